@@ -17,9 +17,13 @@ from strapgen.ir.fixed_settings import Settings
 Inputs = Callable[[strapgen.Evaluator, int], Sequence[np.ndarray]]
 
 
-def share_of_bound(name: str, settings: Settings, proper_inputs: Inputs) -> float | None:
+def _choice(name: str | Choice) -> Choice:
+    return name if isinstance(name, Choice) else Choice(name)
+
+
+def share_of_bound(name: str | Choice, settings: Settings, proper_inputs: Inputs) -> float | None:
     """Hold the errors of a kernel to its bounds, and return the largest share; None where all bounds are zero."""
-    fixed = quantized(Choice(name), settings)
+    fixed = quantized(_choice(name), settings)
     model = strapgen.evaluator(name, "fixed-model", settings)
     inputs = proper_inputs(model, 20)
     results, _ = model.run(inputs, model.fresh(20))
@@ -34,7 +38,7 @@ def share_of_bound(name: str, settings: Settings, proper_inputs: Inputs) -> floa
     return share if any(any(argument.errors) for argument in fixed.interface.outputs) else None
 
 
-def require_integers_of_the_model(name: str, settings: Settings, proper_inputs: Inputs) -> None:
+def require_integers_of_the_model(name: str | Choice, settings: Settings, proper_inputs: Inputs) -> None:
     """Require that C returns the integers and the error feedback of the model."""
     backends = (f"c-fixed{settings.word}", "fixed-model")
     in_c, model = (strapgen.evaluator(name, backend, settings) for backend in backends)
@@ -46,7 +50,9 @@ def require_integers_of_the_model(name: str, settings: Settings, proper_inputs: 
     np.testing.assert_array_equal(left, remaining)
 
 
-def require_what_numpy_computes(name: str, backend: str, settings: Settings, proper_inputs: Inputs) -> None:
+def require_what_numpy_computes(
+    name: str | Choice, backend: str, settings: Settings, proper_inputs: Inputs
+) -> None:
     """Require that C in floating point is within its bounds of numpy."""
     in_c, double = strapgen.evaluator(name, backend), strapgen.evaluator(name)
     model = strapgen.evaluator(name, "fixed-model", settings)
@@ -59,7 +65,7 @@ def require_what_numpy_computes(name: str, backend: str, settings: Settings, pro
     ]
     computed, expected = (result if isinstance(result, tuple) else (result,) for result in results)
     bounds = in_c.sources.rounding
-    for signal, one, other in zip(program(Choice(name)).outputs, computed, expected, strict=True):
+    for signal, one, other in zip(program(_choice(name)).outputs, computed, expected, strict=True):
         apart = np.abs(one.astype(float) - other).reshape(50, -1)
         if bounds.errors:
             # Double itself rounds 2**-29 as much as float; the bounds of both are of twice what either may lose.

@@ -255,6 +255,7 @@ LONG_COMMANDS = (
     "strapgen cost ",
     "strapgen derive separate ",
     "strapgen derive torques ",
+    "strapgen design ",
     "strapgen frontier ",
     "strapgen generate euler --method window",
     "strapgen window ",

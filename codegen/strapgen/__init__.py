@@ -67,6 +67,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.pipeline import quantize as quantize
     from strapgen.reports import formulas as formulas
     from strapgen.rounding.bounds import rounding_bounds as rounding_bounds
+    from strapgen.simulation import sensor_errors as _sensor_errors
     from strapgen.simulation.courses import Course as Course
     from strapgen.simulation.courses import course as course
     from strapgen.simulation.motions import Motion as Motion
@@ -97,6 +98,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.toolchain.compiler import compile_together as compile_together
 
     gyro = _increments
+    sensors = _sensor_errors
     study = _word_length
     window_design = _family
 
@@ -220,6 +222,7 @@ _NAMESPACES = {
     "formulas": "reports.formulas",
     "gyro": "backends.increments",
     "runge_kutta": "catalogue.methods.runge_kutta",
+    "sensors": "simulation.sensor_errors",
     "study": "experiments.word_length",
     "tableaux": "catalogue.methods.tableaux",
     "vibration": "vibration",

@@ -24,8 +24,8 @@ CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
 WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
 ASSESSED = (
-    "allowed: dcm, euler, cayley-klein, rotation-vector, sculling, coning-fast, sculling-fast-1, sculling-fast-2, "
-    "two-speed-fast-1, two-speed-fast-2, two-speed, or a Python file"
+    "allowed: dcm, euler, cayley-klein, rotation-vector, sculling, velocity-position, coning-fast, sculling-fast-1, "
+    "sculling-fast-2, two-speed-fast-1, two-speed-fast-2, two-speed, or a Python file"
 )
 
 LOG = f"--increments-csv {DATA.parents[1]}/examples/inertial_log.csv"
@@ -234,6 +234,22 @@ BAD = {
     "derive rotation-vector --tableau kutta.toml": "rotation-vector goes with no tableau; allowed methods: magnus2",
     "derive sculling --method magnus4": "method of sculling 'magnus4' is not known; allowed: coning-compressed",
     "derive sculling --rates": "method coning-combined takes increments; rates at nodes do not go with it",
+    "derive velocity-position --rates": "velocity-position takes increments of angle and of velocity; rates do not go",
+    "derive velocity-position --method rk99": "method of velocity-position 'rk99' is not known; allowed: rk1, rk2",
+    "series velocity-position --motion constant": "series of velocity-position hold for any motion; --motion, --versus",
+    "series velocity-position --terms 4": "terms is 4; a whole number from 1 to 3 is needed",
+    "study velocity-position --method sculling": "method 'sculling' is not known",
+    "study velocity-position --method two-speed:x": "number of samples in two-speed:x is 'x'; a whole number is needed",
+    "study velocity-position --backend cobol": "backend 'cobol' is not known; allowed: numpy",
+    "study velocity-position --carry full": "--carry goes with a back end of fixed point, not with numpy",
+    "study velocity-position --force push": "force 'push' is not known; allowed: constant, random, oscillation, lever",
+    "study velocity-position --force lever": "force lever needs parameters; allowed: x_m, y_m, z_m",
+    "study velocity-position --force oscillation --force-set x_g=1": "force oscillation lacks frequency_hz",
+    "study velocity-position --force-set rms_m_s2=1 rms_g=1": "rms_m_s2 and rms_g are both given; one is needed",
+    "study velocity-position --force-set rms": "--force-set 'rms' is no setting; key=value is needed",
+    "study velocity-position --force oscillation --force-set frequency_hz=0": "frequency_hz is 0; a number above 0",
+    "study velocity-position --motion swing": "motion 'swing' is not known; allowed: constant",
+    "study velocity-position --duration 0.015": "duration 0.015 s is not a whole multiple of the sampling interval",
     "derive euler --method coning-compressed --rates": "rates at nodes do not go with it",
     "derive sculling --increments 9": "increments is 9; a whole number from 1 to 8 is needed",
     "generate sculling --target c-fixed": "the range of input velocity_increments is not known",

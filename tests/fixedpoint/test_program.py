@@ -94,6 +94,37 @@ def test_any_polynomial_keeps_its_bound(made, word, rounding, data):
         assert abs(computed[0] * result.format.unit - wanted[0]) <= result.errors[0]
 
 
+@pytest.mark.parametrize("word", [8, 32])
+def test_a_product_with_what_is_always_zero_is_zero(word):
+    body = {
+        "zero": op("subtract", "x_1", "x_1"),
+        "again": op("add", "x_2", "zero"),
+        "none": op("subtract", "x_2", "again"),
+        "y": op("multiply", "x_1", "none"),
+    }
+    fixed = quantize(hand_made(body, "y"), Settings(word))
+    assert ModelEvaluator(generate(fixed, "fixed-model")).step([5, -3, 2]) == ((0,),)
+    assert fixed.error_bounds["y"] <= Fraction(1, 1 << word)
+
+
+@pytest.mark.parametrize(
+    ("near", "apart"),
+    [
+        (op("add", "x_1", op("multiply", number(2), "x_2")), True),
+        (op("multiply", number(Fraction(1, 3)), "x_1"), False),
+        (op("multiply", "x_1", "x_2"), False),
+    ],
+)
+def test_only_exact_sums_of_inputs_are_split_off(near, apart):
+    box = {name: Interval.symmetric(Fraction(1, 8)) for name in ("x_1", "x_2", "x_3")}
+    small = op("multiply", op("multiply", "x_3", "x_2"), number(Fraction(1, 64)))
+    body = {"near": near, "sum": op("add", "near", small), "y": op("multiply", "sum", "x_1")}
+    total = quantities(hand_made(body, "y"), box, split=True).items["sum"]
+    assert total.beside == (((("near",), Fraction(1)),) if apart else ())
+    assert (("near",) in dict(total.definition.terms)) is not apart
+    assert not quantities(hand_made(body, "y"), box).items["sum"].beside
+
+
 def test_what_stays_near_a_constant_is_kept_as_its_distance():
     box = {name: Interval.symmetric(Fraction(1, 8)) for name in ("x_1", "x_2", "x_3")}
     body = {

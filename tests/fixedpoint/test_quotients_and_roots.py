@@ -31,6 +31,9 @@ def quotient(known, definition, exact, **options) -> tuple[Value, Worst]:
         # unit, where the computed numerator is too large and the computed divisor too small.
         ({"a": ABOVE, "b": BELOW}, "a", lambda a, b: a / b, 3),
         ({"a": ABOVE, "b": Known(4, 16, 24)}, "a", lambda a, b: a / b, 3),
+        # By a divisor of 2 the errors count half, by one of a half twice.
+        ({"a": ABOVE, "b": Known(3, 16, 24, Fraction(1, 90))}, "a", lambda a, b: a / b, 4),
+        ({"a": ABOVE, "b": Known(5, 16, 24, Fraction(1, 90))}, "a", lambda a, b: a / b, 2),
         ({"a": Known(4, -15, 15), "b": BELOW}, "a", lambda a, b: a / b, 3),
         # Two thirds are 171/256, which is too large; a sixteenth of it in 2048ths of 16ths is 85 and a half.
         ({"b": BELOW}, Fraction(2, 3), lambda b: Fraction(2, 3) / b, 7),
@@ -66,6 +69,15 @@ def test_a_quotient_is_as_fine_as_the_numerator_has_room():
     assert measured.error <= coarse.error == Fraction(1, 2)
     with pytest.raises(InputError, match="too short for y"):
         quotient(wide, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 2})
+
+
+def test_half_of_a_wide_divisor_has_room_beside_the_numerator():
+    # One place more would make 20,000 of the numerator, to which half of 15,010 is added: both have 15 bits together.
+    known = {"a": Known(4, 9_990, 10_000, wide=True), "b": Known(4, 15_000, 15_010, wide=True)}
+    value, measured = quotient(known, Quotient("a", "b"), lambda a, b: a / b)
+    assert (value.fraction, value.peak, measured.peak) == (0, 10_000, 10_000)
+    with pytest.raises(InputError, match="too short for y"):
+        quotient(known, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 1})
 
 
 def root_of(value: Fraction) -> Fraction:

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_systems import COUNTING
+from systems.described_files import description
 
 import strapgen
 from strapgen import backends, pipeline
+from strapgen.backends.systems import system_runner
 from strapgen.cli import main
 from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import CompilerError
@@ -334,3 +337,22 @@ def test_a_fork_compiles_in_a_process_of_its_own(sources):
     child.join(60)
     assert made.get() == (True, child.pid)
     assert compiler.load(other(sources, 3)).lib.euler_normalize
+
+
+def test_stages_of_a_system_are_compiled_together_and_only_where_they_are_called(sources, counting, tmp_path):
+    compiler.load(sources)
+    of_one_module = counting()
+    runner = system_runner(description(tmp_path, COUNTING, "counted.toml"), "c")
+    runner.run({"counts": np.zeros((4, 3))})
+    assert counting() == 2 * of_one_module
+    assert len(runner.evaluators) == 2
+    assert counting() == 3 * of_one_module
+
+
+def test_back_ends_that_are_compared_are_compiled_together(sources, counting):
+    compiler.load(sources)
+    of_one_module = counting()
+    rows = strapgen.compare("euler", "rk1", 1, ["c", "c-float", "c-fixed32"], np.full((5, 1, 3), 0.01))
+    assert [row.backend for row in rows] == ["c", "c-float", "c-fixed32"]
+    # Six kernels; those in double and in float have the same names, and go into two modules.
+    assert counting() == 3 * of_one_module

@@ -125,6 +125,10 @@ def test_a_sculling_kernel_has_the_rate_of_its_dual(options):
     assert direct.computed == dual.computed == step.computed
     assert direct.continuous == dual.continuous
     assert direct.expression("continuous") == SCULLING
+    # The whole change of velocity, by dual numbers, has the rate of the sum and its sculling term.
+    whole = vibration.of(choose("velocity-position", *options), "sculling")
+    assert same(whole.expression("computed"), direct.expression("computed"))
+    assert same(whole.expression("error"), direct.expression("error"))
 
 
 @pytest.mark.parametrize(

@@ -136,6 +136,31 @@ def scalar(frame: Frame, element: Any) -> Polynomial:
     return total.get((), {})
 
 
+def vector(frame: Frame, elements: Sequence[Any]) -> Coefficients:
+    """Return a vector as a sum of vectors and cross products.
+
+    Parameters
+    ----------
+    frame : Frame
+    elements : sequence of ring element
+        The vector in the coordinates of the frame, over the rational numbers or a field of roots.
+
+    Raises
+    ------
+    NotCovariantError
+        If it does not commute with rotations of the vectors of the frame.
+    """
+    domain = elements[0].ring.domain
+    if domain == sp.QQ:
+        return frame.quaternion(list(elements), frame.ring.zero).vector
+    total: Coefficients = {}
+    for power in range(domain.mod.degree()):
+        shares = [_share(frame, element, power) for element in elements]
+        part = frame.quaternion(shares, frame.ring.zero).vector
+        _add(total, _scaled(part, domain.ext.as_expr() ** power))
+    return total
+
+
 def scalar_value(polynomial: Polynomial, vectors: Sequence[Sequence[Any]]) -> Any:
     """Return the value of a polynomial in scalar products for vectors of numbers, symbols or polynomials."""
     return Decomposition(polynomial, {}, {}).evaluate([list(vector) for vector in vectors])[3]

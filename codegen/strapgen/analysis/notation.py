@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -22,16 +22,18 @@ class Notation:
 
     Parameters
     ----------
-    vector, length, dot, cross, triple, symmetric, unit, power : str
-        Patterns: of a derivative of the rate by its number, of the length, the scalar, the cross and the triple product
-        of vectors, of the symmetrized product of two vectors, of the unit matrix, and of a power.
+    vector : callable
+        Writes a vector by its number; by default a derivative of the rate.
+    length, dot, cross, triple, symmetric, unit, power : str
+        Patterns: of the length, the scalar, the cross and the triple product of vectors, of the symmetrized product of
+        two vectors, of the unit matrix, and of a power.
     space : str
         What stands between factors.
     number : callable
         Writes a number above 0.
     """
 
-    vector: str
+    vector: Callable[[int], str]
     length: str
     dot: str
     cross: str
@@ -53,9 +55,11 @@ def _typeset(size: sp.Expr) -> str:
     return str(sp.latex(size if not size.is_Rational or size.q < _DECIMAL else sp.Float(size, 12)))
 
 
-TEXT = Notation("w{}", "|{}|", "({} . {})", "{} x {}", "({} . {} x {})", "S({}, {})", "1", "{}^{}", _plain)
+TEXT = Notation(
+    "w{}".format, "|{}|", "({} . {})", "{} x {}", "({} . {} x {})", "S({}, {})", "1", "{}^{}", _plain
+)
 LATEX = Notation(
-    r"\boldsymbol\omega_{{{}}}",
+    r"\boldsymbol\omega_{{{}}}".format,
     r"|{}|",
     r"({} \cdot {})",
     r"{} \times {}",
@@ -66,6 +70,26 @@ LATEX = Notation(
     _typeset,
     r"\,",
 )
+
+
+def with_forces(notation: Notation, rates: int, force: Callable[[int], str] = "f{}".format) -> Notation:
+    """Return a notation whose vectors from a number on are derivatives of the specific force.
+
+    Parameters
+    ----------
+    notation : Notation
+    rates : int
+        Number of the derivatives of the rate, counting the rate itself.
+    force : callable, optional
+        Writes a derivative of the force by its number.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> covariant_text({(0, 3): {(): Fraction(1, 2)}}, notation=with_forces(TEXT, 2))
+    '1/2 w0 x f1'
+    """
+    return replace(notation, vector=lambda i: notation.vector(i) if i < rates else force(i - rates))
 
 
 def scalar_text(polynomial: Polynomial, notation: Notation = TEXT) -> str:
@@ -100,7 +124,7 @@ def covariant_text(coefficients: Coefficients, symmetric: bool = False, notation
     """
 
     def covariant(indices: tuple[int, ...]) -> str:
-        words = [notation.vector.format(i) for i in indices]
+        words = [notation.vector(i) for i in indices]
         if not symmetric:
             return notation.cross.format(*words) if len(words) > 1 else words[0]
         if not words:
@@ -133,7 +157,7 @@ def _sum(coefficients: Coefficients, notation: Notation, covariant: Callable[[tu
 def _products(monomial: Sequence[tuple[int, ...]], notation: Notation) -> list[str]:
     factors = []
     for product, power in Counter(monomial).items():
-        words = [notation.vector.format(i) for i in product]
+        words = [notation.vector(i) for i in product]
         if len(product) == 3:
             text = notation.triple.format(*words)
         elif product[0] == product[1]:

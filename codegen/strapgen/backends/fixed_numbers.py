@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends.evaluators import Array
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
 from strapgen.support.exceptions import InputError
 
@@ -51,6 +51,12 @@ def in_units(argument: Argument, values: Array) -> Array:
     if argument.sensor is not None:
         return np.asarray(values / float(argument.unit))
     return np.asarray(np.ldexp(values, argument.format.fraction))
+
+
+def fresh_feedback(interface: Interface, count: int) -> Array:
+    """Return the error feedback with which `count` independent runs begin, (count, number of words)."""
+    integer_type: Any = object if interface.settings.word > 32 else np.int64
+    return np.tile(np.array([word.fresh for word in interface.residuals], integer_type), (count, 1))
 
 
 @dataclass(frozen=True)

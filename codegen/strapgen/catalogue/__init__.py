@@ -10,24 +10,26 @@ from strapgen.catalogue.choice import Choice, increments, orthonormalizations, p
 from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.loop_names import LOOPS
+from strapgen.catalogue.method_names import (
+    INTEGRATORS,
+    METHODS,
+    STANDARD_METHODS,
+    VECTORS,
+    Integrator,
+    StepVector,
+)
 from strapgen.catalogue.names import (
     ALGORITHMS,
     COMPENSATION,
-    INTEGRATORS,
     KERNELS,
     LAYOUT_KERNELS,
-    METHODS,
     MOST_BESIDE,
     MOST_INCREMENTS,
     MOTIONS,
     RESERVED,
     RUN_MOTIONS,
-    STANDARD_METHODS,
     TWO_SPEED,
     UPDATE_ORDERS,
-    VECTORS,
-    Integrator,
-    StepVector,
 )
 from strapgen.catalogue.navigation_names import NAVIGATION
 from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS

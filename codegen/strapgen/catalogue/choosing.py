@@ -12,6 +12,7 @@ from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue import layout as layout_files
 from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.layout import Layout
+from strapgen.catalogue.method_names import INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
@@ -19,16 +20,12 @@ from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import EXACT, named_window
 from strapgen.catalogue.names import (
     ALGORITHMS,
-    INTEGRATORS,
     KERNELS,
     LAYOUT_KERNELS,
     LEAST_WHOLE,
-    METHODS,
     MOST_BESIDE,
     MOST_INCREMENTS,
     RESERVED,
-    STANDARD_METHODS,
-    VECTORS,
 )
 from strapgen.catalogue.user import loading
 from strapgen.support import checks
@@ -154,12 +151,15 @@ def _choose(
         return _choose_shape(name, shape, increments, rates, (previous, ahead))
     assert not isinstance(method, (Window, ShapedConing)), "those are taken before"
     if name in VECTORS:
-        if isinstance(method, Tableau):
+        if rates and VECTORS[name].every:
+            raise InputError(f"{name} takes increments of angle and of velocity; rates do not go with it")
+        if isinstance(method, Tableau) and not VECTORS[name].every:
             raise InputError(
                 f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"
             )
         method = VECTORS[name].default if method is None else method
-        checks.choice(f"method of {name}", method, VECTORS[name].methods)
+        if not isinstance(method, Tableau):
+            checks.choice(f"method of {name}", method, VECTORS[name].methods)
     if not isinstance(method, Tableau):
         method = checks.choice("method", "rk4" if method is None else method, METHODS)
     return _choose_samples(name, method, increments, rates, _beside(previous, ahead))
@@ -211,7 +211,7 @@ def _choose_window(
     """Return the choice of a window, or of the filters of its family with other numbers of samples beside the step."""
     if name in VECTORS and not VECTORS[name].takes_windows:
         raise InputError(f"{name} goes with no window; allowed methods: {', '.join(VECTORS[name].methods)}")
-    if name in VECTORS and window.rotation != "fourth":
+    if name in VECTORS and window.rotation != "fourth" and not VECTORS[name].every:
         raise InputError(
             f"{name}: {window.name} computes a rotation, not its vector; {window.name.removesuffix(EXACT)} does"
         )

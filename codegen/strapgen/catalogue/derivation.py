@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.choice import AnyMethod, Choice
+from strapgen.catalogue.method_names import INTEGRATORS, VECTORS
 from strapgen.catalogue.methods.shaped_coning import named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
-from strapgen.catalogue.names import INTEGRATORS, KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS, VECTORS
+from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -81,6 +83,18 @@ def _derived(choice: Choice) -> Kernel:
     """Return the kernel of a choice with all its inputs."""
     if choice.user_kernel is not None:
         return choice.user_kernel.kernel
+    if choice.method is None or isinstance(choice.method, str):
+        return _known(choice)
+    return _of_catalogue(choice)  # the same coefficients from two files are told apart by the kernel alone
+
+
+@lru_cache(maxsize=8)  # lowering, closed forms and noise are of the same kernel, one after the other
+def _known(choice: Choice) -> Kernel:
+    return _of_catalogue(choice)
+
+
+def _of_catalogue(choice: Choice) -> Kernel:
+    """Return the kernel of a choice of names."""
     if choice.method is None:
         described = choice.layout is not None
         recipe = LAYOUT_KERNELS[choice.name] if described else KERNELS[choice.name]

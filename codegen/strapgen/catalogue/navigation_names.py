@@ -36,6 +36,12 @@ NAVIGATION = {
     "velocity-step-level": _recipe("velocity after a cycle, vertical held", "steps", "velocity_step", True),
     "position-step": _recipe("position after a cycle", "steps", "position_step"),
     "height-step": _recipe("height after a cycle", "steps", "height_step"),
+    **{
+        f"{name}-translation": _recipe(
+            "velocity and position after a step", "translation", "translation", name
+        )
+        for name in ("dcm", "euler")
+    },
     "geographic-angles": _recipe("latitude, longitude and wander angle", "geographic", "geographic_angles"),
     "position-from-angles": _recipe(
         "position of latitude, longitude, wander angle", "geographic", "position_from_angles"

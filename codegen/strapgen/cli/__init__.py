@@ -33,10 +33,13 @@ from strapgen.cli.commands import (
     study_attitude_form,
     study_calibration,
     study_loops,
+    study_monte_carlo,
     study_output_filter,
     study_pulse_torque,
     study_redundancy,
+    study_sensor_errors,
     study_system,
+    study_velocity_position,
     system,
     tableau,
     tables,
@@ -48,6 +51,7 @@ from strapgen.cli.commands import (
 )
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.support.exceptions import StrapgenError
+from strapgen.support.processes import prepare_for_derivations
 
 #: Headings of ``strapgen --help``, and the commands below each.
 COMMANDS: dict[str, dict[str, Any]] = {
@@ -105,7 +109,10 @@ study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_o
 study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
 study.app.command("calibration", cls=PlainCommand)(study_calibration.study_calibration)
 study.app.command("pulse-torque", cls=PlainCommand)(study_pulse_torque.study_pulse_torque)
+study.app.command("sensor-errors", cls=PlainCommand)(study_sensor_errors.study_sensor_errors)
 study.app.command("loops", cls=PlainCommand)(study_loops.study_loops)
+study.app.command("velocity-position", cls=PlainCommand)(study_velocity_position.study_velocity_position)
+study.app.command("monte-carlo", cls=PlainCommand)(study_monte_carlo.study_monte_carlo)
 
 app = typer.Typer(
     name="strapgen",
@@ -129,6 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started us
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115, PTH123
+    prepare_for_derivations()
     words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
         status = app(words, prog_name="strapgen", standalone_mode=False)
@@ -168,13 +176,14 @@ def _fail(message: str) -> None:
 
 
 def _spread_settings(words: list[str]) -> list[str]:
-    """Let one --set take several settings: ``--set a=1 b=2`` becomes ``--set a=1 --set b=2``."""
+    """Let one --set take several settings: ``--set a=1 b=2`` becomes ``--set a=1 --set b=2``; --force-set likewise."""
     spread: list[str] = []
-    inside = False
+    inside = ""
     for word in words:
-        if inside and "=" in word and not word.startswith("-") and spread[-1] != "--set":
-            spread.append("--set")
+        if inside and "=" in word and not word.startswith("-") and spread[-1] != inside:
+            spread.append(inside)
         elif word.startswith("-"):
-            inside = word == "--set" or word.startswith("--set=")
+            name = word.partition("=")[0]
+            inside = name if name in ("--set", "--force-set") else ""
         spread.append(word)
     return spread

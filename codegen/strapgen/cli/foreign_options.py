@@ -11,7 +11,7 @@ from strapgen.cli.options import option
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.experiments.foreign_runs import ForeignStep
+    from strapgen.experiments.foreign.runs import ForeignStep
 
 _Text = str | None
 
@@ -74,7 +74,7 @@ class ForeignOptions:
 
     def step(self, file: str) -> ForeignStep:
         """Return the function of a file, compiled."""
-        from strapgen.experiments.foreign_runs import Convention, ForeignStep
+        from strapgen.experiments.foreign.runs import Convention, ForeignStep
         from strapgen.toolchain.foreign_arguments import RATES, read_arguments
         from strapgen.toolchain.foreign_bridge import ForeignSource
 

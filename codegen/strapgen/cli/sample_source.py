@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from strapgen.cli.options import option
 from strapgen.support.exceptions import InputError
@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
     from strapgen.simulation.motions import Motion
     from strapgen.simulation.recording import Recording
+    from strapgen.simulation.sensor_errors.instruments import InstrumentErrors
 
 _Text = str | None
+Recorded = TypeVar("Recorded", bound="Recording")
 
 #: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
@@ -31,6 +33,17 @@ MotionSettings = Annotated[
         "--set",
         metavar="KEY=VALUE...",
         help="Parameters of the motion; strapgen list motions shows their names.",
+        panel="Input",
+    ),
+]
+
+#: The option of sensor errors, for every command that runs an algorithm.
+SensorFile = Annotated[
+    str | None,
+    option(
+        "--errors",
+        metavar="FILE",
+        help="TOML file of sensor errors, or a class: ins-0.1, ins-1, ahrs or midcourse.  [default: no errors]",
         panel="Input",
     ),
 ]
@@ -110,9 +123,11 @@ class SampleSource:
         option(
             "--specific-force",
             metavar="X,Y,Z",
-            help="Specific force on a described system in m/s^2, constant in reference axes.  [default: 0,0,0]",
+            help="Specific force in m/s^2, constant in reference axes: on a described system, or on sensors with "
+            "--errors.  [default: 0,0,0]",
         ),
     ] = None
+    errors: SensorFile = None
 
     @property
     def stated(self) -> bool:
@@ -127,8 +142,9 @@ class SampleSource:
         of_system : bool, optional
             Whether a described system runs, which states its rate itself.
         """
-        if self.specific_force is not None and not (of_system and self.motion is not None):
-            raise InputError("--specific-force goes with a described system and --motion")
+        felt = of_system or self.errors is not None
+        if self.specific_force is not None and not (felt and self.motion is not None):
+            raise InputError("--specific-force goes with a described system or --errors, and with --motion")
         from strapgen.catalogue import RUN_MOTIONS
 
         check_motion(self.motion, RUN_MOTIONS)
@@ -167,11 +183,38 @@ class SampleSource:
             return None
         return math.radians(float(checks.number("pulse_arcsec", self.pulse_arcsec, positive=True)) / 3600)
 
-    def profile(self) -> Motion:
-        """Return the motion with its parameters; one of a file is checked over the duration of the run."""
+    def profile(self, start: Any = None) -> Motion:
+        """Return the motion with its parameters, as sensors measure it if they have errors.
+
+        A motion of a file is checked over the duration of the run.
+
+        Parameters
+        ----------
+        start : array, (3, 3), optional
+            Attitude at the start, body to reference; by default there is no rotation.
+        """
         from strapgen.simulation.users_motions import any_motion
 
-        return any_motion(self.motion or "", self.duration or "", pairs(self.settings or []))
+        true = any_motion(self.motion or "", self.duration or "", pairs(self.settings or []))
+        errors = self.sensor_errors()
+        if errors is None:
+            return true
+        from strapgen.simulation.sensor_errors.measured_motions import measured
+
+        force = None if self.specific_force is None else force_of(self.specific_force)
+        return measured(true, errors, force=force, start=start)
+
+    def sensor_errors(self) -> InstrumentErrors | None:
+        """Return the errors of the sensors; None without a file."""
+        errors = read_errors(self.errors)
+        if errors is not None and self.pulse_arcsec is not None and errors.gyro.pulse.any():
+            raise InputError("--pulse-arcsec and the pulse in --errors are both there; one of them is needed")
+        return errors
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a report says of the sensors: nothing, unless they have errors."""
+        return {} if self.errors is None else {"errors": self.errors}
 
     def described(self, name: str, noun: str = "") -> str:
         """Return the name of the motion with its parameters, for a title."""
@@ -182,7 +225,7 @@ class SampleSource:
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
         of_motion = Path(self.motion) if self.motion is not None and is_file(self.motion) else None
-        return self.increments_csv, self.rates_csv, of_motion
+        return self.increments_csv, self.rates_csv, of_motion, Path(self.errors) if self.errors else None
 
     def times(self) -> tuple[Fraction, Fraction]:
         """Return the step and the duration of a run on a motion in s."""
@@ -198,10 +241,14 @@ class SampleSource:
         from strapgen.cli.progress import waiting
         from strapgen.simulation import recording
 
+        errors = self.sensor_errors()
         with waiting(f"reading {self.file.name}"):
-            if self.increments_csv is not None:
-                return recording.read_increments(self.increments_csv)
-            return recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
+            data = (
+                recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
+                if self.increments_csv is None
+                else recording.read_increments(self.increments_csv)
+            )
+        return with_errors(data, errors)
 
     def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
         """Return the increments that the options describe.
@@ -262,6 +309,35 @@ class SampleSource:
         return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
 
 
+def read_errors(source: str | None) -> InstrumentErrors | None:
+    """Return the errors that --errors names; None without it."""
+    if source is None:
+        return None
+    from strapgen.simulation.sensor_errors.error_file import read
+
+    return read(source)
+
+
+def with_errors(data: Recorded, errors: InstrumentErrors | None) -> Recorded:
+    """Return a recording as sensors with errors measure what it holds."""
+    if errors is None:
+        return data
+    from strapgen.simulation.sensor_errors.measured_motions import measured_recording
+
+    return measured_recording(data, errors)
+
+
+def force_of(text: str | None) -> tuple[float, float, float]:
+    """Return a specific force of the command line in m/s^2."""
+    from strapgen.support import checks
+
+    parts = ["0"] * 3 if text is None else text.split(",")
+    if len(parts) != 3:
+        raise InputError(f"--specific-force is {text!r}; three numbers with commas between are needed")
+    x, y, z = (Fraction(checks.number("specific-force", part)) for part in parts)
+    return float(x), float(y), float(z)
+
+
 def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
     for name, value in options.items():
         if value is not None:
@@ -290,14 +366,14 @@ def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> 
         checks.choice("motion", name, {**MOTIONS, **(further or {})})
 
 
-def pairs(settings: list[str]) -> dict[str, str]:
+def pairs(settings: list[str], option: str = "--set") -> dict[str, str]:
     """Read settings of the form key=value."""
     values: dict[str, str] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not equals or not key:
-            raise InputError(f"--set {setting!r} is no setting; key=value is needed")
+            raise InputError(f"{option} {setting!r} is no setting; key=value is needed")
         if key in values:
-            raise InputError(f"--set {key} is given twice")
+            raise InputError(f"{option} {key} is given twice")
         values[key] = value
     return values

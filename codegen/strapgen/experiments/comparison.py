@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step
+from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step, sources_to_build
 from strapgen.backends import backend as attitude_backend
 from strapgen.backends.increments import pulses
 from strapgen.catalogue import Choice
@@ -22,6 +22,7 @@ from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain.code_size import code_size
+from strapgen.toolchain.compiler import compile_together
 
 Array = NDArray[np.float64]
 
@@ -157,9 +158,14 @@ def compare(
     d = np.asarray(increments, np.float64)
     fixed = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 
-    def load(name: str) -> Backend:
-        return attitude_backend(choice, backend=name, settings=fixed if BACKENDS[name].fixed else None)
+    def settings_of(name: str) -> Settings | None:
+        return fixed if BACKENDS[name].fixed else None
 
+    def load(name: str) -> Backend:
+        return attitude_backend(choice, backend=name, settings=settings_of(name))
+
+    names = [reference, *(name for name in backends if isinstance(name, str))]
+    compile_together(s for name in names for s in sources_to_build(choice, name, settings_of(name)))
     if fixed.sensor is not None:
         d = pulses(d, fixed.sensor.count, choice.previous + choice.ahead)
     standard = load(reference)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import fixedpoint
-from strapgen.backends import Backend, exact
+from strapgen.backends import Backend, exact, sources_to_build
 from strapgen.backends import backend as attitude_backend
 from strapgen.backends.exact import interpreter
 from strapgen.backends.increments import windows
@@ -22,11 +23,13 @@ from strapgen.experiments.convergence import converge
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.simulation.exact_attitudes import step_of_increments
 from strapgen.simulation.motions import GENERAL, motion
 from strapgen.simulation.runs import attitude, drift_between, simulate
 from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.toolchain.compiler import compile_together
 
 #: Largest allowed difference of an observed order from the one of theory.
 ORDER_WITHIN = 0.15
@@ -270,6 +273,8 @@ def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
         drift = drift_between(attitude(backend, states), exact_matrices)
         return float(np.linalg.norm(drift, axis=-1).max())
 
+    settings = Settings().fitted(float(np.abs(increments).max())) if fixedpoint.can_lower(program) else None
+    _compile(choice, settings)
     for name in ("numpy", "c", "c-float"):
         try:
             backend = attitude_backend(choice, backend=name)
@@ -281,7 +286,17 @@ def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
         text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
         yield Finding(f"back end {name}", off <= allowed, text, off, allowed)
         yield _loop(backend, increments, states)
-    yield _fixed(choice, program, increments, exact_states, angle)
+    yield _fixed(choice, settings, increments, exact_states, angle)
+
+
+def _compile(choice: Choice, settings: Settings | None) -> None:
+    """Compile the C of all back ends in one call of the compiler; what fails is told of each of them."""
+    every: list[Sources] = []
+    for name, stated in (("c", None), ("c-float", None), *([("c-fixed32", settings)] if settings else [])):
+        with suppress(InputError):
+            every += sources_to_build(choice, name, stated)
+    with suppress(CompilerError):
+        compile_together(every)
 
 
 def _loop(backend: Backend, increments: NDArray[np.float64], states: Any) -> Finding:
@@ -298,16 +313,15 @@ def _loop(backend: Backend, increments: NDArray[np.float64], states: Any) -> Fin
 
 def _fixed(
     choice: Choice,
-    program: Program,
+    settings: Settings | None,
     increments: NDArray[np.float64],
     exact_states: NDArray[np.float64],
     angle: Callable[[Any, Backend], float],
 ) -> Finding:
     name = "back end c-fixed32"
-    if not fixedpoint.can_lower(program):
+    if settings is None:
         return Finding(name, None, "no fixed point: an input has no stated bound, or an operation is unknown")
     try:
-        settings = Settings().fitted(float(np.abs(increments).max()))
         backend = attitude_backend(choice, backend="c-fixed32", settings=settings)
         off = angle(backend.propagate(increments), backend)
     except (InputError, CompilerError) as error:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 
 from strapgen.fixedpoint.quantities import is_power_of_two
 from strapgen.ir.program import (
@@ -193,7 +194,12 @@ class _Scaling:
         return node if value == 1 else Operation("multiply", (Constant(value), node))
 
     def _factor(self, factor: Fraction, power: int) -> Fraction:
-        return factor * self.scale**power
+        return factor * _power_of(self.scale, power) if power else factor
+
+
+@lru_cache(maxsize=256)
+def _power_of(scale: Fraction, power: int) -> Fraction:
+    return scale**power
 
 
 def _is_linear(node: Node) -> bool:
@@ -285,6 +291,16 @@ def _descend(program: Program, groups: list[tuple[str, ...]], weights: dict[str,
             users[name].append(assignment)
     scalars = {group[0] for group in groups if len(group) == 1}
     scaling, improved = _Scaling(_STAND_IN, weights), True
+    involved = {a.name: sorted({a.name, *references(a.value)} & {*weights}) for a in program.body}
+    known: dict[tuple[str, tuple[int, ...]], int] = {}
+
+    def cost_of(assignment: Assignment) -> int:
+        """Return the multiplications of an assignment, which depend on the weights of its own names alone."""
+        key = assignment.name, tuple([weights[name] for name in involved[assignment.name]])
+        if key not in known:
+            known[key] = _cost(scaling.assigned(assignment))
+        return known[key]
+
     while improved:
         improved = False
         for group in groups:
@@ -296,7 +312,7 @@ def _descend(program: Program, groups: list[tuple[str, ...]], weights: dict[str,
                 costs: dict[int, int] = {}
                 for change in _CHANGES:
                     weights.update((name, k + change) for name, k in zip(names, before, strict=True))
-                    costs[change] = sum(_cost(scaling.assigned(a)) for a in near)
+                    costs[change] = sum(map(cost_of, near))
                 best = min(costs, key=lambda change: costs[change])
                 weights.update((name, k + best) for name, k in zip(names, before, strict=True))
                 improved |= best != 0

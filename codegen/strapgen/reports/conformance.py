@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from strapgen.experiments.conformance import Finding
-from strapgen.experiments.foreign_check import ForeignOutcome
+from strapgen.experiments.foreign.check import ForeignOutcome
 from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import Column, TextTable
 

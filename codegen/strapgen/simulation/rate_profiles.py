@@ -216,10 +216,25 @@ def random_rate(rate: float) -> CosineSum:
         Thirty cosines on each axis, of frequencies 0.2 Hz to 50/3 Hz and phases that are the fractional parts of
         multiples of roots.
     """
+    return random_sum(rate, _FREQUENCY_ROOTS, _PHASE_ROOTS)
+
+
+def random_sum(
+    size: float, frequency_roots: tuple[int, int, int], phase_roots: tuple[int, int, int]
+) -> CosineSum:
+    """Return a vector that looks random, without power above 50/3 Hz, see `random_rate`.
+
+    Parameters
+    ----------
+    size : float
+        Root mean square on each axis.
+    frequency_roots, phase_roots : tuple of int
+        For each axis the number whose root sets its frequencies, and the one whose root sets its phases.
+    """
     number = np.arange(1, _COSINES + 1)
-    frequencies = _LOWEST + (_HIGHEST - _LOWEST) * _fractions(_FREQUENCY_ROOTS, number)
-    amplitudes = np.full(frequencies.shape, rate * math.sqrt(2 / _COSINES))
-    return CosineSum(amplitudes, 2 * np.pi * frequencies, 2 * np.pi * _fractions(_PHASE_ROOTS, number))
+    frequencies = _LOWEST + (_HIGHEST - _LOWEST) * _fractions(frequency_roots, number)
+    amplitudes = np.full(frequencies.shape, size * math.sqrt(2 / _COSINES))
+    return CosineSum(amplitudes, 2 * np.pi * frequencies, 2 * np.pi * _fractions(phase_roots, number))
 
 
 def vibration_rate(angle: float, gyro: float) -> CosineSum | ThroughGyro:

@@ -16,7 +16,8 @@ from strapgen.ir.system import Cell, DescribedSystem
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.recording import History, Recording
 from strapgen.simulation.runs import Run
-from strapgen.simulation.system_inputs import cycles_of, samples, velocity_increments
+from strapgen.simulation.sensor_errors.measured_motions import both_increments
+from strapgen.simulation.system_inputs import cycles_of, samples
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -125,8 +126,7 @@ def simulate_system(
     def attitude(time: Array) -> Array:
         return np.asarray(begin @ motion.attitude(time))
 
-    angle = motion.samples(interval, 0, cycles)
-    velocity = velocity_increments(attitude, force, interval, cycles)
+    angle, velocity = both_increments(motion, attitude, force, interval, cycles)
     run = runner.run(samples(runner.fit.description, angle, velocity), memory)
     states = matrices(cell.signal, run.values[cell.name])[thinning - 1 :: thinning]
     if not np.isfinite(states).all():

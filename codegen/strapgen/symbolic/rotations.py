@@ -148,14 +148,14 @@ def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
 
 
 def wave_series(square: Any, first: int, order: int) -> Any:
-    """Return the truncated series of sin(x)/x, (1 - cos x)/x^2 or cos x in the square of x.
+    """Return the truncated series of sin(x)/x, (1 - cos x)/x^2, (x - sin x)/x^3 or cos x in the square of x.
 
     Parameters
     ----------
     square : Expr or ring element
         x^2.
     first : int
-        1, 2 or 0 for these functions: the power of x that multiplies the function in the caller's formula.
+        1, 2, 3 or 0 for these functions: the power of x that multiplies the function in the caller's formula.
     order : int
         Highest power of x in that product, so that the series itself ends at ``order - first``.
 

@@ -8,6 +8,7 @@ from strapgen.vibration.assessment import of as of
 from strapgen.vibration.assessment import sculling as sculling
 from strapgen.vibration.assessment import two_speed as two_speed
 from strapgen.vibration.gyro import through_gyro as through_gyro
+from strapgen.vibration.gyro import through_gyros as through_gyros
 from strapgen.vibration.mean_rates import Assessment as Assessment
 from strapgen.vibration.mean_rates import Rates as Rates
 from strapgen.vibration.spectrum import RandomRates as RandomRates

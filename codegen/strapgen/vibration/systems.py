@@ -35,6 +35,8 @@ RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fa
 NAMES = (*catalogue.ALGORITHMS, *catalogue.VECTORS, *RECURSIONS)
 #: The kernel that computes attitude and velocity after a step from its rotation vector and sculling term.
 _SLOW_LOOP = "dcm-two-speed-slow-2"
+#: The output that is the whole change of velocity, and not what comes on top of the sum of the increments.
+_WHOLE_CHANGE = "velocity_change"
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,8 @@ def _of_vector(
     slow = pipeline.derive(Choice(_SLOW_LOOP))
     assert slow.recursion is not None
     expander = Expander([kernel, slow])
-    output = kernel.outputs[-1].signal
+    whole = [stage.signal for stage in kernel.outputs if stage.signal.name == _WHOLE_CHANGE]
+    output = (whole or [kernel.outputs[-1].signal])[0]
     if output.shape != (3,) or output.unit not in ("rad", "m/s"):
         raise InputError(f"kernel {kernel.name} gives {output.name}; a vector in rad or m/s can be assessed")
     samples, times, cycle = _waves(expander, kernel, sampled, beside, nodes)
@@ -213,8 +216,10 @@ def _of_vector(
                 signal.elements[3 * k : 3 * k + 3] for k in range(beside[0], signal.size // 3 - beside[1])
             ]
             zero = expander.constant(0)
+            counted = signal.unit == "rad" or not whole
             sums[name] = [
-                sum((variables.get(e, zero) for e in axis), zero) for axis in zip(*rows, strict=True)
+                sum((variables.get(e, zero) for e in axis if counted), zero)
+                for axis in zip(*rows, strict=True)
             ]
     for name, elements in sums.items():
         slow_inputs |= dict(zip(inputs[name].elements, elements, strict=True))

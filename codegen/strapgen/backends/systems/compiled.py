@@ -26,6 +26,10 @@ class CompiledSystem(SystemRunner):
         self.module = compiler.load(self.sources)
         self.name = self.sources.function.name
 
+    @property
+    def _dtype(self) -> Any:
+        return real_type(self.fit.target)[1]
+
     def _type(self, name: str) -> np.dtype[Any]:
         argument = self.fit.arguments.get(name)
         if argument is None:
@@ -51,8 +55,7 @@ class CompiledSystem(SystemRunner):
             for cell in self.system.cells
         }
         feedback = {}
-        for name, evaluator in self.evaluators.items():
-            words = evaluator.fresh(1)
+        for name, words in self.fresh(1).items():
             if words.shape[1]:
                 words = np.array([list(getattr(held, f"residuals_{name}"))], words.dtype)
             feedback[name] = words

@@ -12,7 +12,7 @@ import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.exact import in_digits, rounded
-from strapgen.backends.fixed_numbers import integers, numbers
+from strapgen.backends.fixed_numbers import fresh_feedback, integers, numbers
 from strapgen.backends.increments import pulses
 from strapgen.backends.registry import BACKENDS, evaluator_class
 from strapgen.backends.systems.memory import SystemMemory, SystemRun, rescaled
@@ -23,6 +23,7 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.systems.bounds import SystemBounds, bounds
 from strapgen.systems.fitting import Fitted
+from strapgen.toolchain import compiler
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
 _EXACT_BITS = 53
@@ -43,9 +44,22 @@ class SystemRunner(ABC):
         self.fit = fit
         self.backend = backend
         self.system = fit.description.system
-        make = evaluator_class(BACKENDS[backend].target)
-        self.evaluators: dict[str, Evaluator] = {name: make(s) for name, s in fit.sources.items()}
         self.many_digits = BACKENDS[backend].many_digits
+
+    @cached_property
+    def evaluators(self) -> dict[str, Evaluator]:
+        """The generated functions of the stages by name; C is compiled in one call of the compiler."""
+        compiler.compile_together(self.fit.sources.values())
+        make = evaluator_class(BACKENDS[self.backend].target)
+        return {name: make(sources) for name, sources in self.fit.sources.items()}
+
+    def fresh(self, runs: int) -> dict[str, Array]:
+        """Return the error feedback with which runs begin, by stage, (runs, number of words)."""
+        interfaces = {name: sources.fixed for name, sources in self.fit.sources.items()}
+        return {
+            name: np.empty((runs, 0)) if interface is None else fresh_feedback(interface, runs)
+            for name, interface in interfaces.items()
+        }
 
     def begin(self, runs: int = 1) -> SystemMemory:
         """Return the memory with which a run begins."""
@@ -60,8 +74,7 @@ class SystemRunner(ABC):
             else:
                 row = np.array([[float(value) for value in cell.initial]], self._dtype)
             cells[cell.name] = np.repeat(row, runs, axis=0)
-        feedback = {name: evaluator.fresh(runs) for name, evaluator in self.evaluators.items()}
-        return SystemMemory(cells, feedback)
+        return SystemMemory(cells, self.fresh(runs))
 
     @cached_property
     def rounding(self) -> SystemBounds:

@@ -33,7 +33,7 @@ NAVIGATION_VELOCITY = Signal.vector(
 
 
 def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> sp.Matrix:
-    """Return a vector in navigation axes instead of body axes: C u, or q u q*.
+    """Return vectors in navigation axes instead of body axes: C u, or q u q*.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
         "dcm" or "euler".
     state : Matrix
         Attitude, body to navigation axes.
-    u : Matrix, 3 x 1
-        The vector in body axes.
+    u : Matrix, 3 x N
+        The vectors in body axes.
 
     Returns
     -------
-    Matrix, 3 x 1
+    Matrix, 3 x N
     """
     if name == "dcm":
         return state * u

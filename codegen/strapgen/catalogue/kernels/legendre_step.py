@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -38,8 +39,8 @@ def step(name: str, degree: int, terms: int = 0) -> Kernel:
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state = build.input(kinematics.state)
-    samples = _Coefficients(build, degree)
-    method = windowed.method(_unfiltered(degree, terms))
+    samples = Coefficients(build, [build.input(_signal(m)) for m in range(degree + 1)])
+    method = windowed.method(unfiltered(degree, terms))
     transition = method.transition(build, kinematics, samples)
     build.output(kinematics.next, kinematics.product(state, build.stage(kinematics.transition, transition)))
     return build.kernel(
@@ -66,30 +67,39 @@ def coefficient_name(m: int) -> str:
     return f"legendre_{m}"
 
 
-class _Coefficients(Samples):
-    """Legendre coefficients as the samples of a step, each an input."""
+class Coefficients(Samples):
+    """Legendre coefficients of the rate as the samples of a step.
 
-    def __init__(self, build: KernelBuilder, degree: int) -> None:
-        rows = []
-        for m in range(degree + 1):
-            signal = Signal.vector(
-                coefficient_name(m),
-                f"c{m}",
-                unit="rad",
-                meaning=f"Legendre coefficient {m} of the body rate times the step, body axes",
-                bound=Fraction(1),
-                frame="b",
-                over="cycle",
-            )
-            rows.append(build.input(signal).T)
+    Parameters
+    ----------
+    build : KernelBuilder
+        The kernel under construction.
+    vectors : sequence of Matrix, 3 x 1
+        Coefficients of the rate times the step, from degree 0 on: symbols of the kernel.
+    """
+
+    def __init__(self, build: KernelBuilder, vectors: Sequence[sp.Matrix]) -> None:
         self._build = build
         self._labels = {}
-        self._symbols = sp.Matrix.vstack(*rows)
-        self.increments, self.previous, self.ahead = degree + 1, 0, 0
-        self.fit = rate_fit.from_legendre(_unfiltered(degree).filters)
+        self._symbols = sp.Matrix.vstack(*(vector.T for vector in vectors))
+        self.increments, self.previous, self.ahead = len(vectors), 0, 0
+        self.fit = rate_fit.from_legendre(unfiltered(len(vectors) - 1).filters)
 
 
-def _unfiltered(degree: int, terms: int = 0) -> Window:
+def _signal(m: int) -> Signal:
+    """Return the input of a Legendre coefficient."""
+    return Signal.vector(
+        coefficient_name(m),
+        f"c{m}",
+        unit="rad",
+        meaning=f"Legendre coefficient {m} of the body rate times the step, body axes",
+        bound=Fraction(1),
+        frame="b",
+        over="cycle",
+    )
+
+
+def unfiltered(degree: int, terms: int = 0) -> Window:
     """Return the window whose samples are the Legendre coefficients themselves."""
     count = degree + 1
     filters = tuple(tuple(Fraction(row == column) for column in range(count)) for row in range(count))

@@ -8,7 +8,7 @@ import sympy as sp
 
 from strapgen.catalogue.kernels.attitude_step import chosen
 from strapgen.catalogue.methods.method import Method
-from strapgen.catalogue.methods.samples import beside, increments_signal, sample_names
+from strapgen.catalogue.methods.samples import increments_signal, sample_names, velocities_signal
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
@@ -39,16 +39,7 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
     build = KernelBuilder()
     angles = increments_signal(increments, previous)
     names = [sample_names(increments, previous, letter=letter) for letter in "dv"]
-    velocities = Signal(
-        "velocity_increments",
-        angles.shape,
-        tuple(f"{name}_{axis}" for name in names[1] for axis in "xyz"),
-        unit="m/s",
-        meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
-        + beside(previous),
-        frame="b",
-        over="cycle",
-    )
+    velocities = velocities_signal(increments, previous)
     d, v = build.input(angles), build.input(velocities)
     rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]
     total = sp.zeros(3, 1)

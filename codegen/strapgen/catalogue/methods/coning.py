@@ -7,16 +7,15 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.methods import coning_coefficients, rate_fit, rotation_series
+from strapgen.catalogue.methods import coning_coefficients, legendre_vector, rate_fit, rotation_series
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples, sample_names
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import KernelBuilder
-from strapgen.symbolic.rotations import cross, dot
+from strapgen.symbolic.rotations import cross
 
 #: Most Legendre coefficients of the rate in the terms of third and fourth order.
 MOST_COEFFICIENTS = 6
@@ -126,44 +125,8 @@ def _with_terms(
         for m in range(count)
     ]
     second = in_legendre(pairs, samples.increments, samples.previous)
-    series = rotation_series.legendre_terms(min(count, MOST_COEFFICIENTS), 4)
-    third, fourth = rotation_series.third(series[2]), rotation_series.fourth(series[3])
-    products: dict[tuple[int, int], sp.Symbol] = {}
-
-    def weight(constant: Fraction, row: Scalars) -> sp.Expr:
-        total = exact(constant)
-        for (i, j), c in row.items():
-            if (i, j) not in products:
-                products[i, j] = build.value(
-                    f"product_{i}_{j}",
-                    dot(vectors[i], vectors[j]),
-                    f"scalar product of Legendre coefficients {i} and {j}",
-                )
-            total += exact(c) * products[i, j]
-        return total
-
-    phi = sp.zeros(3, 1)
-    for k in range(count):
-        value = weight(Fraction(int(k == 0)), third.get(k, {}))
-        if value.is_Rational:
-            phi += value * vectors[k]
-        else:
-            phi += build.value(f"weight_{k}", value, f"weight of Legendre coefficient {k}") * vectors[k]
-    for k, m in sorted({*second, *fourth}):
-        product = build.stage(
-            Signal.vector(
-                f"cross_{k}_{m}",
-                f"cross_{k}_{m}",
-                meaning=f"cross product of Legendre coefficients {k} and {m}",
-            ),
-            cross(vectors[k], vectors[m]),
-        )
-        value = weight(second.get((k, m), Fraction(0)), fourth.get((k, m), {}))
-        if value.is_Rational:
-            phi += value * product
-        else:
-            phi += build.value(f"weight_{k}_{m}", value, "weight of that cross product") * product
-    return build.stage(PHI, phi)
+    third, fourth = rotation_series.legendre_terms(min(count, MOST_COEFFICIENTS), 4)[2:]
+    return legendre_vector.rotation_vector(build, vectors, (second, third, fourth))
 
 
 def sample_terms(

@@ -14,6 +14,7 @@ from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
+from strapgen.catalogue.methods.window import Window
 from strapgen.ir.attitude_step import Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.evaluation import exact
@@ -63,6 +64,8 @@ class Method:
         each cross product, see `coning_coefficients.Design`.
     truncation : callable, optional
         ``truncation(kinematics)`` returns what its series for an exponential leaves out.
+    window : Window, optional
+        Of a method with filters of its own, the window.
     """
 
     name: str
@@ -80,6 +83,7 @@ class Method:
     conditions: int | None = None
     coning: Callable[[int, int], dict[tuple[int, int], Fraction]] | None = None
     truncation: Callable[[Kinematics], Truncation] | None = None
+    window: Window | None = None
 
     def step_order(self, increments: int | None, previous: int = 0, ahead: int = 0) -> Order:
         """Return the orders of a step on so many increments; None stands for rates at the nodes."""

@@ -96,6 +96,29 @@ class Fit:
             for row in self.basis
         ]
 
+    def integral(self, begin: Fraction, end: Fraction) -> list[sp.Expr]:
+        """Return the weights of the samples in the integral of the rate between two times, in steps.
+
+        Examples
+        --------
+        >>> from_increments(2).integral(Fraction(0), Fraction(1, 2))
+        [1, 0]
+        """
+        ends = [exact(begin), exact(end)]
+        powers = [(ends[1] ** (k + 1) - ends[0] ** (k + 1)) / (k + 1) for k in range(self.degree + 1)]
+        return [_reduced(sp.Add(*(c * x for c, x in zip(row, powers, strict=True)))) for row in self.basis]
+
+    def times_remaining(self) -> Fit:
+        """Return the rate times 1 - t, the part of the step that is still to come at time t.
+
+        Examples
+        --------
+        >>> from_increments(1).times_remaining().basis
+        ((1, -1),)
+        """
+        padded = [((*row, sp.Integer(0)), (sp.Integer(0), *row)) for row in self.basis]
+        return Fit(tuple(tuple(a - b for a, b in zip(*pair, strict=True)) for pair in padded))
+
 
 def from_legendre(filters: Sequence[Sequence[Fraction]]) -> Fit:
     """Return the rate whose Legendre coefficients are given sums of the samples.

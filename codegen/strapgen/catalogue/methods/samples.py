@@ -61,6 +61,20 @@ def increments_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
     )
 
 
+def velocities_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
+    """Return the signal of the velocity increments that a step takes, oldest first, as `increments_signal`."""
+    return Signal(
+        "velocity_increments",
+        (previous + count + ahead, 3),
+        tuple(f"{name}_{axis}" for name in sample_names(count, previous, ahead, "v") for axis in "xyz"),
+        unit="m/s",
+        meaning="velocity increments of the step, body axes, oldest first: exact integrals of the specific force"
+        + beside(previous, ahead),
+        frame="b",
+        over="cycle",
+    )
+
+
 def beside(previous: int, ahead: int = 0) -> str:
     """Return the part of a signal's meaning that tells of samples from before the step and from after it."""
     before = f"; the first {previous} are those before the step" if previous else ""

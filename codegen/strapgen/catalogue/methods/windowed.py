@@ -28,7 +28,7 @@ from strapgen.symbolic.kernel import KernelBuilder
 from strapgen.symbolic.rotations import cross, dot
 
 #: Highest degree of the Legendre coefficients in the rotation vector, and order of a step with its terms.
-_DEGREE, _FOURTH = 4, 6
+DEGREE, _FOURTH = 4, 6
 #: Highest power of the rotation vector in its exponential. At half a radian the powers left out are below 3e-18 in
 #: Euler parameters, which are of half the angle, and below 3e-14 in direction cosines.
 SERIES = 12
@@ -46,7 +46,7 @@ def method(window: Window) -> Method:
     """
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
-        return build.stage(PHI, _rotation_vector(build, _Filtered(build, samples, window)))
+        return build.stage(PHI, _rotation_vector(build, Filtered(build, samples, window)))
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         phi = rotation_vector(build, samples)
@@ -54,7 +54,7 @@ def method(window: Window) -> Method:
         return kinematics.exponential(phi, SERIES, square)
 
     def exact_rotation(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
-        rate = _Filtered(build, samples, window)
+        rate = Filtered(build, samples, window)
         coefficients = [rate.coefficient(m) for m in range(window.degree + 1)]
         return polynomial_rotation.rotation(build, kinematics, coefficients, window.terms, window.increments)
 
@@ -71,6 +71,7 @@ def method(window: Window) -> Method:
         conditions=window.conditions,
         isometry=lambda count: True,
         truncation=lambda kinematics: Truncation(SERIES, fraction(kinematics.scale), _SQUARE),
+        window=window,
     )
     if window.rotation == "fourth":
         return fourth
@@ -101,7 +102,7 @@ def _lever(odd: int, degree: int) -> dict[int, Fraction]:
     return below if odd == degree else {**below, odd + 1: pairs[odd, odd + 1]}
 
 
-class _Filtered:
+class Filtered:
     """The filters of a window as stages of a kernel under construction.
 
     Parameters
@@ -115,7 +116,7 @@ class _Filtered:
     def __init__(self, build: KernelBuilder, samples: Samples, window: Window) -> None:
         self._build, self._samples, self._window = build, samples, window
         self._folded: dict[tuple[int, int], sp.Matrix] = {}
-        self.degree = min(window.degree, _DEGREE)
+        self.degree = min(window.degree, DEGREE)
 
     def coefficient(self, m: int) -> sp.Matrix:
         """Return a Legendre coefficient of the rate times the step."""
@@ -164,7 +165,7 @@ class _Filtered:
         )
 
 
-def _rotation_vector(build: KernelBuilder, rate: _Filtered) -> sp.Matrix:
+def _rotation_vector(build: KernelBuilder, rate: Filtered) -> sp.Matrix:
     """Return the rotation vector to fourth order in its lean form, from c_0, c_1 and e_0, and from c_3 and e_2."""
     vectors = [rate.coefficient(0), rate.coefficient(1), *([rate.lever(1)] if rate.degree > 1 else [])]
     second, third, fourth = _lean_series(len(vectors))

@@ -80,7 +80,7 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
 def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     """Check a function of a file in C or C++."""
     step = foreign.step(file)
-    from strapgen.experiments.foreign_check import check_foreign
+    from strapgen.experiments.foreign.check import check_foreign
     from strapgen.reports.conformance import outcome_report
 
     outcome = check_foreign(step)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from strapgen.catalogue import Choice
 
 _Text = str | None
+#: The kernel of the velocity and position of a step.
+VELOCITY_POSITION = "velocity-position"
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,10 @@ def series(
     where t is the time at the beginning of the step, and the drift of a whole run follows where it has a series; at a
     constant rate all errors are also in closed form.
 
+    The algorithm velocity-position stands for the velocity and position change of a step, whose errors are sums of
+    vectors and cross products of the rate w0 + w1 t + ... and of the specific force f0 + f1 t + ...; the position is
+    divided by h.
+
     Example: strapgen series euler --method rk4 --increments 2 --motion constant
 
     Example: strapgen series dcm --method rk1 --motion constant --versus euler
@@ -183,6 +189,9 @@ def series(
             f"--format {output.format} goes with --all; without it text, latex and json are allowed"
         )
     _check_plot(motion, versus, plot, output)
+    if algorithm == VELOCITY_POSITION:
+        _of_velocity(methods, motion, count, versus, output)
+        return
     choices = methods.choices(algorithm)
     if len(choices) > 1 and (output.plot is not None or versus.versus is not None):
         raise InputError("--plot and --versus go with one method")
@@ -199,6 +208,22 @@ def series(
 
     image = None if output.plot is None else plot.draw(choices[0], motion, count, output.plot)
     output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)
+
+
+def _of_velocity(
+    methods: SeveralMethods, motion: str, terms: int | None, versus: Versus, output: Output
+) -> None:
+    """Deliver the series of velocity and position, which hold for any smooth motion and specific force."""
+    if motion != "general" or versus.versus is not None or output.plot is not None:
+        raise InputError(
+            f"series of {VELOCITY_POSITION} hold for any motion; --motion, --versus and --plot go with an attitude"
+        )
+    from strapgen.analysis import velocity_series
+    from strapgen.reports.error_analysis.velocity_series import velocity_series_report
+
+    most = 1 if terms is None else terms
+    choices = methods.choices(VELOCITY_POSITION, step=False)
+    output.report(velocity_series_report([velocity_series.series(choice, most) for choice in choices]))
 
 
 def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:

@@ -38,6 +38,8 @@ def simulate(
     The true attitude of a motion is known, so that you see the drift, scale and skew of the computed attitude; along a
     recording you see the attitude itself.
 
+    With --errors the algorithm takes what sensors with errors measure, and the truth stays that of the motion.
+
     A file of a motion of your own has functions increments and attitude, which are checked against each other. With
     --rates the step takes the rate itself, so that you see what its extraction from increments costs.
 
@@ -135,7 +137,8 @@ def _on_motion(
     length = float(checks.number("step", step, positive=True))
     _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
     every = _prints(output.print_every, intervals.record or step)
-    profile, start = source.profile(), intervals.start()
+    start = intervals.start()
+    profile = source.profile(start)
     samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
 
     def largest() -> float:
@@ -158,6 +161,7 @@ def _on_motion(
         "duration_s": float(checks.number("duration", duration)),
     }
     facts |= {} if intervals.initial is None else {"initial_deg": intervals.initial}
+    facts |= source.facts
     title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
     shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
     output.report(
@@ -197,8 +201,12 @@ def _on_recording(
         else:
             history = recording.propagate(backend, data, *options)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
-    facts = _facts(backend, choice) | {"source": str(source.file)}
+    facts = _facts(backend, choice) | {"source": str(source.file)} | source.facts
     replace(output, format=output.format or "csv").report(
-        history_report(history, backend.elements, ({"title": output.title} if output.title else {}) | facts),
+        history_report(
+            history,
+            backend.elements,
+            ({"title": output.title} if output.title else {}) | facts,
+        ),
         lambda path: plots.history_image(history, backend.elements, output.title or title, path),
     )

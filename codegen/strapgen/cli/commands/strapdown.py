@@ -10,6 +10,7 @@ from strapgen.cli.course_options import CourseOutput, CycleCounts, Start
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import OneBackend, StrapdownAlgorithm, option
+from strapgen.cli.sample_source import SensorFile, read_errors, with_errors
 from strapgen.systems.built_in import is_system
 
 
@@ -28,6 +29,7 @@ def strapdown(
             panel="Input",
         ),
     ],
+    errors: SensorFile = None,
     start: Start,
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
     output: CourseOutput,
@@ -38,17 +40,19 @@ def strapdown(
     navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force over the
     cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
+    With --errors the increments of the file are the true ones, and the algorithm takes what sensors measure of them.
+
     A described system, a built-in one or a file, takes the rate of the recording, and you see its outputs at the rate
     of the slowest of them.
 
     Example: strapgen strapdown dcm --increments-csv examples/inertial_log.csv --fast-cycles 4 --slow-cycles 25
     --backend c
     """
-    output.check(increments)
+    output.check(increments, errors)
     if is_system(algorithm):
         from strapgen.cli.systems.along import system_along
 
-        return system_along(algorithm, cycles.stated, backend, increments, start, fixed, output)
+        return system_along(algorithm, cycles.stated, backend, (increments, errors), start, fixed, output)
     counts = cycles.counts()
     import numpy as np
 
@@ -57,7 +61,7 @@ def strapdown(
     from strapgen.simulation.courses import course
 
     fixed.check_backend(backend)
-    data = recording.read_inertial(increments)
+    data = with_errors(recording.read_inertial(increments), read_errors(errors))
     settings = fixed.settings_for_run(backend, 1, data.interval, lambda: data.largest)
     frame = start.frame()
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
@@ -74,6 +78,7 @@ def strapdown(
         "backend": backend,
         "source": str(increments),
     }
+    facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
     title = f"{facts['algorithm']}, {backend}: {increments.name}"
     replace(output, format=format).report(

@@ -93,7 +93,8 @@ class VibrationSource:
         option(
             "--gyro-bandwidth-hz",
             metavar="HZ",
-            help="Natural frequency of a gyro of second order, through which the algorithm sees the angles.",
+            help="Natural frequency of a gyro of second order, through which the algorithm sees the angles; X,Y for "
+            "one about each axis.",
         ),
     ] = None
     gyro_damping: GyroDamping = None
@@ -104,7 +105,23 @@ class VibrationSource:
             return assessment
         from strapgen import vibration
 
-        return vibration.through_gyro(assessment, self.gyro_bandwidth_hz, self.gyro_damping)
+        frequencies, dampings = (
+            self._two(name, text)
+            for name, text in (
+                ("--gyro-bandwidth-hz", self.gyro_bandwidth_hz),
+                ("--gyro-damping", self.gyro_damping),
+            )
+        )
+        x, y = zip(frequencies, dampings, strict=True)
+        return vibration.through_gyros(assessment, x, y)
+
+    @staticmethod
+    def _two(name: str, text: str) -> list[str]:
+        """Return the numbers of the gyros about x and y; one number is that of both."""
+        numbers = text.split(",")
+        if len(numbers) > 2:
+            raise InputError(f"{name} is {text!r}; one number or two with a comma between are needed")
+        return numbers * (3 - len(numbers))
 
     @property
     def gyro_words(self) -> str:

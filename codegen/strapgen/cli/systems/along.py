@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from strapgen.cli.sample_source import read_errors, with_errors
 from strapgen.cli.systems.running import described_along, facts_of, refuse_options, runner_of
 from strapgen.support.exceptions import InputError
 
@@ -18,12 +19,13 @@ def system_along(
     name: str,
     others: list[str],
     backend: str,
-    increments: Path,
+    sensors: tuple[Path, str | None],
     start: Start,
     fixed: FixedOptions,
     output: CourseOutput,
 ) -> None:
-    """Run a described system along a recording, and deliver its outputs."""
+    """Run a described system along a recording, as sensors with errors measure it, and deliver its outputs."""
+    increments, errors = sensors
     refuse_options(None, fixed, [*others, *([] if output.plot is None else ["--plot"])])
     if start.frame_rate != "0,0,0":
         raise InputError(
@@ -36,7 +38,7 @@ def system_along(
     from strapgen.simulation import recording
     from strapgen.simulation.system_runs import begun, system_course
 
-    data = recording.read_inertial(increments)
+    data = with_errors(recording.read_inertial(increments), read_errors(errors))
     runner = runner_of(described_along(name, data), backend, fixed)
     memory = None
     if start.initial != "0,0,0":
@@ -44,5 +46,6 @@ def system_along(
     with waiting(f"running {name}"):
         course = system_course(runner, data, memory)
     facts = facts_of(runner, name) | {"source": str(increments)}
+    facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
     replace(output, format=format).report(system_course_report(course, facts))

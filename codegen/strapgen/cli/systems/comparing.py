@@ -7,13 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapgen.cli.systems.running import (
-    described_along,
-    described_at,
-    force_of,
-    recorded,
-    refuse_options,
-)
+from strapgen.cli.sample_source import force_of
+from strapgen.cli.systems.running import described_along, described_at, recorded, refuse_options
 from strapgen.support import checks
 
 if TYPE_CHECKING:
@@ -58,7 +53,8 @@ def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDA
     """Return the system, the samples of its inputs, and where they come from in words."""
     import numpy as np
 
-    from strapgen.simulation.system_inputs import cycles_of, samples, velocity_increments
+    from strapgen.simulation.sensor_errors.measured_motions import both_increments
+    from strapgen.simulation.system_inputs import cycles_of, samples
 
     if source.motion is None:
         data = recorded(source)
@@ -69,7 +65,7 @@ def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDA
     seconds = checks.number("duration", source.duration or "", positive=True)
     system = description.system
     count, interval = cycles_of(system, seconds), 1 / system.sample_hz
-    angle = profile.samples(interval, 0, count)
-    velocity = velocity_increments(profile.attitude, force_of(source.specific_force), interval, count)
+    force = force_of(source.specific_force)
+    angle, velocity = both_increments(profile, profile.attitude, force, interval, count)
     title = f"{source.described(profile.name, ' motion')}, {count} cycles of {float(interval):.6g} s"
     return description, samples(description, angle, velocity), title

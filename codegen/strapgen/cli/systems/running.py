@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+from strapgen.cli.sample_source import force_of
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -63,6 +63,7 @@ def simulated_system(
         "duration_s": float(seconds),
         "specific_force_m_s2": list(force_of(source.specific_force)),
     }
+    facts |= source.facts
     title = f"{name}, {backend}: {source.described(profile.name, ' motion')}"
     shown = RunLayout(source.described(profile.name), output.title, output.matrices, None)
     output.report(
@@ -82,7 +83,7 @@ def _on_recording(
     runner = runner_of(described_along(name, data), backend, fixed)
     elements = attitude_output(runner.system).signal.elements
     history = system_history(runner, data)
-    facts = facts_of(runner, name) | {"source": str(source.file)}
+    facts = facts_of(runner, name) | {"source": str(source.file)} | source.facts
     title = f"{name}, {backend}: attitude along {source.file.name}"
     replace(output, format=output.format or "csv").report(
         history_report(history, elements, facts),
@@ -134,12 +135,3 @@ def facts_of(runner: SystemRunner, name: str) -> dict[str, Any]:
     """Return what a report says first."""
     rate = runner.system.sample_hz
     return {"system": name, "backend": runner.backend, "sample_hz": float(rate)}
-
-
-def force_of(text: str | None) -> tuple[float, float, float]:
-    """Return a specific force of the command line in m/s^2."""
-    parts = ["0"] * 3 if text is None else text.split(",")
-    if len(parts) != 3:
-        raise InputError(f"--specific-force is {text!r}; three numbers with commas between are needed")
-    x, y, z = (Fraction(checks.number("specific-force", part)) for part in parts)
-    return float(x), float(y), float(z)

@@ -80,6 +80,8 @@ def _room(term: Term, place: int, value: Value, factor: Value, others: list[Valu
     size = abs(term.factor) / Fraction(2) ** (place - factor.fraction)
     for other in others:
         size = Fraction(other.magnitude) / Fraction(2) ** other.fraction
+    if not size:  # a product with what is always zero
+        return place
     fraction = value.fraction + (_FED_BACK if _is_fed_back(value) else 0)
     units = _PART / Fraction(2) ** fraction / size * Fraction(2) ** factor.fraction
     return max(0, math.floor(units).bit_length() - 1)

@@ -12,7 +12,7 @@ from strapgen.analysis.growth import Growth, contraction
 from strapgen.analysis.motion_rates import is_plain
 from strapgen.analysis.notation import LATEX, covariant_text, intervals_text, scalar_text
 from strapgen.analysis.series import PARTS, STEP
-from strapgen.reports.latex import align_environment
+from strapgen.reports.latex import align_environment, wrapped
 from strapgen.reports.report import Report
 
 
@@ -120,11 +120,11 @@ def series_latex(analysis: ErrorAnalysis) -> str:
     if step.invariant:
         for power, one in step.invariant.items():
             rows.append(
-                (rf"h^{{{power}}}\!:\ \mathbf{{d}}", _wrapped(covariant_text(one.drift, notation=LATEX)))
+                (rf"h^{{{power}}}\!:\ \mathbf{{d}}", wrapped(covariant_text(one.drift, notation=LATEX)))
             )
             if one.symmetric:
                 text = covariant_text(one.symmetric, symmetric=True, notation=LATEX)
-                rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", _wrapped(text)))
+                rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", wrapped(text)))
     else:
         for part in PARTS:
             rows += _latex_rows(rf"\mathrm{{{part}}}", step.expressions(part))
@@ -157,10 +157,3 @@ def _latex_rows(name: str, expressions: Sequence[sp.Expr]) -> list[tuple[str, st
     return [
         (f"{name}_{axis}", sp.latex(expression)) for axis, expression in zip("xyz", expressions, strict=True)
     ]
-
-
-def _wrapped(text: str, terms: int = 4) -> str:
-    """Break a long sum of an align environment into lines."""
-    parts = text.replace(" + ", "\n+ ").replace(" - ", "\n- ").split("\n")
-    lines = [" ".join(parts[k : k + terms]) for k in range(0, len(parts), terms)]
-    return " \\\\\n    &\\quad ".join(lines)

@@ -11,17 +11,17 @@ import pytest
 
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
-from strapgen.experiments import foreign_causes as causes
-from strapgen.experiments.foreign_check import check_foreign
-from strapgen.experiments.foreign_cone import closed_form_deg_h
-from strapgen.experiments.foreign_runs import Convention, ForeignStep
+from strapgen.experiments.foreign import causes as causes
+from strapgen.experiments.foreign.check import check_foreign
+from strapgen.experiments.foreign.cone import closed_form_deg_h
+from strapgen.experiments.foreign.runs import Convention, ForeignStep
 from strapgen.library import generated_sources
 from strapgen.reports.conformance import outcome_report
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.foreign_arguments import read_arguments
 from strapgen.toolchain.foreign_bridge import ForeignSource
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "check_foreign_c"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "check_foreign_c"
 FAULTS = {
     "correction_absent.c": causes.ABSENT,
     "wrong_sign.c": causes.WRONG_SIGN,

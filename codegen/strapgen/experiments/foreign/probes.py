@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.experiments.foreign_runs import Segment, SegmentRun
+from strapgen.experiments.foreign.runs import Segment, SegmentRun
 from strapgen.simulation.motions import motion
 from strapgen.simulation.runs import drift_between
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from strapgen import pipeline
 from strapgen.catalogue.methods.coning_coefficients import Design
-from strapgen.experiments import foreign_causes as causes
 from strapgen.experiments.conformance import ORDER_WITHIN, Finding
 from strapgen.experiments.convergence import MOST_ERROR, Convergence, fitted
-from strapgen.experiments.foreign_cone import (
+from strapgen.experiments.foreign import causes
+from strapgen.experiments.foreign.cone import (
     SAMPLES,
     SAMPLING,
     closed_form_deg_h,
@@ -26,7 +26,7 @@ from strapgen.experiments.foreign_cone import (
     published_step,
     seconds,
 )
-from strapgen.experiments.foreign_probes import (
+from strapgen.experiments.foreign.probes import (
     Directions,
     Products,
     direction_segments,
@@ -34,7 +34,7 @@ from strapgen.experiments.foreign_probes import (
     product_segments,
     products,
 )
-from strapgen.experiments.foreign_runs import (
+from strapgen.experiments.foreign.runs import (
     SCALARS,
     SENSES,
     Convention,

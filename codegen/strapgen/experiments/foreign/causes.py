@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, Design, design
-from strapgen.experiments.foreign_probes import Products
+from strapgen.experiments.foreign.probes import Products
 
 ABSENT = "correction absent or zero"
 WRONG_SIGN = "correction of the wrong sign"

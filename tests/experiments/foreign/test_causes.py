@@ -6,8 +6,8 @@ import pytest
 from gathering import each
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
-from strapgen.experiments import foreign_causes as causes
-from strapgen.experiments.foreign_probes import Products, pairs
+from strapgen.experiments.foreign import causes as causes
+from strapgen.experiments.foreign.probes import Products, pairs
 
 DESIGNS = [
     (samples, previous, form)

@@ -1,0 +1,143 @@
+"""The names of the integration methods, and of the vectors of a step that they compute, as plain data."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
+from strapgen.catalogue.methods.tableaux import TITLES
+from strapgen.catalogue.methods.windows import WINDOW_TITLES
+
+
+class Integrator(NamedTuple):
+    """A method without a tableau; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
+
+    title: str
+    module: str
+    order: int
+    takes_rates: bool = True
+    arguments: tuple[str, ...] = ()
+    takes_ahead: bool = True
+
+
+#: Integration methods that have no tableau.
+INTEGRATORS = {
+    **{
+        f"taylor{order}": Integrator(
+            f"Taylor series of order {order} of the transition", "taylor", order, False
+        )
+        for order in range(1, 21)
+    },
+    **{
+        f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
+        for order in (2, 4, 6)
+    },
+    "fit-exact": Integrator(
+        "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
+    ),
+    "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
+    "crouch-grossman3": Integrator("Crouch-Grossman method of order 3", "crouch_grossman", 3),
+    "coning-least-squares": Integrator(
+        "compressed coning coefficients, by least squares over a band",
+        "frequency_shaping",
+        2,
+        takes_rates=False,
+        takes_ahead=False,
+    ),
+    "coning-compressed": Integrator(
+        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
+    ),
+    "coning-uncompressed": Integrator(
+        "uncompressed coning coefficients, made for polynomial rates",
+        "coning",
+        4,
+        False,
+        ("uncompressed",),
+        False,
+    ),
+    "coning-combined": Integrator(
+        "coning coefficients for both, with the terms of third and fourth order",
+        "coning",
+        6,
+        False,
+        ("combined",),
+        False,
+    ),
+    "coning-exact-rest": Integrator(
+        "coning coefficients for both, with all other terms of the polynomial through the increments",
+        "exact_rest",
+        16,
+        False,
+        takes_ahead=False,
+    ),
+    "coning-polynomial": Integrator(
+        "uncompressed coning coefficients, with the terms of third and fourth order",
+        "coning",
+        6,
+        False,
+        ("polynomial",),
+        False,
+    ),
+}
+
+#: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
+METHODS = {
+    **TITLES,
+    **{name: integrator.title for name, integrator in INTEGRATORS.items()},
+    **SHAPE_TITLES,
+    **WINDOW_TITLES,
+}
+
+#: Methods of the standard catalogue, which are those of the thesis.
+STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
+
+
+class StepVector(NamedTuple):
+    """A vector of a step: the module and function that derive it, the methods that it can use, and the default.
+
+    One with `every` goes with every method on increments, those of tableaux and exact rotations of windows among them.
+    """
+
+    title: str
+    module: str
+    function: str
+    families: tuple[str, ...]
+    default: str
+    takes_windows: bool = False
+    every: bool = False
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods that can compute it, without windows."""
+        if self.every:
+            return [*TITLES, *INTEGRATORS]
+        return [name for name, integrator in INTEGRATORS.items() if integrator.module in self.families]
+
+
+#: Vectors of a step that a method computes.
+VECTORS = {
+    "rotation-vector": StepVector(
+        "rotation vector of a step",
+        "attitude_step",
+        "rotation_vector",
+        ("magnus", "munthe_kaas", "coning"),
+        "coning-combined",
+        True,
+    ),
+    "sculling": StepVector(
+        "sculling term of a step, by duality with coning",
+        "sculling_term",
+        "sculling",
+        ("coning",),
+        "coning-combined",
+    ),
+    "velocity-position": StepVector(
+        "velocity and position change of a step",
+        "velocity_position",
+        "step",
+        (),
+        "coning-combined",
+        True,
+        True,
+    ),
+}

@@ -1,0 +1,46 @@
+"""The study of velocity and position: candidates, cost, back ends, and its command."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from strapgen.experiments import translations
+from strapgen.experiments.translations import Flight, candidates, study
+from strapgen.simulation.motions import motion
+from strapgen.simulation.specific_forces import force
+from strapgen.support.exceptions import InputError
+
+CONE, SWING = (
+    motion("cone", half_angle_deg=1, frequency_hz=10),
+    force("oscillation", swing_y_g=1, frequency_hz=10),
+)
+
+
+def flight(backend="numpy", duration="2"):
+    return Flight(CONE, SWING, Fraction(100), Fraction(duration), backend)
+
+
+def test_every_method_has_a_velocity_and_windows_beat_the_recursion():
+    rows = {one.name: one for one in study(candidates(["two-speed:2", "rk4:2", "window-7-7"]), flight())}
+    recursion, step, window = rows.values()
+    assert recursion.velocity > step.velocity > 1e4 * window.velocity
+    assert recursion.position > 1e3 * window.position
+    assert recursion.multiply < step.multiply < window.multiply
+
+
+def test_the_default_algorithms_exist():
+    assert len(candidates(translations.DEFAULT)) == len(translations.DEFAULT)
+
+
+def test_fixed_point_adds_rounding_alone():
+    double, fixed = (
+        next(study(candidates(["rk4:2"]), flight(backend))) for backend in ("numpy", "c-fixed32")
+    )
+    assert fixed.velocity == pytest.approx(double.velocity, abs=1e-5)
+
+
+def test_a_duration_that_is_no_multiple_of_a_sample_is_refused():
+    with pytest.raises(InputError, match="is not a whole multiple of the sampling interval"):
+        list(study(candidates(["rk4:2"]), flight(duration="0.015")))
