@@ -84,23 +84,27 @@ def _rounded(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) 
 
 def _shares(frame: Frame, elements: Sequence[Any]) -> list[tuple[sp.Expr, list[Any]]]:
     """Return elements as sums of rational ones, each times an expression in roots and unknowns."""
-    domain = elements[0].ring.domain
+    domain, divisor = elements[0].ring.domain, sp.S.One
+    coefficients = [dict(element.terms()) for element in elements]
+    if domain.is_Frac:  # all quotients get one divisor
+        common = domain.get_ring().one
+        for quotient in (c for row in coefficients for c in row.values()):
+            common = common.lcm(quotient.denom)
+        divisor, domain = common.as_expr(), domain.get_ring()
+        coefficients = [
+            {place: c.numer * common.exquo(c.denom) for place, c in row.items()} for row in coefficients
+        ]
     terms: dict[sp.Expr, list[dict[Any, Any]]] = {}
-    for number, element in enumerate(elements):
-        for place, coefficient in element.terms():
+    for number, row in enumerate(coefficients):
+        for place, coefficient in row.items():
             for share, rational in _rational_parts(domain, coefficient):
-                row = terms.setdefault(share, [{} for _ in elements])[number]
-                row[place] = row.get(place, sp.QQ.zero) + rational
+                terms.setdefault(share / divisor, [{} for _ in elements])[number][place] = rational
     return [(share, [frame.ring.from_dict(row) for row in rows]) for share, rows in terms.items()]
 
 
 def _rational_parts(domain: Any, number: Any) -> Iterator[tuple[sp.Expr, Any]]:
     """Yield what a number of a domain is the sum of: expressions in its generators, and their rational factors."""
-    if domain.is_Frac:
-        divisor = number.denom.as_expr()
-        for share, rational in _rational_parts(domain.get_ring(), number.numer):
-            yield share / divisor, rational
-    elif domain.is_Poly:
+    if domain.is_Poly:
         for exponents, coefficient in number.terms():
             product = sp.Mul(*(x**k for x, k in zip(domain.symbols, exponents, strict=True)))
             for share, rational in _rational_parts(domain.domain, coefficient):

@@ -93,7 +93,7 @@ def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
     """Return a choice with constants in place of inputs; `constants` and errors are those of `choose`."""
     values = constant_values.read(constants)
     if choice.user_kernel is not None and choice.user_kernel.unknowns:
-        return replace(choice, user_kernel=_with_values(choice.user_kernel, values))
+        return Choice.of_user(_with_values(choice.user_kernel.kernel, values))
     if values and (choice.name in ALGORITHMS or choice.name in VECTORS or choice.user_kernel is not None):
         raise InputError(
             f"algorithm {choice.name} takes no constants (got {values[0][0]}); kernels without a method do, such as "

@@ -277,17 +277,14 @@ def vibration(
     --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
     """
     output.check(algorithm, *methods.files, source.spectrum)
-    cases = _cases_with_unknowns(algorithm, methods, source, output)
-    if cases:
-        from strapgen.reports.vibration import closed_forms_report
+    from strapgen.reports.vibration import closed_forms_report, vibration_report
 
+    if cases := _cases_with_unknowns(algorithm, methods, source, output):
         output.report(closed_forms_report(cases))
         return
     source.check(output)
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
-    from strapgen.reports.vibration import vibration_report
-
     output.report(
         vibration_report(outcomes, cases, f"{words}; step {source.step} s"),
         lambda path: _image(cases, source, output, path),
@@ -303,13 +300,9 @@ def _cases_with_unknowns(
     choices = methods.choices(algorithm, step=False)
     if not any(choice.user_kernel is not None and choice.user_kernel.unknowns for choice in choices):
         return []
-    if output.plot is not None or output.format in ("csv", "markdown", "latex"):
+    if output.plot or source.spectrum or output.format not in ("text", "json"):
         raise InputError(
-            f"{algorithm} holds unknowns: its rates are text or json, not numbers of a table or plot"
-        )
-    if source.spectrum is not None:
-        raise InputError(
-            f"{algorithm} holds unknowns: it has closed forms at one frequency, and none for a spectrum"
+            f"{algorithm} holds unknowns: its rates have closed forms, as text or json, and no numbers"
         )
     source = replace(source, theta_y=source.theta_y or "0")
     return [case for method in methods.each() for case in _assessed(algorithm, method, source)]
