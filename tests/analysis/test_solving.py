@@ -157,8 +157,8 @@ def test_the_command_answers_in_json(capsys):
     [
         ("{example} --order 9", "order on general motion is 9; a whole number from 1 to 8 is needed"),
         ("{example} --order 3 --on cone", "motion 'cone' is not known"),
-        ("{example} --order 3 --on coning,coning:5", "--on has coning twice"),
-        ("{example} --order 3 --on coning:x", "--on is 'x'; a whole number is needed"),
+        ("{example} --order 3 --on coning,coning=5", "--on has coning twice"),
+        ("{example} --order 3 --on coning=x", "--on is 'x'; a whole number is needed"),
         ("{example} --order 4 --set c=1", "unknown 'c' is not known; allowed: a"),
         ("{example} --order 4 --set a=1 --family 2", "family is 2"),
         ("{example} --order 5 --set a=1", "there is no solution"),

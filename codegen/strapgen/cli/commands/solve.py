@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import MethodOptions, listed, option, pair
+from strapgen.cli.options import MethodOptions, listed, option
 from strapgen.cli.output import Output, format_option
 from strapgen.cli.progress import waiting
+from strapgen.cli.sample_source import pairs
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -52,9 +53,10 @@ def solve(
         str,
         option(
             "--on",
-            metavar="MOTION[:N],...",
-            help="Motions on which it is to have the order, or the order N of its own: general (any smooth rate); "
-            "polynomial, of the degree that the increments determine; coning; the last two to products of two rates.",
+            metavar="MOTION=N,...",
+            help="Motions on which it is to have the order N, without =N that of --order: general (any smooth rate); "
+            "polynomial, of the degree that the increments determine; coning. The last two hold to products of two "
+            "rates.",
             panel="Input",
         ),
     ] = "general",
@@ -62,7 +64,7 @@ def solve(
         list[str] | None,
         option(
             "--set",
-            metavar="NAME=VALUE",
+            metavar="KEY=VALUE...",
             help="Value of a free parameter; shows the member of the family that has it.",
             panel="Input",
         ),
@@ -97,7 +99,7 @@ def solve(
         if not solved.families:
             raise InputError(f"--set: {solved.solution.reason}; there is no solution")
         number = checks.count("family", checks.whole("--family", family), largest=len(solved.families))
-        chosen = solved.values(dict(pair("--set", text) for text in settings), number - 1)
+        chosen = solved.values(pairs(settings), number - 1)
     output.report(solved_report(solved, chosen))
 
 
@@ -107,8 +109,8 @@ def _demands(on: str, order: int) -> list[Demand]:
 
     demands = []
     for text in listed("--on", on):
-        name, colon, number = text.partition(":")
-        demands.append(Demand(name, checks.whole("--on", number) if colon else order))
+        name, equals, number = text.partition("=")
+        demands.append(Demand(name, checks.whole("--on", number) if equals else order))
     names = [demand.motion for demand in demands]
     if repeated := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"--on has {repeated} twice; one order is needed")
