@@ -13,7 +13,7 @@ from strapgen.analysis.conditions import Demand, conditions
 from strapgen.analysis.one_step import Step
 from strapgen.catalogue import Choice
 from strapgen.support.exceptions import InputError
-from strapgen.symbolic import elimination, families, unknown_values
+from strapgen.symbolic import elimination, families
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution
 from strapgen.symbolic.kernel import Kernel
 
@@ -95,7 +95,7 @@ class SolvedStep:
             raise InputError(
                 f"kernel {self.kernel.name} has {len(self.families)} families of solutions; there is no number {family}"
             )
-        return member(self.families[family], f"kernel {self.kernel.name}", parameters or {})
+        return families.member(self.families[family], f"kernel {self.kernel.name}", parameters or {})
 
     def substitute(self, parameters: Mapping[str, Any] | None = None, family: int = 0) -> Kernel:
         """Return the kernel with the values of a family; parameters and errors are those of `values`.
@@ -108,30 +108,6 @@ class SolvedStep:
         ({'a': 27/40, 'b': 9/20}, ())
         """
         return self.kernel.substitute(self.values(parameters, family))
-
-
-def member(family: Family, what: str, parameters: Mapping[str, Any]) -> dict[str, sp.Expr]:
-    """Return the values of all unknowns of a family that parameters fix.
-
-    Raises
-    ------
-    InputError
-        If a parameter is none of the family's, or the family excludes its value.
-    """
-    chosen = unknown_values.read(what, tuple(symbol.name for symbol in family.free), parameters)
-    for excluded in family.nonzero:
-        if sp.expand(excluded.subs(chosen)) == 0:
-            raise InputError(
-                f"{what}: {families.shown(excluded)} is 0 with these values; the family excludes it"
-            )
-    for equation in family.equations:
-        rest = sp.expand(equation.subs(chosen))
-        if rest.is_number and rest != 0:
-            raise InputError(
-                f"{what}: {families.shown(equation)} has to be 0; with these values it is {rest}"
-            )
-    values = {symbol: sp.cancel(value.subs(chosen)) for symbol, value in family.values.items()}
-    return {symbol.name: value for symbol, value in {**chosen, **values}.items()}
 
 
 def solve(choice: Choice, demands: Sequence[Demand]) -> SolvedStep:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import sympy as sp
 
+from strapgen.support.exceptions import InputError
+from strapgen.symbolic import unknown_values
 from strapgen.symbolic.power_series import field
 
 
@@ -119,6 +123,26 @@ def shown(polynomial: sp.Expr) -> str:
         polynomial = sp.Poly(polynomial, *polynomial.free_symbols, domain=sp.QQ).clear_denoms(convert=True)[1]
         polynomial = polynomial.primitive()[1].as_expr()
     return str(sp.sstr(polynomial))
+
+
+def member(family: Family, what: str, parameters: Mapping[str, Any]) -> dict[str, sp.Expr]:
+    """Return the values of all unknowns of a family that parameters fix.
+
+    Raises
+    ------
+    InputError
+        If a parameter is none of the family's, or the family excludes its value.
+    """
+    chosen = unknown_values.read(what, tuple(symbol.name for symbol in family.free), parameters)
+    for excluded in family.nonzero:
+        if sp.expand(excluded.subs(chosen)) == 0:
+            raise InputError(f"{what}: {shown(excluded)} is 0 with these values; the family excludes it")
+    for equation in family.equations:
+        rest = sp.expand(equation.subs(chosen))
+        if rest.is_number and rest != 0:
+            raise InputError(f"{what}: {shown(equation)} has to be 0; with these values it is {rest}")
+    values = {symbol: sp.cancel(value.subs(chosen)) for symbol, value in family.values.items()}
+    return {symbol.name: value for symbol, value in {**chosen, **values}.items()}
 
 
 def with_roots(family: Family) -> list[Family]:
