@@ -402,7 +402,7 @@ def test_the_algorithm_of_a_user_is_generated_as_the_page_says(shown_files, caps
 @pytest.mark.long
 def test_the_commands_on_own_algorithms(shown_files, capsys):
     commands = shown_commands(DOCS["own-algorithms"])
-    shown = {"tableau", "generate", "converge", "check", "compare", "simulate"}
+    shown = {"tableau", "generate", "converge", "check", "compare", "simulate", "series"}
     assert {shlex.split(command)[1] for command in commands} == shown
     for command in commands:
         run(command, capsys)

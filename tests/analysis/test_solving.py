@@ -87,7 +87,10 @@ def test_uncompressed_coefficients_are_those_of_the_catalogue(increments, previo
     assert solved.values() == as_values(design.pairs)
 
 
-@pytest.mark.parametrize(("increments", "previous"), [(3, 0), (4, 0), (1, 2), (2, 1)])
+@pytest.mark.parametrize(
+    ("increments", "previous"),
+    [(3, 0), *(pytest.param(n, p, marks=pytest.mark.long) for n, p in ((4, 0), (1, 2), (2, 1)))],
+)
 def test_compressed_coefficients_are_those_of_the_catalogue(increments, previous):
     samples = increments + previous
     design = coning_coefficients.design(increments, previous, "compressed")
@@ -101,6 +104,7 @@ def test_compressed_coefficients_are_those_of_the_catalogue(increments, previous
     assert solved_pairs(increments, previous, coning=2 * samples + 2).families == ()
 
 
+@pytest.mark.long
 def test_combined_coefficients_are_a_member_of_the_family_of_both():
     design = coning_coefficients.design(4, 0, "combined")
     solved = solved_pairs(4, 0, coning=8, polynomial=5)

@@ -74,7 +74,7 @@ def test_values_in_the_series_are_the_series_of_the_kernel_with_these_values(gen
     assert [sp.expand(x.coeff("h", 5)) for x in substituted] == [x.coeff("h", 5) for x in known_terms]
 
 
-@pytest.mark.parametrize("motion", ["general", "coning"])
+@pytest.mark.parametrize("motion", ["general", pytest.param("coning", marks=pytest.mark.long)])
 def test_series_come_back_from_json(motion, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["series", EXAMPLE, "--motion", motion, "--terms", "1", "--format", "json"])
@@ -179,6 +179,7 @@ def test_unknowns_are_checked_with_the_kernel(unknowns, vector, reason, tmp_path
         strapgen.choose(step(tmp_path, unknowns, vector))
 
 
+@pytest.mark.long
 def test_an_unknown_may_divide(tmp_path):
     path = step(tmp_path, "a = build.parameter('a')", "first + second + algebra.cross(first, second) / a")
     drift = series(strapgen.choose(path), terms=1).invariant[3]

@@ -171,7 +171,7 @@ def test_previous_and_ahead_must_belong_to_the_row(tmp_path):
 
 
 BAD = {
-    "def increments(*a): return 0": "defines no function attitude; a motion needs increments and attitude",
+    "def increments(*a): return 0": "a motion needs increments and attitude, or rate_expression",
     "x = 1 / 0": ", line 22: ZeroDivisionError: division by zero",
     "import sys; sys.exit()": "ends the program with sys.exit; it must define a motion",
     "def attitude(t): return 'no'": "attitude returns no array of numbers",
@@ -189,7 +189,8 @@ def test_files_that_are_no_motions(tmp_path):
             read_motion(written(tmp_path, text), 10)
         assert said in str(refused.value), text
     with pytest.raises(
-        InputError, match="is no file; a Python file with functions increments and attitude is needed"
+        InputError,
+        match="is no file; a Python file with functions increments and attitude, or with rate_expression, is needed",
     ):
         read_motion(tmp_path / "missing.py", 10)
     no_rate = written(tmp_path, CONING + "del rate")

@@ -13,6 +13,7 @@ from strapgen.analysis.constant_rate import ConstantRate, constant_rate
 from strapgen.analysis.growth import Growth, contraction, growth
 from strapgen.analysis.series import PARTS, ErrorSeries, series
 from strapgen.catalogue import Choice
+from strapgen.simulation.users_motions import is_file
 from strapgen.support.exceptions import InputError
 
 
@@ -91,6 +92,8 @@ def analyse(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorAna
     run, why = None, ""
     if step.unknowns:
         why = "" if motion == "general" else f"kernel {step.kernel} holds unknowns"
+    elif is_file(motion):
+        why = f"{motion} is any function of time"
     elif motion != "general":
         try:
             run = accumulate(choice, motion, terms)

@@ -17,8 +17,9 @@ from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
 from strapgen.analysis.invariants import scalar, scalar_value
 from strapgen.analysis.notation import scalar_text
 from strapgen.analysis.one_step import Step
-from strapgen.analysis.series import MOST_TERMS, MOTIONS, STEP
+from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
+from strapgen.simulation.users_motions import is_file
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.polynomials import Polynomial
@@ -91,7 +92,7 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     >>> sp.factor(found.determinant[6])
     -(w_x**2 + w_y**2 + w_z**2)**3/72
     """
-    checks.choice("motion", motion, MOTIONS)
+    motion_rates.require(motion)
     checks.count("terms", terms, largest=MOST_TERMS)
     attitude_step = one_step.step(choice)
     order = attitude_step.kernel.order
@@ -111,6 +112,8 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
 
 
 def _growth(attitude_step: Step, motion: str, terms: int, top: int) -> Growth:
+    if is_file(motion):
+        return _of_file(_growth(attitude_step, "general", top, top), motion, terms, top)
     frame = None
     if motion == "general":
         frame, ring, rate = one_step.general_rate(attitude_step, top)
@@ -144,6 +147,18 @@ def _growth(attitude_step: Step, motion: str, terms: int, top: int) -> Growth:
     return Growth(
         attitude_step.kernel.name, motion, expressions.get("length"), expressions["determinant"], invariant
     )
+
+
+def _of_file(general: Growth, motion: str, terms: int, top: int) -> Growth:
+    """Return the growth on a user's rate, whose derivatives take the place of those of a general one."""
+    inserted = motion_rates.of_file(motion, top)
+
+    def rows(known: dict[int, sp.Expr] | None) -> dict[int, sp.Expr]:
+        parts = {power: inserted(x) for power, x in (known or {}).items()}
+        return dict([(power, x) for power, x in parts.items() if x != 0][:terms])
+
+    length = None if general.length is None else rows(general.length)
+    return Growth(general.kernel, motion, length, rows(general.determinant), {})
 
 
 def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:

@@ -10,11 +10,18 @@ import sympy as sp
 
 from strapgen import catalogue
 from strapgen.catalogue.kernels.motion_models import MOTIONS, MotionModel
+from strapgen.simulation.rate_motions.expressions import time_symbol
+from strapgen.simulation.users_motions import is_file, rate_expressions
+from strapgen.support import checks
 
 #: Time at the beginning of a step.
 TIME = sp.Symbol("t")
 #: From this denominator on a fraction is taken for a decimal.
 _LONG = 10**15
+#: Magnitude below which a value in 40 digits counts as zero.
+_ZERO = sp.Rational(1, 10**30)
+#: Times in s at which a value is looked at.
+_TIMES = (sp.Rational(3, 7), sp.Rational(11, 9))
 #: Symbols of the parameters of the motion "constant" in series.
 CONSTANT = sp.symbols("w_x w_y w_z")
 
@@ -50,6 +57,52 @@ class MotionRate:
         return sum(
             (element.diff(generator) * change for generator, change in self.changes.items()), self.ring.zero
         )
+
+
+def require(motion: str) -> None:
+    """Refuse what is neither a general motion, nor one of the catalogue, nor a file of a user.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    if not is_file(motion):
+        checks.choice("motion", motion, ("general", *catalogue.MOTIONS), "a Python file")
+
+
+def of_file(motion: str, count: int) -> Callable[[sp.Expr], sp.Expr]:
+    """Return a function that replaces the derivatives of a general rate by those of a user's expressions.
+
+    Parameters
+    ----------
+    motion : str
+        A Python file with a rate in SymPy.
+    count : int
+        Number of derivatives, counting the rate itself.
+
+    Returns
+    -------
+    callable
+        ``inserted(expression)`` takes an expression in ``w0_x``, ``w0_y``, ... and returns one in the time t. It is not
+        simplified, which may take for ever; 0 is told by its value at two times.
+    """
+    vector = sp.Matrix(list(rate_expressions(motion)))
+    derivatives: dict[sp.Symbol, sp.Expr] = {}
+    for j in range(count):
+        derivatives |= {sp.Symbol(f"w{j}_{axis}"): x for axis, x in zip("xyz", vector, strict=True)}
+        vector = vector.diff(time_symbol())
+    moments = [
+        {symbol: sp.N(x.subs(time_symbol(), time), 60) for symbol, x in derivatives.items()}
+        for time in _TIMES
+    ]
+
+    def inserted(expression: sp.Expr) -> sp.Expr:
+        if all(abs(sp.expand(expression).xreplace(values)) < _ZERO for values in moments):
+            return sp.S.Zero
+        return expression.xreplace(derivatives).xreplace({time_symbol(): TIME})
+
+    return inserted
 
 
 def parameters(motion: str) -> tuple[sp.Symbol, ...]:

@@ -19,6 +19,7 @@ from strapgen.analysis.invariants import Invariants, invariants, matrix
 from strapgen.analysis.notation import covariant_text
 from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
+from strapgen.simulation.users_motions import is_file
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic import reading
@@ -134,7 +135,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
         An attitude step, whose increments or rates are exact. It starts from zero rotation. The steps of the catalogue
         commute with rotations of the reference axes, so the result holds at any attitude, in the axes of the beginning.
     motion : str, optional
-        "general", or a motion of the catalogue.
+        "general", a motion of the catalogue, or a Python file with a rate in SymPy.
     terms : int, optional
         Number of terms of drift, scale and skew, each counted from its first one that is not zero.
 
@@ -153,7 +154,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     >>> found.order, sp.factor(found.expressions("drift")[2])
     (4, h**5*w_z*(w_x**2 + w_y**2 + w_z**2)**2/120)
     """
-    checks.choice("motion", motion, MOTIONS)
+    motion_rates.require(motion)
     checks.count("terms", terms, largest=MOST_TERMS)
     attitude_step = one_step.step(choice)
     order = attitude_step.kernel.order
@@ -162,11 +163,12 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     most = top + one_step.PATIENCE
     try:
         while True:
-            candidate = (
-                _general(attitude_step, terms, top)
-                if motion == "general"
-                else _named(attitude_step, motion, terms, top)
-            )
+            if motion == "general":
+                candidate = _general(attitude_step, terms, top)
+            elif is_file(motion):
+                candidate = _of_file(attitude_step, motion, terms, top)
+            else:
+                candidate = _named(attitude_step, motion, terms, top)
             parts = [candidate.coefficients(part) for part in PARTS]
             enough = all(len(part) >= terms for part in parts if part)
             if top >= most or (enough and any(parts[:2])):
@@ -203,6 +205,21 @@ def _general(attitude_step: Step, terms: int, top: int) -> ErrorSeries:
             if power in (powers["drift"] if part == "drift" else symmetric) and any(row):
                 parts[part][power] = row
     return _series(attitude_step, "general", parts, top, invariant)
+
+
+def _of_file(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSeries:
+    """Derive the series for a user's rate, whose derivatives take the place of those of a general one."""
+    known = _general(attitude_step, top, top)
+    inserted = motion_rates.of_file(motion, top)
+    parts: dict[str, Coefficients] = {}
+    for part in PARTS:
+        rows: Coefficients = {}
+        for power, row in known.coefficients(part).items():
+            elements = (inserted(row[0]), inserted(row[1]), inserted(row[2]))
+            if any(elements) and len(rows) < terms:
+                rows[power] = elements
+        parts[part] = rows
+    return _series(attitude_step, motion, parts, top, {})
 
 
 def _named(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSeries:

@@ -1,6 +1,11 @@
-"""Motions that users bring: a Python file with the increments of a motion and its attitude, held against each other.
+"""Motions that users bring: a Python file with a rate, or with increments and attitude, held against each other.
 
-The file has two functions, whose times are in s, and may have a third:
+Either the file has one function that returns the body rate in rad/s as expressions of SymPy, from which all else is
+integrated, see `rate_motions`:
+
+    rate_expression(t)                                       three expressions of the symbol t in s
+
+Or it has two functions, whose times are in s, and may have a third:
 
     increments(step, steps, samples, previous=0, ahead=0)    as `Motion.increments`
     attitude(t)                                              (..., 3, 3) at times (...), the identity at time 0
@@ -26,6 +31,8 @@ from numpy.typing import NDArray
 
 from strapgen.backends import backend
 from strapgen.simulation.motions import Motion, motion
+from strapgen.simulation.rate_motions.expressions import rate_of
+from strapgen.simulation.rate_motions.motion import RateMotion
 from strapgen.support import checks, packages
 from strapgen.support.exceptions import InputError
 
@@ -33,6 +40,8 @@ Array = NDArray[np.float64]
 
 #: Names of the functions that a file must have, and of those that it may have.
 FUNCTIONS, FURTHER = ("increments", "attitude"), ("rate",)
+#: Name of the function that a file has instead of them.
+EXPRESSION = "rate_expression"
 #: Intervals into which a run is cut, and then the first of them that is at fault, to find the time; for each the most
 #: pieces of an interval.
 _CUTS = ((64, 1 << 10), (16, 1 << 7), (16, 1 << 4))
@@ -113,19 +122,19 @@ class UsersMotion(Motion):
         return array
 
 
-def read_motion(path: str | Path, duration: float | str | Fraction = 60) -> UsersMotion:
+def read_motion(path: str | Path, duration: float | str | Fraction = 60) -> UsersMotion | RateMotion:
     r"""Read a motion from a Python file, and check it.
 
     Parameters
     ----------
     path : path
-        A Python file with functions ``increments``, ``attitude`` and perhaps ``rate``.
+        A Python file with functions ``increments``, ``attitude`` and perhaps ``rate``, or with ``rate_expression``.
     duration : number, optional
         Time in s over which they must fit together.
 
     Returns
     -------
-    UsersMotion
+    UsersMotion or RateMotion
 
     Raises
     ------
@@ -155,7 +164,8 @@ def read_motion(path: str | Path, duration: float | str | Fraction = 60) -> User
     try:
         if not file.is_file():
             raise InputError(
-                f"motion {name} is no file; a Python file with functions {' and '.join(FUNCTIONS)} is needed"
+                f"motion {name} is no file; a Python file with functions {' and '.join(FUNCTIONS)}, or with "
+                f"{EXPRESSION}, is needed"
             )
         source = file.read_bytes()
     except OSError as error:
@@ -164,9 +174,14 @@ def read_motion(path: str | Path, duration: float | str | Fraction = 60) -> User
 
 
 @lru_cache(maxsize=4)
-def _read(name: str, source: bytes, duration: Fraction) -> UsersMotion:
+def _read(name: str, source: bytes, duration: Fraction) -> UsersMotion | RateMotion:
     """Return the motion of a file with these contents, checked once."""
-    users = UsersMotion(name, functions=_functions(name))
+    functions = _functions(name)
+    if EXPRESSION in functions:
+        motion_of_rate = RateMotion(name, {}, _rate_of(name, functions[EXPRESSION]))
+        motion_of_rate.error_bound(float(duration))  # integrates it over the duration, or refuses it
+        return motion_of_rate
+    users = UsersMotion(name, functions=functions)
     require_consistent(users, duration)
     return users
 
@@ -241,12 +256,38 @@ def _functions(name: str) -> dict[str, Callable[..., Any]]:
     """Return the functions of a user's file."""
     with _guarded(name):
         names = runpy.run_path(name, run_name=Path(name).stem)
+    if callable(names.get(EXPRESSION)):
+        if others := [function for function in FUNCTIONS if function in names]:
+            raise InputError(
+                f"{name} defines {EXPRESSION} and {', '.join(others)}; one of both ways is needed"
+            )
+        return {EXPRESSION: names[EXPRESSION]}
     for function in FUNCTIONS:
         if not callable(names.get(function)):
             raise InputError(
-                f"{name} defines no function {function}; a motion needs {' and '.join(FUNCTIONS)}"
+                f"{name} defines no function {function}; a motion needs {' and '.join(FUNCTIONS)}, or {EXPRESSION}"
             )
     return {function: names[function] for function in (*FUNCTIONS, *FURTHER) if callable(names.get(function))}
+
+
+def rate_expressions(path: str | Path) -> tuple[Any, ...]:
+    """Return the rate of a file's motion as expressions of SymPy in `time_symbol`.
+
+    Raises
+    ------
+    InputError
+        As `read_motion` does, or if the file has functions of numbers in place of expressions.
+    """
+    users = read_motion(path, Fraction(1, 1000))
+    if not isinstance(users, RateMotion):
+        raise InputError(f"{path} has no function {EXPRESSION}, from which series are derived")
+    return users.elements
+
+
+def _rate_of(name: str, function: Callable[..., Any]) -> tuple[Any, ...]:
+    """Return the expressions of a file's function."""
+    with _guarded(name):
+        return rate_of(name, function)
 
 
 def _guarded(name: str) -> Any:

@@ -114,6 +114,7 @@ def test_members_are_ordinary_tableaux(three, four):
     assert (gill.order, gill.rational) == (4, False)
 
 
+@pytest.mark.long
 def test_up_to_fourth_order_linear_equations_leave_no_more_freedom(three, four):
     for unknown, solution in (three, four):
         assert unknown.solve("attitude").families == solution.families
@@ -181,6 +182,7 @@ def test_the_command_shows_the_families(capsys):
     assert len(data["general"]["families"][0]["leading_error"]) == 4
 
 
+@pytest.mark.long
 def test_a_member_is_a_file_for_other_commands(capsys, tmp_path):
     file = tmp_path / "member.toml"
     says(f"tableau {EXAMPLES / 'kutta4.toml'} --set c2=1/3 --set c3=2/3 --format toml --out {file}", capsys)

@@ -145,7 +145,7 @@ def series(
         option(
             "--motion",
             metavar="NAME",
-            help=f"Motion: general (any smooth rate), {MOTION_NAMES}.",
+            help=f"Motion: general (any smooth rate), {MOTION_NAMES}, or a Python file with a rate in SymPy.",
             panel="Input",
         ),
     ] = "general",
