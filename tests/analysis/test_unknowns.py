@@ -150,6 +150,14 @@ def test_generated_code_says_which_values_it_has(capsys, tmp_path):
     assert "--constant a=0.7125 --constant b=0.4125" in " ".join(words)
 
 
+def test_runs_take_values(capsys):
+    line = f"simulate {EXAMPLE} --constant a=9/8 --constant b=0 --motion constant --set x_deg_s=9 --step 1 --duration 2"
+    with pytest.raises(SystemExit) as stop:
+        main([*shlex.split(line), "--format", "json"])
+    assert stop.value.code == 0, capsys.readouterr().err
+    assert "--all and --constant do not go together" in refused("series --all --constant a=1", capsys)
+
+
 def test_values_that_are_none_are_refused():
     kernel = strapgen.derive(EXAMPLE)
     for values, reason in (

@@ -165,6 +165,16 @@ class MethodOptions:
         ),
     ] = False
 
+    constant: Annotated[
+        list[str] | None,
+        option(
+            "--constant",
+            metavar="NAME=VALUE,...",
+            help="Value of the input NAME in its unit, row by row, which the code then has as a constant; or of an "
+            "unknown of your own algorithm.",
+        ),
+    ] = None
+
     @property
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
@@ -173,7 +183,9 @@ class MethodOptions:
     @property
     def stated(self) -> list[str]:
         """The options that the command line has."""
-        return [f"--{part.name}" for part in fields(self) if getattr(self, part.name) not in (None, False)]
+        return [
+            f"--{part.name}" for part in fields(self) if getattr(self, part.name) not in (None, False, [])
+        ]
 
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
         """Return the kernel that the options choose of an algorithm; with `step` it must be an attitude step."""
@@ -198,7 +210,21 @@ class MethodOptions:
         count = whole("increments", self.increments)
         before, after = whole("previous", self.previous), whole("ahead", self.ahead)
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-            return choose(algorithm, method, count, self.rates, before, after)
+            return self._with_constants(choose(algorithm, method, count, self.rates, before, after))
+
+    def _with_constants(self, choice: Choice) -> Choice:
+        """Return a choice with the constants of the options."""
+        if not self.constant:
+            return choice
+        from strapgen import catalogue
+
+        constants: dict[str, list[str]] = {}
+        for text in self.constant:
+            name, numbers = pair("--constant", text)
+            if name in constants:
+                raise InputError(f"--constant {name} is given twice; one is needed")
+            constants[name] = [number.strip() for number in numbers.split(",")]
+        return catalogue.with_constants(choice, constants)
 
     def _chooser(self) -> Callable[..., Choice]:
         """Return the function that chooses a kernel, which need be no attitude step."""
@@ -220,15 +246,6 @@ class KernelOptions(MethodOptions):
         ),
     ] = None
 
-    constant: Annotated[
-        list[str] | None,
-        option(
-            "--constant",
-            metavar="NAME=VALUE,...",
-            help="Value of the input NAME in its unit, row by row, which the code then has as a constant.",
-        ),
-    ] = None
-
     @property
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
@@ -240,29 +257,9 @@ class KernelOptions(MethodOptions):
 
         return partial(catalogue.choose, layout=self.layout)
 
-    @property
-    def stated(self) -> list[str]:
-        """The options that the command line has."""
-        return [name for name in super().stated if name != "--constant" or self.constant]
-
-    def choose(self, algorithm: str, *, step: bool = True) -> Choice:
-        """Return the kernel that the options choose of an algorithm, with its constants."""
-        choice = super().choose(algorithm, step=step)
-        if not self.constant:
-            return choice
-        from strapgen import catalogue
-
-        constants: dict[str, list[str]] = {}
-        for text in self.constant:
-            name, numbers = pair("--constant", text)
-            if name in constants:
-                raise InputError(f"--constant {name} is given twice; one is needed")
-            constants[name] = [number.strip() for number in numbers.split(",")]
-        return catalogue.with_constants(choice, constants)
-
 
 #: The options of an attitude step, which takes increments.
-STEP_OPTIONS = ("method", "tableau", "window", "coning", "increments", "previous", "ahead")
+STEP_OPTIONS = ("method", "tableau", "window", "coning", "increments", "previous", "ahead", "constant")
 
 
 @dataclass(frozen=True)

@@ -248,6 +248,7 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
         "--previous": method.previous,
         "--ahead": method.ahead,
         "--rates": method.rates or None,
+        "--constant": method.constant or None,
     }.items():
         if value is not None:
             raise InputError(f"--all and {name} do not go together")
