@@ -125,9 +125,10 @@ def test_a_million_random_inputs(choice, settings, rng):
     inputs = corners_and_random(model, 1_000_000, rng)
     residuals = rng.integers(0, 2**settings.word, size=(1_000_000, len(model.interface.residuals)))
     (computed,), kept = in_c.run(inputs, residuals)
-    (wanted,), left = model.run(inputs, residuals)
-    np.testing.assert_array_equal(computed, wanted)
-    np.testing.assert_array_equal(kept, left)
+    for rows in np.array_split(np.arange(len(residuals)), 100):  # so few that they stay near the processor
+        (wanted,), left = model.run([array[rows] for array in inputs], residuals[rows])
+        np.testing.assert_array_equal(computed[rows], wanted)
+        np.testing.assert_array_equal(kept[rows], left)
 
 
 @pytest.mark.parametrize(
