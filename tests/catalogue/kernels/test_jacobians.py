@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import mpmath
 import numpy as np
 import pytest
@@ -91,7 +93,7 @@ def test_they_take_fewer_operations_than_common_subexpressions_do(algorithm, mos
 @each("backend", ["c", "c-float"])
 def test_c_is_within_its_bounds_of_numpy(backend, rng):
     choice = choose("euler-jacobian", "rk4", 2)
-    settings = Settings(largest_angle="0.1")
+    settings = Settings(largest_angle=Fraction(1, 10))
     require_what_numpy_computes(
         choice, backend, settings, lambda model, count: corners_and_random(model, count, rng)
     )
@@ -100,7 +102,7 @@ def test_c_is_within_its_bounds_of_numpy(backend, rng):
 @pytest.mark.long
 @pytest.mark.parametrize("word", [16, 32])
 def test_fixed_point_is_within_its_bounds(word, rng):
-    choice, settings = choose("euler-jacobian", "rk4", 2), Settings(word=word, largest_angle="0.1")
+    choice, settings = choose("euler-jacobian", "rk4", 2), Settings(word=word, largest_angle=Fraction(1, 10))
     share = share_of_bound(choice, settings, lambda model, count: corners_and_random(model, count, rng))
     assert share is not None
     assert share > 0.02

@@ -9,11 +9,11 @@ every other transition is differentiated stage by stage.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.attitude_step import chosen
+from strapgen.catalogue.kernels.attitude_step import chosen, smooth
 from strapgen.catalogue.kinematics import DCM, KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import PHI, Method
 from strapgen.catalogue.methods.samples import Samples, increments_signal
@@ -21,11 +21,14 @@ from strapgen.ir.signals import Signal
 from strapgen.symbolic import rotations
 from strapgen.symbolic.covariant_derivatives import CovariantFunction
 from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError
+from strapgen.symbolic.degrees import degree
 from strapgen.symbolic.kernel import Kernel, KernelBuilder, Stage, evaluate_stages
 from strapgen.symbolic.tangents import add_tangents
 
 #: Most vectors of a transition that is differentiated as a function of them, and of a rotation vector.
 _FEW, _SOME = 2, 6
+#: Highest degree of a polynomial that is expanded.
+_HIGHEST = 8
 #: Highest power of the rotation vector in the derivative of its exponential.
 SERIES = 16
 
@@ -149,8 +152,8 @@ def transition(
             return _exponential(build, kinematics, *function)
     apart = KernelBuilder()
     samples = Samples(apart, counts[0], counts[1], method.nodes, counts[2], method.fit)
-    smooth = replace(kinematics, exponential=lambda v, *rest: kinematics.exponential(v, SERIES))
-    value = apart.stage(kinematics.transition, method.transition(apart, smooth, samples))
+    written = method.transition(apart, smooth(apart, kinematics, SERIES), samples)
+    value = apart.stage(kinematics.transition, written)
     if count <= _FEW:
         forms = [
             [sp.Integer(1)] * count,
@@ -181,6 +184,9 @@ def _function(
 
     None if it is no polynomial of them with rational coefficients, or does not turn with them.
     """
+    highest = degree(stages, [element.name for element in increments], [element.name for element in value])
+    if highest is None or highest > _HIGHEST:
+        return None
     frame = Frame(len(forms))
     form = sp.Matrix([list(row) for row in forms])
     # The value depends on these sums alone, so that any increments with the right sums will do.
