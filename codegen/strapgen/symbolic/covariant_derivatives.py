@@ -22,7 +22,7 @@ from strapgen.symbolic.rotations import cross, dot, skew
 
 
 @dataclass(frozen=True)
-class Term:
+class CovariantTerm:
     """A tensor times a polynomial in scalar products.
 
     Parameters
@@ -105,7 +105,7 @@ class CovariantFunction:
             total = [a + factor * element[axis] * h for a, h in zip(total, gradient, strict=True)]
         return total
 
-    def _terms_of(self, decomposition: Decomposition) -> list[Term]:
+    def _terms_of(self, decomposition: Decomposition) -> list[CovariantTerm]:
         """Return the terms of a decomposition."""
         size = 4 if decomposition.scalar is not None else 9
         terms = []
@@ -117,16 +117,18 @@ class CovariantFunction:
                 terms.append(self._term(covariant, weight, [*written, 0], [*named, 0]))
         if decomposition.scalar:
             unit = [sp.Integer(0)] * 3 + [sp.Integer(1)]
-            terms.append(Term("scalar", decomposition.scalar, unit, unit))
+            terms.append(CovariantTerm("scalar", decomposition.scalar, unit, unit))
         for covariant, weight in decomposition.symmetric.items():
             written, named = (self._symmetric(covariant, which) for which in (self._vector, self._named))
             name = "_".join(map(str, ("symmetric", *covariant)))
-            terms.append(Term(name, weight, written, named))
+            terms.append(CovariantTerm(name, weight, written, named))
         return terms
 
     @staticmethod
-    def _term(covariant: Covariant, weight: Polynomial, written: list[sp.Expr], named: list[sp.Expr]) -> Term:
-        return Term("_".join(map(str, covariant)), weight, written, named)
+    def _term(
+        covariant: Covariant, weight: Polynomial, written: list[sp.Expr], named: list[sp.Expr]
+    ) -> CovariantTerm:
+        return CovariantTerm("_".join(map(str, covariant)), weight, written, named)
 
     def _vector(self, covariant: Covariant) -> sp.Matrix:
         first, *rest = (self._vectors[k] for k in covariant)
