@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import strapgen
+from strapgen.backends import numpy_evaluator
 from strapgen.backends.c import _parts
 from strapgen.support.exceptions import InputError
 
@@ -114,3 +115,17 @@ def test_every_run_is_in_one_part():
 def test_parts_are_of_like_size():
     sizes = [part.stop - part.start for part in _parts(10_000, 3)]
     assert max(sizes) - min(sizes) <= 2 * 16
+
+
+@pytest.mark.parametrize("batch", [(3,), (50, 2), (1,), (0,), ()])
+def test_numpy_evaluates_blocks_as_it_does_samples(monkeypatch, rng, batch):
+    backend = strapgen.backend("dcm", backend="numpy")
+    state = backend.step(backend.identity, rng.normal(scale=0.3, size=(*batch, 2, 3)))
+    increments = rng.normal(scale=0.01, size=(*batch, 2, 3))
+    for first, second in ((state, increments), (backend.identity, increments), (state, np.zeros((2, 3)))):
+        whole = backend.step(first, second)
+        monkeypatch.setattr(numpy_evaluator, "_BLOCK", 2)
+        assert backend.step(first, second).tobytes() == whole.tobytes()
+        monkeypatch.setattr(numpy_evaluator, "_BLOCK", 1 << 40)
+        assert backend.step(first, second).tobytes() == whole.tobytes()
+        monkeypatch.undo()

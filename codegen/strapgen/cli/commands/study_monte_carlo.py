@@ -129,4 +129,4 @@ def study_monte_carlo(
     parts = list(track(random_runs(sweep, run.results, jobs, cluster), "running", len(cases(sweep))))
     seconds = None if resumed else time.monotonic() - begin
     mean = predicted(sweep.algorithm, sweep.errors, sweep.steps)
-    output.report(random_report(RandomStudy(sweep, sum(parts, MeanSquare()), mean, hertz, seconds, whole)))
+    output.report(random_report(RandomStudy(sweep, MeanSquare.of(parts), mean, hertz, seconds, whole)))

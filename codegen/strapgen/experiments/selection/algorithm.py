@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -13,7 +12,6 @@ from strapgen.catalogue import Choice
 from strapgen.experiments import cost as costs
 from strapgen.experiments.selection import causes
 from strapgen.experiments.selection.brief import DesignBrief
-from strapgen.experiments.selection.candidates import TWO_SPEED, Contender
 from strapgen.experiments.selection.causes import Rounding
 from strapgen.library import generated_sources
 from strapgen.simulation.motions import Motion
@@ -151,27 +149,3 @@ class AttitudeStep:
         )
         ends = [double.matrices(run.propagate(row)[-1:]) for run in (fixed, double)]
         return float(np.linalg.norm(drift_between(*ends)[-1])) / float(steps * self.step) * causes.DEG_H
-
-
-def algorithm_of(contender: Contender, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:
-    """Return an algorithm for a brief.
-
-    Parameters
-    ----------
-    contender : Contender
-    state : str
-        A name of `candidates.STATES`.
-    brief : DesignBrief
-    path : path
-        The file of the brief, for which coefficients are designed.
-
-    Raises
-    ------
-    InputError
-        If the state has no such step.
-    """
-    if contender.method == TWO_SPEED:
-        from strapgen.experiments.selection.two_speed import TwoSpeedLoops
-
-        return TwoSpeedLoops(state, contender.increments, brief)
-    return AttitudeStep(contender.choice(state, str(path)), brief)

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.experiments.selection import causes
-from strapgen.experiments.selection.algorithm import Algorithm, algorithm_of
+from strapgen.experiments.selection.algorithm import Algorithm
 from strapgen.experiments.selection.brief import DesignBrief, read_brief
 from strapgen.experiments.selection.candidates import STATES, Contender
 from strapgen.experiments.selection.causes import Rounding
+from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.support.clusters import moved
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.processors import PROCESSORS

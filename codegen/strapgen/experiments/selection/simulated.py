@@ -13,9 +13,10 @@ import numpy as np
 
 from strapgen.experiments.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
 from strapgen.experiments.selection import causes
-from strapgen.experiments.selection.algorithm import Algorithm, algorithm_of
+from strapgen.experiments.selection.algorithm import Algorithm
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.candidates import Contender
+from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.experiments.selection.environment import Line
 from strapgen.experiments.selection.judgement import Judgement
 from strapgen.simulation.motions import Motion, motion
@@ -209,7 +210,7 @@ def _turn(brief: DesignBrief) -> float:
 def _random(brief: DesignBrief, algorithm: Algorithm, errors: Errors, jobs: int | None) -> MeanSquare:
     """Return the squared angle at the end of random runs."""
     runs = SteadyRuns(algorithm.steady(), errors, _RANDOM_STEPS, RANDOM_RUNS, (_SEED,))
-    return sum(random_runs(runs, jobs=jobs), MeanSquare())
+    return MeanSquare.of(random_runs(runs, jobs=jobs))
 
 
 def _drift(outcome: MeanSquare, seconds: float, factor: float) -> RandomDrift:

@@ -206,14 +206,12 @@ class TwoSpeedLoops:
         vector += _length(errors["vector", "rotation_vector"]) + samples
         local = _length(errors["update", "next"])
         shortest = 1 - float(Settings().allowance)
-        if self.state != "dcm":
-            if local >= shortest / 2:
-                raise InputError("the words are too short for a bound")
-            return vector + 2 * math.asin(local / shortest)
-        longest = math.sqrt(2 - shortest**2)
-        uneven = (longest - shortest) / (longest + shortest)
         if local >= shortest / 2:
             raise InputError("the words are too short for a bound")
+        if self.state != "dcm":
+            return vector + 2 * math.asin(local / shortest)
+        stretched = math.sqrt(2 - shortest**2)
+        uneven = (stretched - shortest) / (stretched + shortest)
         return vector + math.sqrt((1 + uneven**2) / 2) * local / (shortest - local)
 
     @cached_property

@@ -110,7 +110,7 @@ def _text(brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[s
     if simulated:
         lines += [
             "",
-            f"drift in deg/h, predicted and in a time simulation; of random causes the 95 % interval of {RANDOM_RUNS} runs",
+            f"drift in deg/h, predicted and in time; of random causes the 95 % interval of {RANDOM_RUNS} runs",
             "",
             *_simulated(accepted, simulated),
         ]
