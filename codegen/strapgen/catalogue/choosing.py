@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue import layout as layout_files
@@ -30,6 +30,10 @@ from strapgen.catalogue.user import loading
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.suggestions import some
+
+if TYPE_CHECKING:
+    from strapgen.catalogue.constants import Constants
+    from strapgen.symbolic.kernel import Kernel
 
 #: What every message about an algorithm allows beside the names.
 _FILE = "a Python file"
@@ -61,7 +65,8 @@ def choose(
         Whether the step takes the rate at the nodes of its method in place of increments.
     constants : mapping of str to number, or to an array or nested sequence of numbers, optional
         Values of inputs of a kernel that is no attitude step, in their units and row by row; they are then constants
-        of its code. A float stands for its shortest decimal form. `derive` refuses what the kernel has no input for.
+        of its code. Of a user's kernel with unknowns, values of these. A float stands for its shortest decimal form.
+        `derive` refuses what the kernel has no input for.
     layout : path or Layout, optional
         Of the kernels "separate" and "torques": the file that describes the gyros, see `layout.read`.
 
@@ -86,12 +91,23 @@ def choose(
 def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
     """Return a choice with constants in place of inputs; `constants` and errors are those of `choose`."""
     values = constant_values.read(constants)
+    if choice.user_kernel is not None and choice.user_kernel.unknowns:
+        return Choice.of_user(_with_values(choice.user_kernel.kernel, values))
     if values and (choice.name in ALGORITHMS or choice.name in VECTORS or choice.user_kernel is not None):
         raise InputError(
             f"algorithm {choice.name} takes no constants (got {values[0][0]}); kernels without a method do, such as "
             "imu-compensate"
         )
     return replace(choice, constants=values)
+
+
+def _with_values(kernel: Kernel, values: Constants) -> Kernel:
+    """Return a user's kernel with numbers in place of unknowns; its arguments state them."""
+    for name, numbers in values:
+        if len(numbers) != 1:
+            raise InputError(f"kernel {kernel.name}: {name} has {len(numbers)} numbers; 1 is needed")
+    chosen = kernel.substitute({name: number for name, (number,) in values})
+    return replace(chosen, arguments=f"{kernel.arguments} {constant_values.options(values)}".strip())
 
 
 def _with_layout(choice: Choice, layout: str | Path | Layout | None) -> Choice:

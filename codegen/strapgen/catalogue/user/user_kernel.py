@@ -28,6 +28,8 @@ class Head:
         Names of the kernels that come with it.
     text : str
         Text that differs between different kernels, without their arguments.
+    unknowns : tuple of str
+        Coefficients that are not known.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Head:
     companions: Companions | None
     brought: tuple[str, ...]
     text: str
+    unknowns: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, kernel: Kernel) -> Head:
@@ -42,7 +45,8 @@ class Head:
         shape = kernel.inputs[-1].shape if kernel.inputs else ()
         brought = tuple(other.name for other in kernel.own)
         text = _text(replace(kernel, arguments=""))
-        return cls(kernel.name, shape[0] if shape else 1, kernel.companions, brought, text)
+        samples = shape[0] if shape else 1
+        return cls(kernel.name, samples, kernel.companions, brought, text, kernel.unknowns)
 
 
 class UserKernel:
@@ -72,6 +76,11 @@ class UserKernel:
     def with_arguments(self, arguments: str) -> UserKernel:
         """Return the same kernel with other arguments."""
         return UserKernel(self.head, self._restore, arguments)
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Coefficients that are not known."""
+        return self.head.unknowns
 
     @property
     def text(self) -> str:
