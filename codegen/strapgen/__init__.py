@@ -45,6 +45,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
     from strapgen.design import family as _family
     from strapgen.experiments import word_length as _word_length
+    from strapgen.experiments.algorithm import Algorithm as Algorithm
+    from strapgen.experiments.algorithm import algorithm as algorithm
     from strapgen.experiments.comparison import Comparison as Comparison
     from strapgen.experiments.comparison import compare as compare
     from strapgen.experiments.conformance import Finding as Finding
@@ -142,6 +144,10 @@ _NAMES = {
     "catalogue.methods.tableaux": ("TABLEAUX",),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
+    "experiments.algorithm": (
+        "Algorithm",
+        "algorithm",
+    ),
     "experiments.comparison": (
         "Comparison",
         "compare",

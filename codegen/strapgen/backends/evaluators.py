@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
+from strapgen.support.brief import counted_shape, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted, needed
 
@@ -29,6 +30,13 @@ class Evaluator(ABC):
     dtype : dtype
         Type of the results.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        ins = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.function.inputs)
+        outs = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.function.outputs)
+        return f"{self.sources.kernel} for {self.sources.target}\n{ins} -> {outs}"
 
     def __init__(self, sources: Sources, dtype: Any) -> None:
         self.sources = sources

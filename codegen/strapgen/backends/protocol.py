@@ -14,6 +14,7 @@ from strapgen.backends.numpy_evaluator import NumpyEvaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
+from strapgen.support.brief import counted_shape, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.targets.registry import NUMPY
 
@@ -70,6 +71,12 @@ class Backend(ABC):
     increment_unit: float | None = None
     count: float | None = None
     saturates: bool = False
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        state = f"state {counted_shape(self.state_shape)} {self.dtype}"
+        return f"{self.name}: {self.kernel}, {self.samples} {self.takes} a step, {state}"
 
     def __init__(self, parts: StepSources, step: Evaluator) -> None:
         sources, kernels = parts.step, parts.step_kernels

@@ -13,6 +13,7 @@ from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS
+from strapgen.support.brief import full_text, short_repr
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel, Stage
@@ -55,6 +56,8 @@ class Choice:
     user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
     constants: Constants = ()
     layout: Layout | None = None
+
+    __repr__ = short_repr
 
     @classmethod
     def of_user(cls, kernel: Kernel) -> Choice:
@@ -103,10 +106,10 @@ class Choice:
         if self.user_kernel is not None:
             return f"{self.kernel} {_text(self.user_kernel)}"
         if self.method is not None and not isinstance(self.method, str):
-            return f"{self.kernel} {self.method!r} {self.method.file}"
+            return f"{self.kernel} {full_text(self.method)} {self.method.file}"
         words = [self.kernel, options(self.constants)]
         if self.layout is not None:
-            words += [repr(self.layout), self.layout.file]
+            words += [full_text(self.layout), self.layout.file]
         return " ".join(filter(None, words))
 
     @property
@@ -142,15 +145,15 @@ class Choice:
 def _text(kernel: Kernel) -> str:
     """Return a kernel as text, its formulas with the class of every part.
 
-    `repr` shows the number pi and a symbol of that name alike.
+    SymPy's own text shows the number pi and a symbol of that name alike.
     """
     from sympy import srepr
 
     def shown(stages: tuple[Stage, ...]) -> str:
-        return repr([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
+        return full_text([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
 
     rest = replace(kernel, stages=(), outputs=(), own=())
-    return " ".join([repr(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])
+    return " ".join([full_text(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])
 
 
 def increments(choice: Choice) -> int:

@@ -20,6 +20,7 @@ from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain.code_size import code_size
 from strapgen.toolchain.compiler import compile_together
@@ -86,6 +87,13 @@ class Comparison:
     bytes: int | None
     operations: dict[str, int]
     history: AngleHistory | None = field(default=None, repr=False, compare=False)
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        bound = "" if self.bound_rad is None else f", certified {self.bound_rad:.3g} rad"
+        angle = f"angle from the reference up to {self.max_abs_rad:.3g} rad{bound}"
+        return f"{self.backend}: {angle}\ndrift {self.drift_deg:.4g} deg, {self.ns_per_step:.1f} ns a step"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as plain JSON data."""

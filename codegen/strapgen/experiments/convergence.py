@@ -22,6 +22,7 @@ from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increme
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.support import checks, stages
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError, InputTypeError
 
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
@@ -76,6 +77,13 @@ class Convergence:
     rungs: tuple[Rung, ...]
     observed: float | None
     arguments: str = ""
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        observed = self.hidden if self.observed is None else f"{self.observed:.2f}"
+        ladder = f"{len(self.rungs)} steps"
+        return f"of {self.kernel} on {self.backend}, {ladder}: predicted order {self.predicted}, observed {observed}"
 
     @property
     def hidden(self) -> str:

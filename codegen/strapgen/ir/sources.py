@@ -11,6 +11,7 @@ from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import short_repr
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,11 @@ class Sources:
     own: tuple[Program, ...] = ()
     runs: tuple[str, ...] = ()
     rounding: RoundingBounds | None = None
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"
 
     @property
     def step_files(self) -> dict[str, str]:

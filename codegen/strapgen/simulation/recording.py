@@ -23,6 +23,7 @@ from strapgen.simulation.recorded_columns import (
 from strapgen.simulation.recorded_rows import LineNumbers, RecordedRows, read_rows
 from strapgen.simulation.runs import require_finite
 from strapgen.support import checks, stages
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError, InputTypeError
 
 Array = NDArray[np.float64]
@@ -56,6 +57,12 @@ class Recording:
     interval: float
     increments: Array
 
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        times = f"{self.interval:g} s from {self.start:g} s"
+        return f"of {len(self.increments)} increments of {times}, up to {self.largest:.4g} rad"
+
     @property
     def largest(self) -> float:
         """Largest magnitude of an element of the increments, in rad."""
@@ -73,6 +80,8 @@ class InertialRecording(Recording):
     """
 
     velocity_increments: Array
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -95,6 +104,12 @@ class History:
     states: NDArray[Any]
     step: float
     unused: int
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        times = f"{self.time[0]:g} s to {self.time[-1]:g} s, steps of {self.step:g} s"
+        return f"of {len(self.time)} states, {times}; {self.unused} increments unused"
 
 
 def _checked_intervals(path: Path, rows: RecordedRows) -> tuple[SampleIntervals, float]:

@@ -15,6 +15,7 @@ from strapgen.backends import Backend, evaluator
 from strapgen.backends.increments import PART, StepWindows
 from strapgen.simulation.motions import Motion
 from strapgen.support import checks, stages
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
@@ -43,6 +44,13 @@ class Run:
     scale: Array
     skew: Array
     drift: Array
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        drift = ", ".join(f"{np.degrees(value):.3g}" for value in self.drift_by_axis)
+        records = f"{len(self.time)} records, {self.time[0]:g} s to {self.time[-1]:g} s"
+        return f"of {records}\nmean drift {np.degrees(self.mean_drift):.3g} deg, largest about x, y, z {drift} deg"
 
     @property
     def drift_by_axis(self) -> Array:

@@ -12,6 +12,7 @@ from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import counted_shape, short_repr
 from strapgen.symbolic.evaluation import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
@@ -53,6 +54,12 @@ class Stage:
 
     signal: Signal
     expressions: tuple[sp.Expr, ...]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        shape = counted_shape(self.signal.shape)
+        return f"{self.signal.name} ({shape}, unit {self.signal.unit}): {self.signal.meaning}".rstrip(": ")
 
 
 def evaluate_stages(
@@ -132,6 +139,16 @@ class Kernel:
     arguments: str = ""
     notes: tuple[str, ...] = field(default=())
 
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        ins = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.inputs)
+        outs = ", ".join(
+            f"{stage.signal.name} ({counted_shape(stage.signal.shape)})" for stage in self.outputs
+        )
+        order = "" if self.order is None else f"; order {self.order.step}"
+        return f"{self.name}: {self.title}\n{ins} -> {outs}{order}"
+
     @property
     def identifier(self) -> str:
         """The name in generated code."""
@@ -198,6 +215,14 @@ class KernelBuilder:
     >>> v.T
     Matrix([[v_x, v_y, v_z]])
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        parts = {"input": self.inputs, "stage": [s.signal for s in self.stages]}
+        parts["output"] = [s.signal for s in self.outputs]
+        names = {kind: ", ".join(signal.name for signal in signals) for kind, signals in parts.items()}
+        return "\n".join(f"{kind} {text or 'none'}" for kind, text in names.items())
 
     def __init__(self) -> None:
         self.inputs: list[Signal] = []
