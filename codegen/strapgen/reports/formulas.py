@@ -9,13 +9,17 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.program import Program
-from strapgen.reports.latex import align_environment
+from strapgen.lowering.canonical.vector_form import vector_form
+from strapgen.reports.display.latex import equations
+from strapgen.reports.display.vectors import vectors_latex
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import ExactPrinter
 
+#: Most rows of formulas that are seen at a glance.
+_MOST_ROWS = 12
 _PROGRAM_COLUMNS = (Column("name", "<"), Column("value", "<"))
 _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
@@ -109,18 +113,45 @@ def program_as_data(program: Program) -> dict[str, str]:
 
 
 def as_latex(kernel: Kernel) -> str:
-    """Return a kernel's formulas as one LaTeX align environment."""
+    """Return a kernel's formulas as one LaTeX align environment, broken at the width of a page.
+
+    A step is in vectors, their scalar and cross products, as its program computes it; any other is written element
+    by element, and so is a step whose vector form would be longer than its stages.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    """
+    form = vector_form(kernel)
+    return elements_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
+
+
+def short_latex(kernel: Kernel) -> str | None:
+    """Return a kernel's formulas as LaTeX if a reader sees them at a glance; None for scalars of half a page."""
+    form = vector_form(kernel)
+    if form is not None:
+        return vectors_latex(form, _state(kernel))
+    rows = sum(stage.signal.size for stage in (*kernel.stages, *kernel.outputs))
+    return elements_latex(kernel) if rows <= _MOST_ROWS else None
+
+
+def elements_latex(kernel: Kernel) -> str:
+    """Return a kernel's formulas element by element as one LaTeX align environment."""
     names = {
         sp.Symbol(element, real=True): _latex_name(element)
         for signal in (*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs)))
         for element in signal.elements
     }
-    rows = [
-        f"{_latex_name(element)} &= {sp.latex(expression, symbol_names=names)}"
+    return equations(
+        (_latex_name(element), sp.latex(expression, symbol_names=names))
         for stage in (*kernel.stages, *kernel.outputs)
         for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
-    ]
-    return align_environment(rows)
+    )
+
+
+def _state(kernel: Kernel) -> str:
+    """Return the letter of the state: that of its elements."""
+    return kernel.inputs[0].elements[0].partition("_")[0]
 
 
 def _latex_name(element: str) -> str:
