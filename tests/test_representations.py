@@ -69,6 +69,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Samples": lambda: strapgen.Samples(strapgen.KernelBuilder(), 2),
     "Tableau": lambda: strapgen.TABLEAUX["dormand-prince8"],
     "Window": lambda: strapgen.WINDOWS["window-7-7"],
+    "Comparisons": lambda: strapgen.compare("euler", "rk4", 2, ["numpy"], TURN),
     "Comparison": lambda: strapgen.compare("euler", "rk4", 2, ["numpy"], TURN)[0],
     "Finding": lambda: next(iter(strapgen.check(strapgen.choose("euler", "rk4", 2)))),
     "Convergence": convergence,

@@ -13,7 +13,7 @@ from strapgen.analysis.constant_rate import ConstantRate, constant_rate
 from strapgen.analysis.growth import Growth, contraction, growth
 from strapgen.analysis.series import PARTS, ErrorSeries, series
 from strapgen.catalogue import Choice
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 
 
@@ -42,6 +42,7 @@ class ErrorAnalysis:
     no_run: str = ""
 
     __repr__ = short_repr
+    _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         run = self.no_run or "no run"

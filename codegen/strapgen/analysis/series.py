@@ -19,7 +19,7 @@ from strapgen.analysis.notation import covariant_text
 from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
 from strapgen.support import checks
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.power_series import Powers
 
@@ -60,6 +60,7 @@ class ErrorSeries:
     invariant: dict[int, Invariants] = field(default_factory=dict)
 
     __repr__ = short_repr
+    _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         order = "no error" if self.order is None else f"order {self.order}"

@@ -12,7 +12,7 @@ from strapgen.backends import DEFAULT_BACKENDS, Backend
 from strapgen.backends import backend as attitude_backend
 from strapgen.catalogue import Choice, choose_step
 from strapgen.catalogue.choice import AnyMethod
-from strapgen.experiments.comparison import Array, Comparison, compare
+from strapgen.experiments.comparison import Array, Comparisons, compare
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
@@ -20,7 +20,7 @@ from strapgen.library import generated_sources
 from strapgen.simulation import motions
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import Run, simulate
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ class Algorithm:
     choice: Choice
 
     __repr__ = short_repr
+    _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         choice = self.choice
@@ -184,7 +185,7 @@ class Algorithm:
         reference: str = "exact",
         truth: Array | None = None,
         settings: Settings | None = None,
-    ) -> list[Comparison]:
+    ) -> Comparisons:
         """Run the algorithm on several back ends over the same increments, (N, K, 3) in rad; see `strapgen.compare`.
 
         Examples

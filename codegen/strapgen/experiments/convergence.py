@@ -22,7 +22,7 @@ from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increme
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.support import checks, stages
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_html, short_repr, to_pandas
 from strapgen.support.exceptions import InputError, InputTypeError
 
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
@@ -79,6 +79,8 @@ class Convergence:
     arguments: str = ""
 
     __repr__ = short_repr
+    _repr_html_ = notebook_html
+    to_pandas = to_pandas
 
     def _in_words(self) -> str:
         observed = self.hidden if self.observed is None else f"{self.observed:.2f}"

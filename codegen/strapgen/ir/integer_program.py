@@ -14,7 +14,7 @@ from typing import Any
 from strapgen.ir.fixed_interface import ErrorFeedback, Interface
 from strapgen.ir.formats import Format
 from strapgen.ir.program import Program
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_html, short_repr
 
 
 @dataclass(frozen=True)
@@ -258,6 +258,7 @@ class FixedProgram:
     operations: dict[str, int]
 
     __repr__ = short_repr
+    _repr_html_ = notebook_html
 
     def _in_words(self) -> str:
         formats = ", ".join(

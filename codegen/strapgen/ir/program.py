@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_html, short_repr
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,6 @@ def _wrap(x: Any) -> Any:
 RESOLUTION = "resolution"
 #: The resolution of a double.
 DOUBLE_RESOLUTION = Fraction(1, 1 << 52)
-
 #: The function of each operation, on any ordered numbers; the integer, exact and float interpreters share it.
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -193,6 +192,7 @@ class Program:
     function: str = ""
 
     __repr__ = short_repr
+    _repr_html_ = notebook_html
 
     def _in_words(self) -> str:
         counts = ", ".join(f"{number} {kind}" for kind, number in self.operations.items() if number)

@@ -11,7 +11,7 @@ from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_html, short_repr
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ class Sources:
     rounding: RoundingBounds | None = None
 
     __repr__ = short_repr
+    _repr_html_ = notebook_html
 
     def _in_words(self) -> str:
         return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"

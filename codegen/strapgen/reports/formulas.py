@@ -103,7 +103,9 @@ def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
             return TextTable(_PROGRAM_COLUMNS, list(program_as_data(program).items()))
         return TextTable(_OPERATION_COLUMNS, _counts(program))
 
-    return Report(texts[show], data, table if show in ("program", "operations") else None)
+    if show in ("program", "operations"):
+        return Report(texts[show], data, table)
+    return Report(texts[show], data, latex=texts["latex"])
 
 
 def program_as_data(program: Program) -> dict[str, str]:

@@ -14,7 +14,7 @@ from strapgen.backends import BACKENDS, two_speed
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.recording import InertialRecording
 from strapgen.support import checks
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import Records, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.systems import two_speed_sources
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Course:
+class Course(Records):
     """Attitude and velocity along a recording, after each navigation cycle.
 
     Parameters

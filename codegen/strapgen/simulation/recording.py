@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends import Backend
 from strapgen.backends.increments import StepWindows
+from strapgen.simulation.history import History as History
 from strapgen.simulation.recorded_columns import (
     PART,
     Columns,
@@ -82,34 +82,6 @@ class InertialRecording(Recording):
     velocity_increments: Array
 
     __repr__ = short_repr
-
-
-@dataclass(frozen=True)
-class History:
-    """The attitude along a recording.
-
-    Parameters
-    ----------
-    time : array, (N,)
-        Times in s, on the clock of the recording.
-    states : array, (N, state shape)
-        States of the back end.
-    step : float
-        Step length in s.
-    unused : int
-        Number of increments at the end that do not fill a step.
-    """
-
-    time: Array
-    states: NDArray[Any]
-    step: float
-    unused: int
-
-    __repr__ = short_repr
-
-    def _in_words(self) -> str:
-        times = f"{self.time[0]:g} s to {self.time[-1]:g} s, steps of {self.step:g} s"
-        return f"of {len(self.time)} states, {times}; {self.unused} increments unused"
 
 
 def _checked_intervals(path: Path, rows: RecordedRows) -> tuple[SampleIntervals, float]:
@@ -388,7 +360,7 @@ def propagate(
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
-    return History(time, states, step, unused)
+    return History(time, states, step, unused, backend.elements)
 
 
 def record_interval(what: str, value: float | str, step: float) -> int:

@@ -1,7 +1,12 @@
-"""What an object shows of itself: a `repr` of a few lines, and the whole text of a value where a key needs it."""
+"""What an object shows of itself: a `repr` of a few lines, formulas and tables in a notebook, data frames.
+
+`strapgen.reports.display` writes formulas, tables and plots. It stands above all objects that it shows, so these name
+it and load it when a notebook or a user first asks.
+"""
 
 from __future__ import annotations
 
+import importlib
 import textwrap
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -14,6 +19,8 @@ LINES, WIDTH = 5, 100
 _FIELD = 60
 #: Most characters of a number that is written exactly.
 _NUMBER = 16
+#: The package that shows objects.
+_DISPLAY = "strapgen.reports.display"
 
 
 def short_repr(value: Any) -> str:
@@ -55,6 +62,78 @@ def full_text(value: Any) -> str:
     if isinstance(value, dict):
         return f"{{{', '.join(f'{full_text(k)}: {full_text(v)}' for k, v in value.items())}}}"
     return repr(value)
+
+
+def notebook_latex(value: Any) -> str | None:
+    """Return an object as LaTeX for a notebook; a class takes this function as its ``_repr_latex_``."""
+    text: str | None = importlib.import_module(f"{_DISPLAY}.objects").latex(value)
+    return text
+
+
+def notebook_html(value: Any) -> str | None:
+    """Return an object as HTML for a notebook; a class takes this function as its ``_repr_html_``."""
+    text: str | None = importlib.import_module(f"{_DISPLAY}.objects").html(value)
+    return text
+
+
+def to_pandas(value: Any) -> Any:
+    """Return an object as a data frame of pandas, the units in the names of its columns.
+
+    Raises
+    ------
+    MissingExtraError
+        If pandas is not installed.
+    """
+    return importlib.import_module(f"{_DISPLAY}.frames").pandas_frame(value)
+
+
+class Records:
+    """What objects with records along a time have in common: a plot, and the forms of other libraries."""
+
+    __slots__ = ()
+
+    def plot(self, path: Any = None, title: str = "") -> Any:
+        """Return a plot of the records against time as a figure of matplotlib, or write it to a file.
+
+        Parameters
+        ----------
+        path : path, optional
+            File for the image, whose ending says the kind; by default none is written.
+        title : str, optional
+
+        Returns
+        -------
+        Figure or Path
+            The path if one is named.
+
+        Raises
+        ------
+        MissingExtraError
+            If matplotlib is not installed.
+        InputError
+            If the kind of image is unknown.
+        """
+        return importlib.import_module(f"{_DISPLAY}.objects").plot(self, path, title)
+
+    def to_pandas(self) -> Any:
+        """Return the records as a data frame of pandas, one row each, the units in the names of the columns.
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        return to_pandas(self)
+
+    def to_xarray(self) -> Any:
+        """Return the records as a dataset of xarray along the time in s, the units in names and attributes.
+
+        Raises
+        ------
+        MissingExtraError
+            If xarray is not installed.
+        """
+        return importlib.import_module(f"{_DISPLAY}.frames").xarray_dataset(self)
 
 
 def counted_shape(shape: tuple[int, ...]) -> str:

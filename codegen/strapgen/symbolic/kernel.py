@@ -12,7 +12,7 @@ from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import counted_shape, short_repr
+from strapgen.support.brief import counted_shape, notebook_latex, short_repr
 from strapgen.symbolic.evaluation import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
@@ -140,6 +140,7 @@ class Kernel:
     notes: tuple[str, ...] = field(default=())
 
     __repr__ = short_repr
+    _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         ins = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.inputs)

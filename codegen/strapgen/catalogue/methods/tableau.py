@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_latex, short_repr
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -55,6 +55,7 @@ class Tableau:
     file: str = field(default="", compare=False, repr=False)
 
     __repr__ = short_repr
+    _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         return f"{self.name}: {self.title}, order {self.order}, {len(self.nodes)} stages"
