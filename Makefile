@@ -15,7 +15,7 @@ help:
 	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
 	@echo "make test-modules  list anew which kernels the tests compile"
-	@echo "make mutants   put 369 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
+	@echo "make mutants   put 378 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
@@ -123,6 +123,7 @@ bench: $(BENCH)
 	.venv-bench/bin/python benchmarks/compare.py
 	.venv-bench/bin/python benchmarks/fixed_point.py
 	.venv-bench/bin/python benchmarks/backends.py
+	.venv-bench/bin/python benchmarks/throughput.py
 
 generate: $(READY)
 	$(BIN)/strapgen generate --all

@@ -10,6 +10,8 @@ from _pytest.doctest import DoctestModule
 
 #: SymPy remembers a thousand results of each function; more spare a session of many kernels a tenth of its derivations.
 os.environ.setdefault("SYMPY_CACHE_SIZE", "20000")
+#: The processes of a session fill the processors: threads for products of matrices would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 collect_ignore_glob = []
 if not (find_spec("z3") and find_spec("pycparser")):

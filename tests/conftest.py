@@ -121,11 +121,11 @@ def small_images() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
-    """Compile with less optimization what is not about it: without contraction it leaves every bit as it is.
+    """Compile without optimization what is not about it: without contraction it leaves every bit as it is.
 
     The tests of the C text itself compile as a user does, and long ones look for undefined behaviour at every level.
     """
-    less = {"not long": "-O0", "long": "-O1"}.get(pytestconfig.getoption("markexpr"), "-O3")
+    less = "-O0" if pytestconfig.getoption("markexpr") in ("not long", "long") else "-O3"
     with pytest.MonkeyPatch.context() as patch:
         assert "-O3" in compiler.C_FLAGS
         patch.setattr(compiler, "_flags", tuple(less if f == "-O3" else f for f in compiler.C_FLAGS))

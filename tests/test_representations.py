@@ -56,7 +56,7 @@ def convergence() -> strapgen.Convergence:
 
 #: An object of each public class that a user may hold.
 OBJECTS: dict[str, Callable[[], Any]] = {
-    "Algorithm": lambda: strapgen.algorithm("euler", "rk4", increments=2),
+    "AttitudeAlgorithm": lambda: strapgen.algorithm("euler", "rk4", increments=2),
     "Backend": stepper,
     "Evaluator": lambda: strapgen.evaluator("euler-from-dcm"),
     "CommitLate": lambda: strapgen.CommitLate("window-3-3"),

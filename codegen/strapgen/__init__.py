@@ -45,7 +45,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
     from strapgen.design import family as _family
     from strapgen.experiments import word_length as _word_length
-    from strapgen.experiments.algorithm import Algorithm as Algorithm
+    from strapgen.experiments.algorithm import AttitudeAlgorithm as AttitudeAlgorithm
     from strapgen.experiments.algorithm import algorithm as algorithm
     from strapgen.experiments.comparison import Comparison as Comparison
     from strapgen.experiments.comparison import Comparisons as Comparisons
@@ -148,7 +148,7 @@ _NAMES = {
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
     "experiments.algorithm": (
-        "Algorithm",
+        "AttitudeAlgorithm",
         "algorithm",
     ),
     "experiments.comparison": (

@@ -111,6 +111,8 @@ def lower(kernel: Kernel) -> Program:
     ------
     InputTypeError
         If it is no kernel; the message names the stage that is missing. So do all stages.
+    InputError
+        If it holds unknowns.
     NotImplementedError
         If an expression holds a function that programs do not know.
 
@@ -123,6 +125,7 @@ def lower(kernel: Kernel) -> Program:
     from strapgen.symbolic.kernel import Kernel
 
     stages.require("lower", kernel, Kernel)
+    kernel.require_known()
     with timed("lower", kernel.name):
         return lowering.lower(kernel)
 

@@ -20,6 +20,9 @@ WITHOUT = {
         "there is one number for each parity equation",
     ),
     **dict.fromkeys(("mean", "next_mean"), "from the axes of one unit to those of another"),
+    **dict.fromkeys(
+        ("state_jacobian", "increments_jacobian"), "each element is the derivative of one number by another"
+    ),
     "level_angles": "its axes, level with heading 0, are those of no other signal",
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
 }

@@ -234,7 +234,7 @@ BAD = {
     "derive rotation-vector --tableau kutta.toml": "rotation-vector goes with no tableau; allowed methods: magnus2",
     "derive sculling --method magnus4": "method of sculling 'magnus4' is not known; allowed: coning-compressed",
     "derive sculling --rates": "method coning-combined takes increments; rates at nodes do not go with it",
-    "derive velocity-position --rates": "velocity-position takes increments of angle and of velocity; rates do not go",
+    "derive velocity-position --rates": "velocity-position takes increments; rates at nodes do not go",
     "derive velocity-position --method rk99": "method of velocity-position 'rk99' is not known; allowed: rk1, rk2",
     "series velocity-position --motion constant": "series of velocity-position hold for any motion; --motion, --versus",
     "series velocity-position --terms 4": "terms is 4; a whole number from 1 to 3 is needed",

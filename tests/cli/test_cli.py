@@ -105,6 +105,7 @@ COSTLY = (
     "check",
     "tables",
     "study word-length",
+    "study sensor-errors",
     "series",
     "stability",
     "rate-table",

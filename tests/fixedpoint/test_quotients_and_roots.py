@@ -31,6 +31,9 @@ def quotient(known, definition, exact, **options) -> tuple[Value, Worst]:
         # unit, where the computed numerator is too large and the computed divisor too small.
         ({"a": ABOVE, "b": BELOW}, "a", lambda a, b: a / b, 3),
         ({"a": ABOVE, "b": Known(4, 16, 24)}, "a", lambda a, b: a / b, 3),
+        # By a divisor of 2 the errors count half, by one of a half twice.
+        ({"a": ABOVE, "b": Known(3, 16, 24, Fraction(1, 90))}, "a", lambda a, b: a / b, 4),
+        ({"a": ABOVE, "b": Known(5, 16, 24, Fraction(1, 90))}, "a", lambda a, b: a / b, 2),
         ({"a": Known(4, -15, 15), "b": BELOW}, "a", lambda a, b: a / b, 3),
         # Two thirds are 171/256, which is too large; a sixteenth of it in 2048ths of 16ths is 85 and a half.
         ({"b": BELOW}, Fraction(2, 3), lambda b: Fraction(2, 3) / b, 7),

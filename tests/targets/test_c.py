@@ -363,10 +363,12 @@ def test_several_steps_of_one_run_are_prepared_in_vectors(compiler, target, fold
     assert not re.search(r"\bmuls[sd]\b", body)
 
 
-def test_loops_without_extensions_of_the_compiler_have_the_same_bits(tmp_path, propagate, rng):
+@pytest.mark.parametrize("absent", ["defined(__GNUC__)", "defined(__STRICT_ANSI__)"])
+def test_loops_for_other_compilers_and_processors_have_the_same_bits(absent, tmp_path, propagate, rng):
     sources = propagate.sources
+    assert absent in sources.files[sources.runs[1]]
     for name, text in sources.files.items():
-        (tmp_path / name).write_text(text.replace("defined(__GNUC__)", "0"))
+        (tmp_path / name).write_text(text.replace(absent, "0"))
     names = [name for name in sources.files if name.endswith(".c")]
     command = [needed("gcc"), *C_FLAGS, *STRICT, "-shared", "-fPIC", *names, "-o", "plain.so", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)

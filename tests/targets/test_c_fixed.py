@@ -125,9 +125,10 @@ def test_a_million_random_inputs(choice, settings, rng):
     inputs = corners_and_random(model, 1_000_000, rng)
     residuals = rng.integers(0, 2**settings.word, size=(1_000_000, len(model.interface.residuals)))
     (computed,), kept = in_c.run(inputs, residuals)
-    (wanted,), left = model.run(inputs, residuals)
-    np.testing.assert_array_equal(computed, wanted)
-    np.testing.assert_array_equal(kept, left)
+    for rows in np.array_split(np.arange(len(residuals)), 100):  # so few that they stay near the processor
+        (wanted,), left = model.run([array[rows] for array in inputs], residuals[rows])
+        np.testing.assert_array_equal(computed[rows], wanted)
+        np.testing.assert_array_equal(kept[rows], left)
 
 
 @pytest.mark.parametrize(
@@ -257,10 +258,9 @@ def test_strict_compilers_are_silent(word, methods, tmp_path):
             (tmp_path / name).write_text(text)
             files += [name] * name.endswith(".c")
     (tmp_path / "all.inc").write_text("".join(f'#include "{name}"\n' for name in files))
-    strict = ["cc", *STRICT, "-O2", "-c", *files]
-    # What is compiled with optimization to be run is strict already.
     for command in (
-        strict,
+        ["cc", *STRICT, "-fsyntax-only", *files],  # each by itself
+        ["cc", *STRICT, "-O2", "-c", "-o", "all.o", "-x", "c", "all.inc"],
         ["c++", "-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "all.inc"],
     ):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
@@ -327,7 +327,7 @@ BUILDS = {
     "sanitized": ["-O0", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"],
 }
 MORE_BUILDS = {
-    "sanitized and optimized": ["-O2", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"],
+    "sanitized and optimized": ["-O2", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"],
     "wrapping": ["-O2", "-fwrapv"],
     "trapping": ["-O2", "-ftrapv"],
 }

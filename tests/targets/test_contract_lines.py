@@ -17,6 +17,7 @@ from strapgen.backends.fixed import CFixedEvaluator
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support import resources
+from strapgen.targets import contract
 from strapgen.targets.contract_lines import Contract
 
 
@@ -155,3 +156,15 @@ def test_the_digest_changes_with_the_algorithm_and_its_options_alone():
 
 def test_a_header_without_a_contract_has_none():
     assert Contract.read("/* Nothing. */\n") is None
+
+
+@pytest.mark.parametrize("digits", [2, 3, 6])
+def test_numbers_of_a_header_are_rounded_away_from_what_they_bound(digits):
+    rng = np.random.default_rng(1969)
+    drawn = [Fraction(int(a), int(b)) for a, b in rng.integers(1, 1 << 40, (200, 2))]
+    for size in (*drawn, *(x / (1 << 60) for x in drawn), *(x * 10**20 for x in drawn), Fraction(7, 1000)):
+        for number in (size, -size):
+            low, high = (Fraction(contract._outward(number, up, digits)) for up in (False, True))
+            assert low <= number <= high
+            assert high - low <= size / 10 ** (digits - 1)
+    assert contract.decimal_above(Fraction(1, 3)) == "0.333334"

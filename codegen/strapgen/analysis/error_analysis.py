@@ -100,7 +100,9 @@ def analyse(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorAna
     """
     step = series(choice, motion, terms)
     run, why = None, ""
-    if motion != "general":
+    if step.unknowns:
+        why = "" if motion == "general" else f"kernel {step.kernel} holds unknowns"
+    elif motion != "general":
         try:
             run = accumulate(choice, motion, terms)
         except InputError as error:

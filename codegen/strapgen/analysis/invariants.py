@@ -6,7 +6,7 @@ solution in the fixed order of terms of `Frame`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -68,12 +68,11 @@ def invariants(
         )
     drift: Coefficients = {}
     symmetric: Coefficients = {}
-    for power in range(domain.mod.degree()):
-        share = domain.ext.as_expr() ** power
-        decomposition = frame.matrix([_share(frame, element, power) for element in matrix])
+    for share, elements in _shares(frame, matrix):
+        decomposition = frame.matrix(elements)
         _add(drift, _scaled(decomposition.vector, -share))
         _add(symmetric, _scaled(decomposition.symmetric, share))
-    return Invariants(drift, symmetric)
+    return Invariants(_without_zeros(drift), _without_zeros(symmetric))
 
 
 def _rounded(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) -> Coefficients:
@@ -83,14 +82,49 @@ def _rounded(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) 
     return {c: polynomial for c, polynomial in rounded.items() if polynomial}
 
 
-def _share(frame: Frame, element: Any, power: int) -> Any:
-    """Return the rational polynomial that multiplies a power of the generator of a field of roots."""
-    terms = {}
-    for place, number in element.terms():
-        numbers = number.to_list()[::-1]
-        if power < len(numbers) and numbers[power]:
-            terms[place] = numbers[power]
-    return frame.ring.from_dict(terms)
+def _shares(frame: Frame, elements: Sequence[Any]) -> list[tuple[sp.Expr, list[Any]]]:
+    """Return elements as sums of rational ones, each times an expression in roots and unknowns."""
+    domain, divisor = elements[0].ring.domain, sp.S.One
+    coefficients = [dict(element.terms()) for element in elements]
+    if domain.is_Frac:  # all quotients get one divisor
+        common = domain.get_ring().one
+        for quotient in (c for row in coefficients for c in row.values()):
+            common = common.lcm(quotient.denom)
+        divisor, domain = common.as_expr(), domain.get_ring()
+        coefficients = [
+            {place: c.numer * common.exquo(c.denom) for place, c in row.items()} for row in coefficients
+        ]
+    terms: dict[sp.Expr, list[dict[Any, Any]]] = {}
+    for number, row in enumerate(coefficients):
+        for place, coefficient in row.items():
+            for share, rational in _rational_parts(domain, coefficient):
+                terms.setdefault(share / divisor, [{} for _ in elements])[number][place] = rational
+    return [(share, [frame.ring.from_dict(row) for row in rows]) for share, rows in terms.items()]
+
+
+def _rational_parts(domain: Any, number: Any) -> Iterator[tuple[sp.Expr, Any]]:
+    """Yield what a number of a domain is the sum of: expressions in its generators, and their rational factors."""
+    if domain.is_Poly:
+        for exponents, coefficient in number.terms():
+            product = sp.Mul(*(x**k for x, k in zip(domain.symbols, exponents, strict=True)))
+            for share, rational in _rational_parts(domain.domain, coefficient):
+                yield share * product, rational
+    elif domain == sp.QQ:
+        yield sp.S.One, number
+    else:
+        for power, rational in enumerate(number.to_list()[::-1]):
+            if rational:
+                yield domain.ext.as_expr() ** power, rational
+
+
+def _without_zeros(coefficients: Coefficients) -> Coefficients:
+    """Return coefficients without those whose parts cancel, which they may if they are quotients."""
+    simple = {
+        c: {m: exact(x) if exact(x).is_polynomial() else sp.cancel(x) for m, x in row.items()}
+        for c, row in coefficients.items()
+    }
+    simple = {c: {m: x for m, x in row.items() if x != 0} for c, row in simple.items()}
+    return {c: row for c, row in simple.items() if row}
 
 
 def _add(total: Coefficients, more: Coefficients) -> None:
@@ -130,10 +164,10 @@ def scalar(frame: Frame, element: Any) -> Polynomial:
     if domain == sp.QQ:
         return frame.quaternion([frame.ring.zero] * 3, element).scalar or {}
     total: Coefficients = {}
-    for power in range(domain.mod.degree()):
-        part = frame.quaternion([frame.ring.zero] * 3, _share(frame, element, power)).scalar or {}
-        _add(total, _scaled({(): part}, domain.ext.as_expr() ** power))
-    return total.get((), {})
+    for share, (rational,) in _shares(frame, [element]):
+        part = frame.quaternion([frame.ring.zero] * 3, rational).scalar or {}
+        _add(total, _scaled({(): part}, share))
+    return _without_zeros(total).get((), {})
 
 
 def vector(frame: Frame, elements: Sequence[Any]) -> Coefficients:
@@ -154,11 +188,9 @@ def vector(frame: Frame, elements: Sequence[Any]) -> Coefficients:
     if domain == sp.QQ:
         return frame.quaternion(list(elements), frame.ring.zero).vector
     total: Coefficients = {}
-    for power in range(domain.mod.degree()):
-        shares = [_share(frame, element, power) for element in elements]
-        part = frame.quaternion(shares, frame.ring.zero).vector
-        _add(total, _scaled(part, domain.ext.as_expr() ** power))
-    return total
+    for share, rationals in _shares(frame, elements):
+        _add(total, _scaled(frame.quaternion(rationals, frame.ring.zero).vector, share))
+    return _without_zeros(total)
 
 
 def scalar_value(polynomial: Polynomial, vectors: Sequence[Sequence[Any]]) -> Any:

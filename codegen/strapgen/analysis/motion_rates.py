@@ -91,6 +91,10 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
         vector = vector.diff(TIME)
     unity = ring.from_expr(cosine**2 + sine**2 - 1) if waves else None
     back = {wave: function for function, wave in waves.items()}
+    if not (domain.is_QQ or domain.is_Algebraic):  # unknowns of the kernel may have the names of parameters
+        names = {symbol.name for symbol in domain.symbols}
+        shown = {p: sp.Symbol(f"{motion}_{p.name}") for p in symbols if p.name in names}
+        back = {wave: function.xreplace(shown) for wave, function in back.items()} | shown
 
     def reduced(element: Any) -> Any:
         # Without squares of sines equal expressions cancel.

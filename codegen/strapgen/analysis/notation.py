@@ -52,6 +52,8 @@ def _plain(size: sp.Expr) -> str:
 
 
 def _typeset(size: sp.Expr) -> str:
+    if size.is_Add and size.free_symbols:
+        return rf"\left({sp.latex(size)}\right)"
     return str(sp.latex(size if not size.is_Rational or size.q < _DECIMAL else sp.Float(size, 12)))
 
 
@@ -141,12 +143,13 @@ def _sum(coefficients: Coefficients, notation: Notation, covariant: Callable[[tu
         polynomial = coefficients[indices]
         for monomial in sorted(polynomial, key=lambda m: (len(m), m)):
             number = exact(polynomial[monomial])
-            size = abs(number)
+            negative = number.could_extract_minus_sign() if number.free_symbols else number < 0
+            size = -number if negative else number
             factors = [*_products(monomial, notation), covariant(indices)]
             shown = [factor for factor in factors if factor]
             if size != 1 or not shown:
                 shown.insert(0, notation.number(size))
-            terms.append(("-" if number < 0 else "+", notation.space.join(shown)))
+            terms.append(("-" if negative else "+", notation.space.join(shown)))
     if not terms:
         return "0"
     (sign, first), *rest = terms

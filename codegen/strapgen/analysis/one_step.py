@@ -58,11 +58,11 @@ class Step:
 
     @property
     def domain(self) -> Any:
-        """The smallest field that holds the numbers of the step."""
+        """The smallest domain that holds the numbers of the step and polynomials in its unknowns."""
         expressions = [evaluation.exact(node) for node in self.nodes or ()]
         for stage in (*self.kernel.stages, *self.kernel.outputs):
             expressions += stage.expressions
-        return field(expressions)
+        return field(expressions, self.kernel.unknowns)
 
 
 def step(choice: Choice) -> Step:
@@ -105,9 +105,10 @@ def linear_step(choice: Choice) -> Step:
     Raises
     ------
     InputError, InputTypeError
-        If it is not linear in its state, or no attitude step.
+        If it is not linear in its state, holds unknowns, or is no attitude step.
     """
     attitude_step = step(choice)
+    attitude_step.kernel.require_known()
     if attitude_step.kernel.transition is None:
         raise InputError(
             f"kernel {attitude_step.kernel.name} is not linear in its state: "

@@ -6,7 +6,8 @@ motions of the catalogue in the symbols of their parameters, where t is the time
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +22,7 @@ from strapgen.catalogue import Choice
 from strapgen.support import checks
 from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic import reading
 from strapgen.symbolic.power_series import Powers
 
 #: Motions for which a series can be derived.
@@ -49,6 +51,8 @@ class ErrorSeries:
         The last power of the step that was derived.
     invariant : dict of int to Invariants
         For a general rate the same powers in vector-invariant form.
+    unknowns : tuple of str
+        Coefficients of the kernel that are not known: all terms are polynomials in them.
     """
 
     kernel: str
@@ -58,6 +62,7 @@ class ErrorSeries:
     skew: Coefficients
     known: int
     invariant: dict[int, Invariants] = field(default_factory=dict)
+    unknowns: tuple[str, ...] = ()
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -90,6 +95,8 @@ class ErrorSeries:
         for part in PARTS:
             data[part] = [sp.sstr(expression, order="lex") for expression in self.expressions(part)]
         data["known_to_power"] = self.known
+        if self.unknowns:
+            data["unknowns"] = list(self.unknowns)
         if self.motion == "general":
             data["invariant"] = {
                 str(power): {
@@ -99,6 +106,33 @@ class ErrorSeries:
                 for power, one in self.invariant.items()
             }
         return data
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> ErrorSeries:
+        """Rebuild a series from `as_dict`, with its unknowns as symbols; its vector-invariant form is left out.
+
+        Raises
+        ------
+        InputError
+            If a text is no expression.
+        """
+        unknowns = tuple(data.get("unknowns", ()))
+        drift, scale, skew = (_read(part, data[part], unknowns) for part in PARTS)
+        return cls(data["kernel"], data["motion"], drift, scale, skew, data["known_to_power"], {}, unknowns)
+
+
+def _read(part: str, texts: Sequence[str], unknowns: Sequence[str]) -> Coefficients:
+    """Return the coefficients that three sums hold, by power of the step."""
+    names = {name for text in texts for name in re.findall(r"[A-Za-z_]\w*", text)}
+    symbols = {name: sp.Symbol(name, real=True if name in unknowns else None) for name in names}
+    rows: dict[int, list[sp.Expr]] = {}
+    for axis, text in enumerate(texts):
+        for term in sp.Add.make_args(reading.expression(part, text, symbols)):
+            if term != 0:
+                coefficient, (_, power) = term.as_independent(STEP)[0], term.as_coeff_exponent(STEP)
+                row = rows.setdefault(int(power), [sp.S.Zero] * 3)
+                row[axis] += coefficient
+    return {power: (row[0], row[1], row[2]) for power, row in sorted(rows.items())}
 
 
 def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeries:
@@ -178,9 +212,7 @@ def _general(attitude_step: Step, terms: int, top: int) -> ErrorSeries:
             row = (sp.expand(split[part][0]), sp.expand(split[part][1]), sp.expand(split[part][2]))
             if power in (powers["drift"] if part == "drift" else symmetric) and any(row):
                 parts[part][power] = row
-    return ErrorSeries(
-        attitude_step.kernel.name, "general", parts["drift"], parts["scale"], parts["skew"], top, invariant
-    )
+    return _series(attitude_step, "general", parts, top, invariant)
 
 
 def _named(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSeries:
@@ -198,7 +230,20 @@ def _named(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSerie
             if any(row) and len(rows) < terms:
                 rows[power] = row
         parts[part] = rows
-    return ErrorSeries(attitude_step.kernel.name, motion, parts["drift"], parts["scale"], parts["skew"], top)
+    return _series(attitude_step, motion, parts, top, {})
+
+
+def _series(
+    attitude_step: Step,
+    motion: str,
+    parts: dict[str, Coefficients],
+    known: int,
+    invariant: dict[int, Invariants],
+) -> ErrorSeries:
+    """Return the series with these coefficients."""
+    kernel = attitude_step.kernel
+    drift, scale, skew = (parts[part] for part in PARTS)
+    return ErrorSeries(kernel.name, motion, drift, scale, skew, known, invariant, kernel.unknowns)
 
 
 def _powers(elements: Sequence[Powers]) -> list[int]:

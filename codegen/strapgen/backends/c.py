@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,8 @@ from strapgen.toolchain import compiler
 
 #: The types of C in numpy.
 _TYPES = {"double": np.float64, "float": np.float32}
+#: Runs that generated loops take side by side, in any type.
+_GROUP = 16
 
 
 def real_type(target: str) -> tuple[str, Any]:
@@ -75,20 +79,42 @@ class CBackend(Backend):
     def _propagate(
         self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
     ) -> Array:
+        return self._in_threads(increments, record_every, orthonormalize_every, initial, 1)
+
+    def _in_threads(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array, jobs: int
+    ) -> Array:
         runs, steps = increments.shape[:2]
         history = np.empty((runs, 1 + steps // record_every, *self.state_shape), self.dtype)
-        status = self._generated_propagate(
-            runs,
-            steps,
-            record_every,
-            orthonormalize_every,
-            self._orthonormalizer,
-            self._pointer(initial),
-            self._pointer(increments),
-            self._pointer(history),
-        )
-        if status:
+
+        def work(part: slice) -> int:
+            arrays = (initial[part], increments[part], history[part])
+            status: int = self._generated_propagate(
+                len(arrays[0]),
+                steps,
+                record_every,
+                orthonormalize_every,
+                self._orthonormalizer,
+                *map(self._pointer, arrays),
+            )
+            return status
+
+        parts = _parts(runs, jobs)
+        if len(parts) == 1:
+            statuses = [work(parts[0])]
+        else:
+            with ThreadPoolExecutor(len(parts)) as pool:  # cffi calls C without the interpreter's lock
+                statuses = list(pool.map(work, parts))
+        if any(statuses):
             raise RuntimeError(
-                f"{self.kernel}: the generated loop refused its arguments with status {status}"
+                f"{self.kernel}: the generated loop refused its arguments with status {max(statuses)}"
             )
         return history
+
+
+def _parts(runs: int, jobs: int) -> list[slice]:
+    """Return contiguous parts of some runs for so many threads, all but the last of whole groups."""
+    groups = -(-runs // _GROUP)
+    jobs = min(jobs, groups)
+    edges = [min(runs, groups * job // jobs * _GROUP) for job in range(jobs + 1)]
+    return [slice(first, stop) for first, stop in pairwise(edges) if first < stop]

@@ -18,6 +18,23 @@ from strapgen.support.suggestions import counted, needed
 Array = NDArray[Any]
 
 
+class StepInWords:
+    """What a back end of a step shows of itself."""
+
+    name: str
+    kernel: str
+    samples: int
+    takes: str
+    state_shape: tuple[int, ...]
+    dtype: Any
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        state = f"state {counted_shape(self.state_shape)} {self.dtype}"
+        return f"{self.name}: {self.kernel}, {self.samples} {self.takes} a step, {state}"
+
+
 class Evaluator(ABC):
     """A kernel as a callable on arrays of samples.
 

@@ -15,7 +15,7 @@ from strapgen.support.exceptions import InputError
 #: Most pulses that can be counted, since a double represents every whole number up to here.
 _MOST_PULSES = 2**53
 #: Most steps of a run that are propagated together where their increments come part by part.
-PART = 1 << 18
+PART = 128_000
 
 
 def windows(increments: Any, count: int, beside: int = 0) -> NDArray[np.float64]:

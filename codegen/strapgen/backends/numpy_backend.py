@@ -13,15 +13,18 @@ from collections.abc import Callable
 import numpy as np
 
 from strapgen.backends.evaluators import Array
+from strapgen.backends.increments import PART
 from strapgen.backends.numpy_evaluator import NumpyEvaluator
 from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.toolchain import compiler
 
-#: Largest number of steps times runs in one span: some megabytes, which stay in the processor's cache.
-_SPAN = 1 << 18
-#: Number of products in one numpy call of a scan, large enough to hide the cost of the call.
-_WIDTH = 1024
+#: Number of products in one numpy call of a scan, large enough to hide the cost of the call. Rows of a power of two
+#: would lie in the same lines of the cache.
+_WIDTH = 8000
+#: Largest number of steps times runs in one span: some megabytes, which stay in the processor's cache. A run that comes
+#: part by part has the same spans.
+_SPAN = PART
 #: Steps in one elementwise pass, whose temporaries stay in the nearest caches.
 _PASS = 1 << 13
 
@@ -62,7 +65,16 @@ class NumpyBackend(Backend):
         for first, length, segments in _spans(steps, orthonormalize_every, max(1, _SPAN // max(runs, 1))):
             span = increments[:, first : first + length * segments]
             complete = orthonormalize_every and (first + length) % orthonormalize_every == 0
-            states, state = self._run_span(span, length, segments, bool(complete), state)
+            count = span.shape[1]
+            direct = record_every == 1
+            states = (
+                history[:, 1 + first : 1 + first + count]
+                if direct
+                else np.empty((runs, count, *self.state_shape))
+            )
+            state = self._run_span(span, length, segments, bool(complete), state, states)
+            if direct:
+                continue
             # Records of this span: steps first + 1, ..., counted from 1.
             offset = -first % record_every or record_every
             recorded = states[:, offset - 1 :: record_every]
@@ -84,9 +96,15 @@ class NumpyBackend(Backend):
                 history[:, (number + 1) // record_every] = state
 
     def _run_span(
-        self, increments: Array, length: int, segments: int, orthonormalize: bool, state: Array
-    ) -> tuple[Array, Array]:
-        """Run segments of `length` steps, of which the last may be shorter; return all states and the last.
+        self,
+        increments: Array,
+        length: int,
+        segments: int,
+        orthonormalize: bool,
+        state: Array,
+        states: Array,
+    ) -> Array:
+        """Run segments of `length` steps, of which the last may be shorter; store all states and return the last.
 
         The segments are scanned side by side from the identity. A loop over them then takes the state through their
         products and orthonormalizes between them.
@@ -118,29 +136,51 @@ class NumpyBackend(Backend):
         for k in range(0, depth, rows):
             part = local[:, k : k + rows]
             self._multiply(heads[:, None], part, part)
-        by_time = local.reshape(self._elements, depth, blocks, runs, segments).transpose(3, 4, 2, 1, 0)
-        states = by_time.reshape(runs, segments, blocks * depth, *self.state_shape)[:, :, :length]
+        self._store(local.reshape(self._elements, depth, blocks, runs, segments), length, states)
         if orthonormalize:
-            states[:, :full, -1] = ends[:, :full]
-        return states.reshape(runs, segments * length, *self.state_shape)[:, :steps], state
+            whole = states[:, : full * length].reshape(runs, full, length, *self.state_shape)
+            whole[:, :, -1] = ends[:, :full]
+        return states[:, -1].copy()  # so a run that goes on from a record of its last state has the same bits
+
+    def _store(self, local: Array, length: int, states: Array) -> None:
+        """Store states (elements, depth, blocks, runs, segments) in the order of time, (runs, steps, state shape)."""
+        elements, depth, blocks, runs, segments = local.shape
+        steps = states.shape[1]
+        exact = segments * blocks * depth == steps
+        shape = (runs, segments, blocks, depth, elements)
+        by_time = (
+            states.reshape(shape) if exact else np.empty(shape)
+        )  # the first splits axes, and copies nothing
+        for element in range(elements):
+            by_time[..., element] = local[element].transpose(2, 3, 1, 0)
+        if not exact:
+            padded = by_time.reshape(runs, segments, blocks * depth, *self.state_shape)[:, :, :length]
+            states[...] = padded.reshape(runs, segments * length, *self.state_shape)[:, :steps]
 
     def _transitions(self, increments: Array, length: int, segments: int, blocks: int, depth: int) -> Array:
         """Return the transitions, (elements, depth, blocks, runs * segments).
 
-        Steps beyond the end have zero increments; their transition is the identity.
+        They are worked out in the order of time, and arranged afterwards: a transition has fewer numbers than the
+        increments that it takes. Those beyond the end are the identity.
         """
         runs, steps = increments.shape[:2]
-        whole = np.zeros((runs, segments * length, self.samples * 3))
-        whole[:, :steps] = increments.reshape(runs, steps, -1)
-        padded = np.zeros((runs, segments, blocks * depth, self.samples * 3))
-        padded[:, :, :length] = whole.reshape(runs, segments, length, -1)
-        split = padded.reshape(runs, segments, blocks, depth, -1).transpose(4, 3, 2, 0, 1)
-        split = np.ascontiguousarray(split).reshape(self.samples, 3, -1)
-        result = np.empty((self._elements, split.shape[-1]))
-        for k in range(0, split.shape[-1], _PASS):
-            part = np.moveaxis(split[:, :, k : k + _PASS], -1, 0)
-            self._transition(part, out=self._open(result[:, k : k + _PASS]))
-        return result.reshape(self._elements, depth, blocks, runs * segments)
+        rows = increments.reshape(runs * steps, self.samples, 3)
+        in_time = np.empty((self._elements, len(rows)))
+        for k in range(0, len(rows), _PASS):
+            self._transition(rows[k : k + _PASS], out=self._open(in_time[:, k : k + _PASS]))
+        if in_time.size != self._elements * runs * segments * blocks * depth:
+            whole = self._identities(runs, segments * length)
+            whole[..., :steps] = in_time.reshape(self._elements, runs, steps)
+            in_time = self._identities(runs, segments, blocks * depth)
+            in_time[..., :length] = whole.reshape(self._elements, runs, segments, length)
+        split = in_time.reshape(self._elements, runs, segments, blocks, depth).transpose(0, 4, 3, 1, 2)
+        return np.ascontiguousarray(split).reshape(self._elements, depth, blocks, runs * segments)
+
+    def _identities(self, *shape: int) -> Array:
+        """Return states of zero rotation, (elements, ...)."""
+        result = np.empty((self._elements, *shape))
+        result[...] = self.identity.reshape(-1, *(1 for _ in shape))
+        return result
 
     def _scan(self, transitions: Array) -> Array:
         """Return the product of all transitions up to each place, (elements, length, width)."""
@@ -179,7 +219,7 @@ class NumpyBackend(Backend):
 
 def _cut(length: int, width: int) -> tuple[int, int]:
     """Return the number of blocks for a scan of `length` steps in `width` columns, and the places in each."""
-    blocks = max(1, min(round(_WIDTH / width), length // 16))
+    blocks = max(1, min(round(_WIDTH / width), length // 4))
     return blocks, -(-length // blocks)
 
 

@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.evaluators import Array, Evaluator, StepInWords
 from strapgen.backends.increments import PART, run_parts
 from strapgen.backends.numpy_evaluator import NumpyEvaluator
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
-from strapgen.support.brief import counted_shape, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.targets.registry import NUMPY
 
 
-class Backend(ABC):
+class Backend(StepInWords, ABC):
     """An attitude algorithm that runs.
 
     It can be pickled, so that a pool of processes can run it: the sources of the step and of its kernels travel, and
@@ -71,12 +70,6 @@ class Backend(ABC):
     increment_unit: float | None = None
     count: float | None = None
     saturates: bool = False
-
-    __repr__ = short_repr
-
-    def _in_words(self) -> str:
-        state = f"state {counted_shape(self.state_shape)} {self.dtype}"
-        return f"{self.name}: {self.kernel}, {self.samples} {self.takes} a step, {state}"
 
     def __init__(self, parts: StepSources, step: Evaluator) -> None:
         sources, kernels = parts.step, parts.step_kernels
@@ -140,8 +133,7 @@ class Backend(ABC):
         states = np.asarray(states, np.float64)
         if self.attitude is None:
             return np.array(states)
-        result: Array = NumpyEvaluator(self._parts.sources(self.attitude, NUMPY))(states)
-        return result
+        return np.asarray(NumpyEvaluator(self._parts.sources(self.attitude, NUMPY))(states))
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
         """Return a certified bound of what rounding does to a run without orthonormalization.
@@ -239,8 +231,7 @@ class Backend(ABC):
         InputError, InputTypeError
             If a shape, a dtype or a value does not fit.
         """
-        result: Array = self._step(state, increments)
-        return result
+        return np.asarray(self._step(state, increments))
 
     def orthonormalize(self, state: Any) -> Array:
         """Restore the constraint of a state: its length, or its orthogonality.
@@ -253,8 +244,7 @@ class Backend(ABC):
         -------
         array, (..., state shape)
         """
-        result: Array = self.beside(self._need_orthonormalization())(state)
-        return result
+        return np.asarray(self.beside(self._need_orthonormalization())(state))
 
     def _need_orthonormalization(self) -> str:
         """Return the kernel that orthonormalizes, if there is one."""
@@ -268,6 +258,7 @@ class Backend(ABC):
         record_every: int = 1,
         orthonormalize_every: int | None = None,
         initial: Any = None,
+        jobs: int = 1,
     ) -> Array:
         """Run the algorithm over a sequence of increments.
 
@@ -276,13 +267,14 @@ class Backend(ABC):
         increments : array_like, (..., N, samples, 3)
             Angle increments of N steps in rad, body axes; leading axes are independent runs. `gyro.windows` cuts a
             row of increments into those of each step.
-        record_every : int, optional
-            Steps from record to record.
-        orthonormalize_every : int, optional
-            Steps from orthonormalization to orthonormalization; never by default. A record of the same
-            step is taken after it.
+        record_every, orthonormalize_every : int, optional
+            Steps from record to record, and from orthonormalization to orthonormalization; never by default. A record
+            of the same step is taken after it.
         initial : array_like, (..., state shape), optional
             State at the start, by default zero rotation.
+        jobs : int, optional
+            Number of threads that share independent runs of C in double or float, which needs no lock of the
+            interpreter; other back ends use one. The bits are those of one thread.
 
         Returns
         -------
@@ -304,10 +296,8 @@ class Backend(ABC):
         d = checks.real_array("increments", increments, (self.samples, 3), self.dtype)
         if d.ndim < 3:
             raise InputError(f"increments has shape {d.shape}; (..., steps, {self.samples}, 3) is needed")
-        checks.count("record_every", record_every, largest=checks.MOST)
-        if orthonormalize_every is not None:
-            checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
-            self._need_orthonormalization()
+        self._check_schedule(record_every, orthonormalize_every)
+        checks.count("jobs", jobs)
         start = self.identity if initial is None else initial
         start = checks.real_array("initial", start, self.state_shape, self.dtype)
         batch, steps = d.shape[:-3], d.shape[-3]
@@ -320,11 +310,12 @@ class Backend(ABC):
         runs = int(np.prod(batch, dtype=int))
         if not runs:
             return np.empty((*batch, 1 + steps // record_every, *self.state_shape), self.dtype)
-        history = self._propagate(
+        history = self._in_threads(
             d.reshape(runs, steps, self.samples, 3),
             record_every,
             orthonormalize_every or 0,
             np.ascontiguousarray(start).reshape(runs, *self.state_shape),
+            jobs,
         )
         return history.reshape(*batch, 1 + steps // record_every, *self.state_shape)
 
@@ -360,10 +351,7 @@ class Backend(ABC):
         """
         if steps <= PART:
             return self.propagate(part(0, steps), record_every, orthonormalize_every, initial)
-        checks.count("record_every", record_every, largest=checks.MOST)
-        if orthonormalize_every is not None:
-            checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
-            self._need_orthonormalization()
+        self._check_schedule(record_every, orthonormalize_every)
         history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
         start = self.identity if initial is None else initial
         history[0] = start = checks.real_array("initial", start, self.state_shape, self.dtype)
@@ -392,6 +380,18 @@ class Backend(ABC):
     def _memory(self, initial: Array) -> Any:
         """Return the memory with which a run begins at a state."""
         return initial
+
+    def _check_schedule(self, record_every: int, orthonormalize_every: int | None) -> None:
+        checks.count("record_every", record_every, largest=checks.MOST)
+        if orthonormalize_every is not None:
+            checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
+            self._need_orthonormalization()
+
+    def _in_threads(
+        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array, jobs: int
+    ) -> Array:
+        """Propagate as `_propagate` does, in some threads where that is faster."""
+        return self._propagate(increments, record_every, orthonormalize_every, initial)
 
     @abstractmethod
     def _propagate(

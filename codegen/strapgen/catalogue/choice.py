@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -13,10 +13,11 @@ from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS
+from strapgen.catalogue.user.user_kernel import UserKernel
 from strapgen.support.brief import full_text, short_repr
 
 if TYPE_CHECKING:
-    from strapgen.symbolic.kernel import Kernel, Stage
+    from strapgen.symbolic.kernel import Kernel
 
 
 #: What chooses a method: its name, or the value that holds its coefficients.
@@ -38,7 +39,7 @@ class Choice:
         method.
     previous, ahead : int, optional
         Numbers of increments from before the step and from after it that it takes in addition to its own.
-    user_kernel : Kernel, optional
+    user_kernel : UserKernel, optional
         A user's kernel itself, with the kernels that it brings; None for one of the catalogue.
     constants : tuple of (str, tuple of Fraction), optional
         Inputs that are constants, sorted by name, each with its numbers in row-major order; of kernels that are no
@@ -53,20 +54,22 @@ class Choice:
     previous: int = 0
     ahead: int = 0
     # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
-    user_kernel: Kernel | None = field(default=None, hash=False, repr=False)
+    user_kernel: UserKernel | None = field(default=None, hash=False, repr=False)
     constants: Constants = ()
     layout: Layout | None = None
 
     __repr__ = short_repr
 
     @classmethod
-    def of_user(cls, kernel: Kernel) -> Choice:
+    def of_user(cls, kernel: Kernel | UserKernel) -> Choice:
         """Return the choice of a user's kernel: an attitude step, or a kernel that comes with one."""
-        if kernel.companions is None:
-            return cls(kernel.name, user_kernel=kernel)
-        previous, ahead = kernel.companions.previous, kernel.companions.ahead
-        increments = kernel.inputs[1].shape[0] - previous - ahead
-        return cls(kernel.name, None, increments, previous, ahead, kernel)
+        user_kernel = kernel if isinstance(kernel, UserKernel) else UserKernel.of(kernel)
+        head = user_kernel.head
+        if head.companions is None:
+            return cls(head.name, user_kernel=user_kernel)
+        previous, ahead = head.companions.previous, head.companions.ahead
+        increments = head.samples - previous - ahead
+        return cls(head.name, None, increments, previous, ahead, user_kernel)
 
     @property
     def method_name(self) -> str | None:
@@ -104,7 +107,7 @@ class Choice:
         with its file, or the kernel.
         """
         if self.user_kernel is not None:
-            return f"{self.kernel} {_text(self.user_kernel)}"
+            return f"{self.kernel} {self.user_kernel.text}"
         if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {full_text(self.method)} {self.method.file}"
         words = [self.kernel, options(self.constants)]
@@ -122,7 +125,7 @@ class Choice:
         """Names of the kernels that orthonormalize the state; for a user's step, the one that it names."""
         if self.user_kernel is None:
             return orthonormalizations(self.name)
-        step = self.user_kernel.companions
+        step = self.user_kernel.head.companions
         return [] if step is None or step.orthonormalize is None else [step.orthonormalize]
 
     def companion(self, name: str) -> Choice:
@@ -138,22 +141,9 @@ class Choice:
         >>> Choice("euler", "rk4", 2).companion("dcm-from-euler").kernel
         'dcm-from-euler'
         """
-        brought = () if self.user_kernel is None else self.user_kernel.own
-        return next((Choice.of_user(kernel) for kernel in brought if kernel.name == name), Choice(name))
-
-
-def _text(kernel: Kernel) -> str:
-    """Return a kernel as text, its formulas with the class of every part.
-
-    SymPy's own text shows the number pi and a symbol of that name alike.
-    """
-    from sympy import srepr
-
-    def shown(stages: tuple[Stage, ...]) -> str:
-        return full_text([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
-
-    rest = replace(kernel, stages=(), outputs=(), own=())
-    return " ".join([full_text(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])
+        if self.user_kernel is None or name not in self.user_kernel.head.brought:
+            return Choice(name)
+        return next(Choice.of_user(kernel) for kernel in self.user_kernel.kernel.own if kernel.name == name)
 
 
 def increments(choice: Choice) -> int:

@@ -6,20 +6,19 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue import layout as layout_files
 from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.layout import Layout
-from strapgen.catalogue.method_names import INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
+from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import EXACT, named_window
 from strapgen.catalogue.names import (
-    ALGORITHMS,
     KERNELS,
     LAYOUT_KERNELS,
     LEAST_WHOLE,
@@ -31,6 +30,10 @@ from strapgen.catalogue.user import loading
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.suggestions import some
+
+if TYPE_CHECKING:
+    from strapgen.catalogue.constants import Constants
+    from strapgen.symbolic.kernel import Kernel
 
 #: What every message about an algorithm allows beside the names.
 _FILE = "a Python file"
@@ -62,7 +65,8 @@ def choose(
         Whether the step takes the rate at the nodes of its method in place of increments.
     constants : mapping of str to number, or to an array or nested sequence of numbers, optional
         Values of inputs of a kernel that is no attitude step, in their units and row by row; they are then constants
-        of its code. A float stands for its shortest decimal form. `derive` refuses what the kernel has no input for.
+        of its code. Of a user's kernel with unknowns, values of these. A float stands for its shortest decimal form.
+        `derive` refuses what the kernel has no input for.
     layout : path or Layout, optional
         Of the kernels "separate" and "torques": the file that describes the gyros, see `layout.read`.
 
@@ -87,12 +91,23 @@ def choose(
 def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
     """Return a choice with constants in place of inputs; `constants` and errors are those of `choose`."""
     values = constant_values.read(constants)
+    if choice.user_kernel is not None and choice.user_kernel.unknowns:
+        return Choice.of_user(_with_values(choice.user_kernel.kernel, values))
     if values and (choice.name in ALGORITHMS or choice.name in VECTORS or choice.user_kernel is not None):
         raise InputError(
             f"algorithm {choice.name} takes no constants (got {values[0][0]}); kernels without a method do, such as "
             "imu-compensate"
         )
     return replace(choice, constants=values)
+
+
+def _with_values(kernel: Kernel, values: Constants) -> Kernel:
+    """Return a user's kernel with numbers in place of unknowns; its arguments state them."""
+    for name, numbers in values:
+        if len(numbers) != 1:
+            raise InputError(f"kernel {kernel.name}: {name} has {len(numbers)} numbers; 1 is needed")
+    chosen = kernel.substitute({name: number for name, (number,) in values})
+    return replace(chosen, arguments=f"{kernel.arguments} {constant_values.options(values)}".strip())
 
 
 def _with_layout(choice: Choice, layout: str | Path | Layout | None) -> Choice:
@@ -152,7 +167,7 @@ def _choose(
     assert not isinstance(method, (Window, ShapedConing)), "those are taken before"
     if name in VECTORS:
         if rates and VECTORS[name].every:
-            raise InputError(f"{name} takes increments of angle and of velocity; rates do not go with it")
+            raise InputError(f"{name} takes increments; rates at nodes do not go with it")
         if isinstance(method, Tableau) and not VECTORS[name].every:
             raise InputError(
                 f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"

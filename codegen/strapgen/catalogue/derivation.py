@@ -82,7 +82,7 @@ def derive(choice: Choice) -> Kernel:
 def _derived(choice: Choice) -> Kernel:
     """Return the kernel of a choice with all its inputs."""
     if choice.user_kernel is not None:
-        return choice.user_kernel
+        return choice.user_kernel.kernel
     if choice.method is None or isinstance(choice.method, str):
         return _known(choice)
     return _of_catalogue(choice)  # the same coefficients from two files are told apart by the kernel alone

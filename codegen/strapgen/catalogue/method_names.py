@@ -8,6 +8,13 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
+#: Attitude algorithms, by the state they integrate.
+ALGORITHMS = {
+    "dcm": "direction cosine matrix",
+    "euler": "Euler parameters, scalar last",
+    "cayley-klein": "Cayley-Klein parameters, scalar first",
+}
+
 
 class Integrator(NamedTuple):
     """A method without a tableau; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
@@ -140,4 +147,16 @@ VECTORS = {
         True,
         True,
     ),
+    **{
+        f"{algorithm}-jacobian": StepVector(
+            f"Jacobians of a step by state and increments: {words}",
+            "jacobians",
+            algorithm.replace("-", "_"),
+            (),
+            "rk4",
+            True,
+            True,
+        )
+        for algorithm, words in ALGORITHMS.items()
+    },
 }

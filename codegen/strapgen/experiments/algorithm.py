@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Algorithm:
+class AttitudeAlgorithm:
     """An attitude algorithm; what you can do with it are methods, each of which calls a function of the package.
 
     `algorithm` returns one. It is a value: it holds the choice alone, and no method changes it.
@@ -213,7 +213,7 @@ def algorithm(
     rates: bool = False,
     previous: int | None = None,
     ahead: int | None = None,
-) -> Algorithm:
+) -> AttitudeAlgorithm:
     """Return an attitude algorithm as one object, from which everything else follows.
 
     Parameters
@@ -231,7 +231,7 @@ def algorithm(
 
     Returns
     -------
-    Algorithm
+    AttitudeAlgorithm
 
     Raises
     ------
@@ -241,6 +241,6 @@ def algorithm(
     Examples
     --------
     >>> algorithm("euler", "rk4", increments=2)
-    <Algorithm euler, method rk4, 2 increments a step: euler-rk4-2>
+    <AttitudeAlgorithm euler, method rk4, 2 increments a step: euler-rk4-2>
     """
-    return Algorithm(choose_step(name, method, increments, rates, previous, ahead))
+    return AttitudeAlgorithm(choose_step(name, method, increments, rates, previous, ahead))

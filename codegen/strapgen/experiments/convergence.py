@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -21,9 +22,12 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
+from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import checks, stages
 from strapgen.support.brief import notebook_html, short_repr, to_pandas
+from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.resumable import side_by_side
 
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
 FITTED = 3
@@ -119,6 +123,60 @@ class Convergence:
             "observed_order": self.observed,
             "rungs": [asdict(rung) for rung in self.rungs],
         }
+
+
+@dataclass(frozen=True)
+class LadderCase:
+    """What a process needs to measure the order of an algorithm.
+
+    Parameters
+    ----------
+    choice : Choice
+    backend : str
+    motion : str
+        Name of a motion, or the file of one.
+    settings : dict of str to str
+        Its parameters.
+    steps : tuple of str
+        Steps in s.
+    duration : str
+        In s.
+    """
+
+    choice: Choice
+    backend: str
+    motion: str
+    settings: Mapping[str, Any]
+    steps: tuple[str, ...]
+    duration: str
+
+    def moved(self, begin: Path, end: Path) -> LadderCase:
+        """Return the case with the file of its motion in another folder, see `clusters.Movable`."""
+        return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
+
+
+def measured(case: LadderCase) -> Convergence:
+    """Return the outcome of a case."""
+    profile = any_motion(case.motion, case.duration, case.settings)
+    with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
+        return converge(case.choice, profile, case.steps, case.duration, case.backend)
+
+
+def converge_all(
+    cases: Sequence[LadderCase], jobs: int | None = None, cluster: Cluster | None = None
+) -> Iterator[tuple[int, Convergence]]:
+    """Measure several algorithms side by side, and yield the place of each with its outcome when it is there.
+
+    Parameters
+    ----------
+    cases : sequence of LadderCase
+    jobs, cluster
+        As for `resumable.side_by_side`.
+    """
+    files = None if cluster is None else Bundle.of({case.motion for case in cases if is_file(case.motion)})
+    numbered = {str(place): case for place, case in enumerate(cases)}
+    for name, outcome in side_by_side(measured, numbered, jobs, cluster, files):
+        yield int(name), outcome
 
 
 def converge(

@@ -7,7 +7,7 @@ on how many processes work on them, or which of them ends first.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -105,9 +105,18 @@ class MeanSquare:
     total: float = 0.0
     squares: float = 0.0
 
-    def __add__(self, other: MeanSquare) -> MeanSquare:
-        """Return the mean square of both sets of runs together."""
-        return MeanSquare(self.runs + other.runs, self.total + other.total, self.squares + other.squares)
+    @classmethod
+    def of(cls, parts: Iterable[MeanSquare]) -> MeanSquare:
+        """Return the mean square of several parts together, whose order changes nothing.
+
+        Examples
+        --------
+        >>> MeanSquare.of([MeanSquare(1, 0.1, 0.01), MeanSquare(1, 0.3, 0.09)]).mean
+        0.2
+        """
+        several = list(parts)
+        totals, squares = ([getattr(one, name) for one in several] for name in ("total", "squares"))
+        return cls(sum(one.runs for one in several), math.fsum(totals), math.fsum(squares))
 
     @property
     def mean(self) -> float:

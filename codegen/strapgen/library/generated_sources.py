@@ -10,16 +10,19 @@ from __future__ import annotations
 import json
 import pickle
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from strapgen import pipeline, targets
+from strapgen import targets
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import FixedProgram
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
 from strapgen.support.exceptions import InputError
 from strapgen.targets.names import UNNAMED, Naming
+
+if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
+    from strapgen.ir.program import Program
 
 _programs: dict[str, Program] = {}
 
@@ -44,6 +47,8 @@ def program(choice: Choice) -> Program:
     """
 
     def fill(draft: Path) -> None:
+        from strapgen import pipeline  # what is in the cache does without the stages
+
         (draft / "program.pickle").write_bytes(pickle.dumps(pipeline.lowered(choice)))
 
     key = cache.digest([cache.generator_digest(), choice.identity])
@@ -85,6 +90,8 @@ def fixed_program(choice: Choice, settings: Settings | None = None) -> FixedProg
     settings = settings or Settings()
 
     def fill(draft: Path) -> None:
+        from strapgen import pipeline
+
         (draft / "fixed.pickle").write_bytes(pickle.dumps(pipeline.quantize(program(choice), settings)))
 
     def read() -> bytes:
@@ -127,6 +134,8 @@ def sources(
     """
 
     def fill(draft: Path) -> None:
+        from strapgen import pipeline
+
         compiled = pipeline.compile(
             choice,
             target,

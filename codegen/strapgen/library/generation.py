@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.targets.names import UNNAMED, Naming
+
+if TYPE_CHECKING:
+    from strapgen.ir.program import Program
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
         lines.append(f"out  {stage.signal.name} (unit {stage.signal.unit}): {stage.signal.meaning}")
     if kernel.order is not None:
         lines.append(f"order {kernel.order.step}: {kernel.order}")
+    if kernel.unknowns:
+        lines.append(f"unknowns {', '.join(kernel.unknowns)}")
     lines += [f"note {note}" for note in (kernel.notes if notes is None else notes)]
     for stage in (*kernel.stages, *kernel.outputs):
         lines += [
@@ -108,6 +110,17 @@ def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
     return Report(texts[show], data, latex=texts["latex"])
 
 
+def unknown_formulas_report(kernel: Kernel, show: str) -> Report:
+    """Return the formulas of a kernel with unknowns, which has no program, as text or LaTeX."""
+    texts = {"text": lambda: as_text(kernel), "latex": lambda: as_latex(kernel)}
+
+    def data() -> dict[str, Any]:
+        shown = {"latex": as_latex(kernel)} if show == "latex" else {}
+        return kernel_as_data(kernel) | {"unknowns": list(kernel.unknowns)} | shown
+
+    return Report(texts[show], data)
+
+
 def program_as_data(program: Program) -> dict[str, str]:
     """Return the straight-line code of a program by the names that it assigns, in order, with exact constants."""
     printer = ExactPrinter()
@@ -168,6 +181,11 @@ def _latex_name(element: str) -> str:
 
 
 def as_data(kernel: Kernel, program: Program) -> dict[str, Any]:
+    """Return a kernel as plain JSON data with the operations of its program."""
+    return kernel_as_data(kernel) | {"operations": program.operations, "temporaries": program.temporaries}
+
+
+def kernel_as_data(kernel: Kernel) -> dict[str, Any]:
     """Return a kernel as plain JSON data; expressions are strings that SymPy parses."""
 
     def stage_data(stage: Stage) -> dict[str, Any]:
@@ -184,6 +202,4 @@ def as_data(kernel: Kernel, program: Program) -> dict[str, Any]:
         "inputs": [signal.as_dict() for signal in kernel.inputs],
         "stages": [stage_data(stage) for stage in kernel.stages],
         "outputs": [stage_data(stage) for stage in kernel.outputs],
-        "operations": program.operations,
-        "temporaries": program.temporaries,
     }

@@ -147,6 +147,36 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
     return "\n".join(lines)
 
 
+def closed_forms_report(cases: Sequence[AssessedCase]) -> Report:
+    """Return the rates of kernels with unknowns as a report: closed forms, without numbers."""
+
+    def text() -> str:
+        lines = ["mean rates about z, to second order in the amplitudes, in closed form"]
+        for case in cases:
+            lines += ["", f"{case.label}, {case.quantity} rate in {case.assessment.unit}"]
+            unknowns = ", ".join(case.assessment.unknowns)
+            lines += [f"  unknowns   = {unknowns or 'none'}"]
+            lines += [
+                f"  {part:10} = {case.assessment.text(part)}" for part in ("continuous", "computed", "error")
+            ]
+        return "\n".join(lines)
+
+    def data() -> list[dict[str, Any]]:
+        return [
+            {
+                "kernel": case.assessment.kernel,
+                "increments": case.samples,
+                "unknowns": list(case.assessment.unknowns),
+                f"{case.quantity}_closed_form": {
+                    part: case.assessment.text(part) for part in ("computed", "continuous", "error")
+                },
+            }
+            for case in cases
+        ]
+
+    return Report(text, data)
+
+
 def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
     """Return the rates of one unit, each above its error of quadrature if there is one."""
     readable, factor = READABLE_UNITS[unit]

@@ -31,8 +31,8 @@ _MOST_CUBES, _MOST_COEFFICIENTS = 600, 6_000_000
 
 #: The coefficients of a polynomial by the powers of its variables.
 Powers = dict[tuple[int, ...], Fraction]
-#: The ends of every side of a part of the unit cube.
-Cube = tuple[tuple[Fraction, Fraction], ...]
+#: The ends of every side of a part of the unit cube: a few halvings, exact in double.
+Cube = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class _BernsteinForms:
     @classmethod
     def of(cls, form: NDArray[Any], unit: Fraction) -> _BernsteinForms:
         """Return integers as multiples of a unit, rounded down, on the whole cube."""
-        whole = ((Fraction(0), Fraction(1)),) * (form.ndim - 1)
+        whole = ((0.0, 1.0),) * (form.ndim - 1)
         return cls((form * unit.denominator // unit.numerator).astype(np.int64)[None], [whole], 1)
 
     def are_below(self, limit: int) -> NDArray[np.bool_]:
@@ -197,8 +197,12 @@ def _reached(form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]) -
         degree = values.shape[2] - 1
         powers = np.arange(degree + 1)
         binomials = np.array([math.comb(degree, k) for k in powers], np.float64)
-        basis = binomials * x[:, None] ** powers * (1 - x[:, None]) ** (degree - powers)
-        values = np.einsum("pei...,pi->pe...", np.broadcast_to(values, (len(x), *values.shape[1:])), basis)
+        points, place = np.unique(x, return_inverse=True)
+        basis = binomials * points[:, None] ** powers * (1 - points[:, None]) ** (degree - powers)
+        if len(values) == 1:  # the same at all points so far
+            values = np.einsum("ei...,pi->pe...", values[0], basis)[place]
+        else:
+            values = np.einsum("pei...,pi->pe...", values, basis[place])
     size = _size(len(form))
     lower = np.zeros((len(samples), size, size))
     rows, columns = np.triu_indices(size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import sympy as sp
@@ -13,6 +13,8 @@ from strapgen.ir.program import RESOLUTION
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.support.brief import counted_shape, notebook_latex, short_repr
+from strapgen.support.exceptions import InputError
+from strapgen.symbolic import unknown_values
 from strapgen.symbolic.evaluation import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
@@ -123,6 +125,9 @@ class Kernel:
         ``strapgen redundancy FILE``, where another than ``strapgen generate`` generates it.
     notes : tuple of str
         Remarks for the reader of generated code: domain, conventions.
+    unknowns : tuple of str
+        Names of the coefficients that are not known yet. Series and conditions are polynomials in them; no code can be
+        generated before `substitute` has replaced all of them.
     """
 
     name: str
@@ -138,6 +143,7 @@ class Kernel:
     own: tuple[Kernel, ...] = ()
     arguments: str = ""
     notes: tuple[str, ...] = field(default=())
+    unknowns: tuple[str, ...] = ()
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -180,6 +186,7 @@ class Kernel:
         """
         if values is None:
             values = {n: sp.Symbol(n, real=True) for signal in self.inputs for n in signal.elements}
+        values = {name: sp.Symbol(name, real=True) for name in self.unknowns} | dict(values)
         known = evaluate_stages((*self.stages, *self.outputs), values, number)
         return {stage.signal.name: [known[n] for n in stage.signal.elements] for stage in self.outputs}
 
@@ -189,20 +196,73 @@ class Kernel:
         Returns
         -------
         dict of str to list of ring element
-            For each output its elements, row-major.
+            For each output its elements, row-major; the unknowns are the last generators of their ring.
 
         Raises
         ------
         TypeError
             If the kernel divides or calls functions.
         """
-        names = [name for signal in self.inputs for name in signal.elements]
+        names = [*(name for signal in self.inputs for name in signal.elements), *self.unknowns]
         ring, *generators = sp.ring(names, sp.QQ)
         try:
             outputs = self.expand(dict(zip(names, generators, strict=True)))
             return {name: [ring(element) for element in elements] for name, elements in outputs.items()}
         except (TypeError, ValueError):  # SymPy's errors where a ring element meets what is no polynomial
             raise TypeError(f"{self.name} is no polynomial: it divides or calls functions") from None
+
+    def require_known(self) -> None:
+        """Refuse a kernel with unknowns where numbers are needed.
+
+        Raises
+        ------
+        InputError
+            If it has any.
+        """
+        if self.unknowns:
+            raise InputError(
+                f"kernel {self.name} holds the unknowns {', '.join(self.unknowns)}; strapgen solve states what they "
+                "may be, and --constant or Kernel.substitute sets them"
+            )
+
+    def substitute(self, values: Mapping[str, Any]) -> Kernel:
+        """Return the kernel with values, or expressions in the unknowns that remain, in place of unknowns.
+
+        Parameters
+        ----------
+        values : mapping of str to number or Expr
+            By the name of the unknown; a text is read exactly, such as "57/80" or "1 - a/2".
+
+        Returns
+        -------
+        Kernel
+            An ordinary kernel once no unknown is left.
+
+        Raises
+        ------
+        InputError
+            If the kernel has no such unknown, or a value holds an unknown symbol, an inexact number, or none.
+
+        Examples
+        --------
+        >>> build = KernelBuilder()
+        >>> w = build.scalar(Signal.scalar("w"))
+        >>> a, b = build.parameter("a", "b")
+        >>> _ = build.output(Signal.scalar("sum"), [a * w + b])
+        >>> kernel = build.kernel("sum", "a sum", "this example")
+        >>> kernel.substitute({"a": "1/2"}).expand(), kernel.substitute({"a": "b/2"}).unknowns
+        ({'sum': [b + w/2]}, ('b',))
+        """
+        chosen = unknown_values.read(f"kernel {self.name}", self.unknowns, values)
+
+        def replaced(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+            return tuple(Stage(s.signal, tuple(x.xreplace(chosen) for x in s.expressions)) for s in stages)
+
+        stages, outputs = replaced(self.stages), replaced(self.outputs)
+        if any(x.has(sp.nan, sp.zoo) for stage in (*stages, *outputs) for x in stage.expressions):
+            raise InputError(f"kernel {self.name} divides by zero with these values of its unknowns")
+        remaining = unknown_values.remaining(self.unknowns, chosen)
+        return replace(self, stages=stages, outputs=outputs, unknowns=remaining)
 
 
 class KernelBuilder:
@@ -229,6 +289,25 @@ class KernelBuilder:
         self.inputs: list[Signal] = []
         self.stages: list[Stage] = []
         self.outputs: list[Stage] = []
+        self.unknowns: dict[sp.Symbol, sp.Symbol] = {}
+
+    def parameter(self, *names: str | sp.Symbol) -> Any:
+        """Declare coefficients that are not known yet, by name or as symbols, and return their symbols.
+
+        Returns
+        -------
+        Symbol or tuple of Symbol
+            As many as there are arguments. The symbols that were passed may be used in formulas too.
+
+        Examples
+        --------
+        >>> build = KernelBuilder()
+        >>> a, b = build.parameter(*sp.symbols("a b"))
+        """
+        declared = [sp.Symbol(name, real=True) if isinstance(name, str) else name for name in names]
+        self.unknowns |= {symbol: sp.Symbol(symbol.name, real=True) for symbol in declared}
+        real = tuple(self.unknowns[symbol] for symbol in declared)
+        return real if len(real) != 1 else real[0]
 
     def input(self, signal: Signal) -> sp.Matrix:
         """Declare an input and return its symbols."""
@@ -255,9 +334,16 @@ class KernelBuilder:
 
     def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
         """Return the kernel; `rest` are further fields of `Kernel`."""
-        return Kernel(
-            name, title, source, tuple(self.inputs), tuple(self.outputs), tuple(self.stages), **rest
+        stages, outputs = (
+            tuple(Stage(s.signal, tuple(self._real(x) for x in s.expressions)) for s in stages)
+            for stages in (self.stages, self.outputs)
         )
+        unknowns = tuple(dict.fromkeys(symbol.name for symbol in self.unknowns.values()))
+        return Kernel(name, title, source, tuple(self.inputs), outputs, stages, unknowns=unknowns, **rest)
+
+    def _real(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression with the real symbols of the unknowns."""
+        return expression.xreplace(self.unknowns) if self.unknowns else expression
 
 
 def _expressions(items: Iterable[Any] | Sequence[Any]) -> tuple[sp.Expr, ...]:

@@ -127,6 +127,8 @@ class Powers:
             If it begins with anything else.
         """
         start = self.ring.domain.to_sympy(self._number())
+        if start.free_symbols:
+            raise ArithmeticError(f"a series that begins with the unknown {start} has no series as its root")
         try:
             factor = self.ring.domain.from_sympy(sp.sqrt(start)) if start > 0 else None
         except CoercionFailed:
@@ -200,15 +202,42 @@ def constant(ring: Any, value: Any, top: int) -> Powers:
     return Powers(ring, {0: ring(ring.domain.from_sympy(sp.sympify(value)))}, top)
 
 
-def field(expressions: Iterable[sp.Expr]) -> Any:
-    """Return the smallest field that holds the numbers of some expressions: the rationals, extended by their roots."""
+def field(expressions: Iterable[sp.Expr], unknowns: Sequence[str] = ()) -> Any:
+    """Return the smallest domain that holds the numbers of some expressions, and polynomials in some unknowns.
+
+    Parameters
+    ----------
+    expressions : iterable of Expr
+    unknowns : sequence of str, optional
+        Names of the unknowns.
+
+    Returns
+    -------
+    Domain
+        The rationals, extended by the roots in the expressions; the ring of polynomials in the unknowns over that
+        field, or the field of their quotients where an expression divides by one.
+
+    Examples
+    --------
+    >>> a = sp.Symbol("a", real=True)
+    >>> field([sp.Rational(1, 2)]), field([a / 2], ["a"]), field([1 / a], ["a"])
+    (QQ, QQ[a], QQ(a))
+    """
+    expressions = [*expressions]
     roots = {
         root
         for expression in expressions
         for root in expression.atoms(sp.Pow)
         if root.is_number and not root.is_Rational
     }
-    return sp.QQ.algebraic_field(*sorted(roots, key=str)) if roots else sp.QQ
+    numbers = sp.QQ.algebraic_field(*sorted(roots, key=str)) if roots else sp.QQ
+    if not unknowns:
+        return numbers
+    generators = [sp.Symbol(name, real=True) for name in unknowns]
+    divided = {
+        symbol for x in expressions for p in x.atoms(sp.Pow) if p.exp.is_negative for symbol in p.free_symbols
+    }
+    return numbers.frac_field(*generators) if divided & {*generators} else numbers[tuple(generators)]
 
 
 def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -> dict[str, list[Powers]]:
@@ -248,7 +277,8 @@ def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -
     def number(value: Any) -> Powers:
         return constant(ring, value, top)
 
-    inputs = {RESOLUTION: number(0), **values}
+    unknowns = {name: number(sp.Symbol(name, real=True)) for name in kernel.unknowns}
+    inputs = {RESOLUTION: number(0), **unknowns, **values}
     known = evaluate_stages((*kernel.stages, *kernel.outputs), inputs, number, function)
     results = {stage.signal.name: [known[name] for name in stage.signal.elements] for stage in kernel.outputs}
     if not all(isinstance(element, Powers) for elements in results.values() for element in elements):
@@ -339,6 +369,8 @@ def _largest(expression: sp.Expr, arguments: list[Any]) -> Any:
 def _compared(expression: sp.Expr, left: Any, right: Any) -> tuple[Any, Any]:
     """Return the numbers that decide a comparison of two series: their coefficients of the power 0."""
     numbers = _begins(left), _begins(right)
+    if (numbers[0] - numbers[1]).free_symbols:
+        raise ArithmeticError(f"{expression} is decided by the unknown {numbers[0] - numbers[1]}")
     if numbers[0] == numbers[1] and not (isinstance(left, Powers) and left.equals(right)):
         raise ArithmeticError(f"{expression} is decided by a value at its very limit")
     return numbers

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import FixedProgram
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.targets import registry
 from strapgen.targets.registry import BUILT_IN, TARGETS, Target, titles
+
+if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
+    from strapgen.ir.program import Program
 
 __all__ = [
     "BUILT_IN",
@@ -73,6 +76,8 @@ def emit(program: Program | FixedProgram, target: str) -> Sources:
             raise InputError(f"target {target} takes quantized programs alone; strapgen.quantize makes them")
         takers = ", ".join(fixed_targets())
         raise InputError(f"target {target} does not take fixed-point programs; these do: {takers}")
+    from strapgen.ir.integer_program import FixedProgram
+
     if isinstance(program, FixedProgram):
         _require_word(entry, program.word)
     plain = program.program if isinstance(program, FixedProgram) else program

@@ -206,9 +206,9 @@ def _outward(value: Fraction, up: bool, digits: int = 3) -> str:
     if not value:
         return "0"
     place = math.floor(math.log10(abs(value))) - digits + 1
-    scaled = value / Fraction(10) ** place
-    integer = math.ceil(scaled) if up else math.floor(scaled)
-    return f"{float(integer * Fraction(10) ** place):.{digits}g}"
+    above, below = value.numerator * 10 ** max(0, -place), value.denominator * 10 ** max(0, place)
+    integer = -(-above // below) if up else above // below
+    return f"{integer * 10 ** max(0, place) / 10 ** max(0, -place):.{digits}g}"
 
 
 def exact_text(value: Fraction) -> str:

@@ -8,6 +8,8 @@ import textwrap
 
 def fill(text: str, indent: str, width: int = 99) -> str:
     """Wrap text at spaces, every line after the first with `indent`."""
+    if len(text) <= width and not re.search(r"[^\S ]", text):
+        return text.rstrip()
     return "\n".join(
         textwrap.wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     )

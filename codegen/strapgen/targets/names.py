@@ -13,13 +13,15 @@ import symtable
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from strapgen.ir.integer_program import FixedProgram
-from strapgen.ir.program import Program
 from strapgen.support.exceptions import InputError
 from strapgen.targets.c_library import LIBRARY
-from strapgen.targets.renaming import Key, keys, renamed
+
+if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
+    from strapgen.ir.program import Program
+    from strapgen.targets.renaming import Key
 
 #: Keywords of C99 to C23 and of C++, which reads the headers too, and macros without arguments in lower case.
 _C_TEXT = """
@@ -42,7 +44,7 @@ _C_MACROS = re.compile(
     r"|(U?INT(MAX|PTR|(_LEAST|_FAST)?\d+)?|FLT|L?DBL|[SU]?CHAR|U?SHRT|U?L?LONG|WCHAR|WINT|S?SIZE|PTRDIFF|SIG_ATOMIC|FP|FE|LC"
     r"|EXIT|SEEK|MATH|SA)_[A-Z0-9_]+|(PRI|SCN)[diouxX](LEAST|FAST)?(\d+|MAX|PTR)"
 )
-_P = TypeVar("_P", Program, FixedProgram)
+_P = TypeVar("_P", "Program", "FixedProgram")
 
 #: A letter that no name has: admission lets letters of ASCII alone in.
 _MARK = "ж"
@@ -288,6 +290,8 @@ def printed(
         With the names that are printed.
     files : dict of str to str
     """
+    from strapgen.targets.renaming import keys, renamed  # what is in the cache is printed already
+
     names = keys(program, frozenset(joined))
     marks = {key: f"{_MARK}{number}{_MARK}" for number, key in enumerate(names)}
     marked = text(renamed(program, marks, joined), {})

@@ -12,16 +12,18 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from strapgen.ir.integer_program import FixedProgram
-from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, packages
 from strapgen.support.brief import short_repr
 from strapgen.support.cache import digest
 from strapgen.support.exceptions import InputError, StrapgenError
 from strapgen.support.packages import entry_points
+
+if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
+    from strapgen.ir.program import Program
 
 #: Entry points of installed packages.
 GROUP = "strapgen.targets"
@@ -78,6 +80,9 @@ class Target:
     @property
     def program(self) -> type[Program | FixedProgram]:
         """The class of the programs that it takes."""
+        from strapgen.ir.integer_program import FixedProgram
+        from strapgen.ir.program import Program
+
         return FixedProgram if self.fixed else Program
 
     @property

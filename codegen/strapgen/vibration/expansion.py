@@ -66,7 +66,8 @@ class Expander:
         if any(_is_transcendental(expression) for expression in self._expressions()):
             # They are rounded to so many digits that the results do not differ.
             self._kernels = {name: rationalized(kernel) for name, kernel in self._kernels.items()}
-        self.domain = power_series.field(self._expressions())
+        unknowns = [name for kernel in self._kernels.values() for name in kernel.unknowns]
+        self.domain = power_series.field(self._expressions(), unknowns).get_field()
         signals = chain.from_iterable(kernel.inputs for kernel in self._kernels.values())
         self._names = sorted({name for signal in signals for name in signal.elements})
         self._ring = sp.ring(self._names, self.domain)[0]

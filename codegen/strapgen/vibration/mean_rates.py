@@ -96,6 +96,13 @@ class Assessment:
             for power in value.atoms(sp.Pow)
         )
 
+    @cached_property
+    def unknowns(self) -> tuple[str, ...]:
+        """Coefficients of the kernel that are not known, which the closed forms hold: such rates are no numbers."""
+        symbols = {x for form in (*self.computed.values(), *self.continuous.values()) for x in form}
+        names = {symbol.name for value in symbols for symbol in value.free_symbols}
+        return tuple(sorted(names - {symbol.name for symbol in (F, T, T_L, T_M)}))
+
     @property
     def times(self) -> tuple[sp.Symbol, ...]:
         """The symbols of time."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from fractions import Fraction
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -11,6 +14,7 @@ import sympy as sp
 from users_files import STEP, beside, written
 
 import strapgen
+from strapgen.catalogue import choose
 from strapgen.catalogue.user import kernel_cache, loading
 from strapgen.ir.signals import Signal
 from strapgen.support import cache
@@ -230,3 +234,34 @@ def test_what_pickle_does_not_restore_in_every_part_is_not_kept():
     assert not kernel_cache._alike(whole(Marked("!")), whole(Marked("?")))
     assert not kernel_cache._alike((1, 2.0), (1, 2)) and not kernel_cache._alike((1,), (1, 2))
     assert not kernel_cache._alike(Signal.scalar("x"), Signal.scalar("x", meaning="another"))
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_text_in_the_cache_is_written_again_without_sympy(file, tmp_path, target):
+    words = ["generate", file, "--target", target, "--out"]
+    program = "import sys; sys.modules.update(dict.fromkeys({!r})); from strapgen.cli import main; main()"
+    written_files = []
+    for absent in ((), ("sympy", "jinja2", "mpmath")):
+        folder = tmp_path / f"without {len(absent)}"
+        command = [sys.executable, "-c", program.format(absent), *words, str(folder)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        written_files.append({path.name: path.read_bytes() for path in folder.iterdir()})
+    assert written_files[0] == written_files[1]
+    assert written_files[0]
+
+
+def test_choices_of_a_kernel_at_hand_and_in_the_cache_are_equal(file):
+    derived, stored = (choose(file) for _ in range(2))
+    assert derived == stored
+    assert derived.identity == stored.identity
+    assert hash(derived) == hash(stored)
+    assert pickle.loads(pickle.dumps(stored)) == derived
+    assert stored.user_kernel.kernel == derived.user_kernel.kernel
+
+
+def test_a_kernel_that_no_longer_restores_is_derived_again(file, monkeypatch):
+    derived = choose(file).user_kernel.kernel
+    stored = choose(file)
+    monkeypatch.setattr(kernel_cache.pickle, "loads", lambda data: 1 / 0)
+    assert stored.user_kernel.kernel == derived

@@ -107,7 +107,8 @@ CAUSES = {
     ),
     "misalignment": InstrumentErrors(gyro=TriadErrors(misalignment=1e-4 * (1 - np.eye(3))), drawn=True),
     "anisoinertia": InstrumentErrors(gyro=TriadErrors(terms={"J_xy": 1e-3, "J_yz": 1e-3}), drawn=True),
-    "random walk": InstrumentErrors(gyro=TriadErrors(random_walk=np.full(3, 1e-6))),
+    "noise": InstrumentErrors(gyro=TriadErrors(noise=np.array([1e-5, 3e-5, 2e-5]))),
+    "random walk": InstrumentErrors(gyro=TriadErrors(random_walk=np.array([1e-6, 3e-6, 2e-6]))),
     "output noise": InstrumentErrors(output_noise=OutputNoise(0.5, np.full(3, 1e-5))),
     "jitter": InstrumentErrors(sampling=Sampling(1e-3)),
     "late": InstrumentErrors(sampling=Sampling(0.0, 0.1, "late")),
@@ -210,11 +211,13 @@ def test_the_command_shows_causes_with_their_intervals(run, tmp_path):
     ]
     data = json.loads(run(f"noise.toml {MOTION} --format json")[1])
     assert len(data["rows"]) == 9
+    for name, lines in (("csv", 10), ("markdown", 11)):
+        table = run(f"noise.toml {MOTION} --format {name}")[1]
+        assert len(table.splitlines()) == lines and "predicted_deg" in table
     for row in data["rows"]:
-        if row["cause"] != "pulses":
-            assert row["low_deg"] < row["deviation_deg"] < row["high_deg"]
-        elif row["axis"] != "z":  # the count of an axis that does not turn is the same before and after
-            assert row["deviation_deg"] < 1e-10
+        assert row["low_deg"] < row["deviation_deg"] < row["high_deg"]
+        if row["cause"] == "pulses":  # 20 runs tell a deviation to 16 %
+            assert row["deviation_deg"] == pytest.approx(row["predicted_deg"], rel=0.5)
         if row["cause"] == "noise":
             assert row["predicted_deg"] == pytest.approx(math.sqrt(5 / 3600))
     assert data == json.loads(run(f"noise.toml {MOTION} --format json")[1])
@@ -230,7 +233,9 @@ def test_back_ends_agree_on_a_monte_carlo(run):
 
     plain = deviations("")
     np.testing.assert_allclose(deviations("--backend c"), plain, rtol=1e-9)
-    np.testing.assert_allclose(deviations("--backend c-fixed32 --carry full"), plain, rtol=1e-4)
+    # Increments are rounded to a format of some 2^-34 rad, and a state of 32 bits to 2^-31.
+    fixed = deviations("--backend c-fixed32 --carry full")
+    np.testing.assert_allclose(fixed, plain, atol=math.degrees(2.0**-28))
 
 
 @each(

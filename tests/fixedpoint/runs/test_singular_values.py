@@ -172,3 +172,11 @@ def test_no_call_is_refused_before_the_stated_number_and_one_is_soon_after(algor
     backend.propagate(increments[:calls])
     with pytest.raises(strapgen.InputError, match="refuses its input in step"):
         backend.propagate(increments)
+
+
+def test_only_parts_beyond_the_disc_are_left_out():
+    """The second vector is no longer than the first: a part counts if its corner nearest to the origin is inside."""
+    side = 1 / 64
+    for k, m in product(range(64), repeat=2):
+        cube = ((0.0, side), (k * side, (k + 1) * side), (m * side, (m + 1) * side))
+        assert singular_values._is_outside(cube) == (k * k + m * m > 64 * 64)

@@ -120,13 +120,17 @@ def test_rounding_together_is_never_worse_than_one_by_one(integers):
     assert missed(together) <= missed(one_by_one) + sum(map(abs, errors(one_by_one))) / 1024
 
 
-def test_coefficients_whose_samples_have_proportional_moments_are_exact_together():
-    """Every whole number is 2 x + 5 y, and x is the number times the inverse of 2 modulo 5."""
-    coefficients, numbers = (Fraction(1, 3), Fraction(2, 7), Fraction(1, 2)), ((2, 4), (5, 10), (1, 0))
+@pytest.mark.parametrize(
+    "numbers", [((2, 4), (5, 10), (1, 0)), ((-3, 1), (0, 0), (1, 0)), ((0, 0), (1, 3), (1, 0))]
+)
+def test_coefficients_whose_samples_have_proportional_moments_are_exact_together(numbers):
+    """Every whole number is 2 x + 5 y, and x is the number times the inverse of 2 modulo 5; a moment may be none."""
+    coefficients = (Fraction(1, 3), Fraction(2, 7), Fraction(1, 2))
     moments = tuple((Fraction(a), Fraction(b)) for a, b in numbers)
     exact = sum(c * m for c, (m, _) in zip(coefficients, moments, strict=True))
     for word in (8, 12, 16):
         words = rounded_together(coefficients, moments, word)
+        assert all(isinstance(n, int) and abs(n) < 1 << (word - 1) for n, _ in words)
         rounded = sum(
             Fraction(n) / Fraction(2) ** b * m for (n, b), (m, _) in zip(words, moments, strict=True)
         )

@@ -278,13 +278,51 @@ def test_a_wide_bandwidth_passes_everything(row):
 
 
 def test_output_noise_has_the_printed_variances_and_a_bounded_sum():
-    recursion, white = bounded_noise(0.9), np.random.default_rng(1).standard_normal(400_000)
-    noise, _ = recursion.run(white, np.zeros(2))
-    # Printed: 2(1-A)^2/(1+A) and (1-A)/(1+A). The variance of a correlated row is told to some sqrt(2 * 20/400000).
-    assert noise.var() == pytest.approx(0.0105263, rel=0.02)
-    assert np.cumsum(noise).var() == pytest.approx(0.0526316, rel=0.04)
-    late = np.abs(np.cumsum(noise))
-    assert late[200_000:].max() < 1.5 * late[:200_000].max()
+    impulse = np.zeros(3000)
+    impulse[0] = 1.0
+    response, _ = bounded_noise(0.9).run(impulse, np.zeros(2))
+    # Printed for unit noise: 2(1-A)^2/(1+A), and (1-A)/(1+A) for the running sum.
+    assert np.sum(response**2) == pytest.approx(0.02 / 1.9, rel=1e-12)
+    assert np.sum(response**2) == pytest.approx(0.0105263, abs=5e-8)
+    assert np.sum(np.cumsum(response) ** 2) == pytest.approx(0.0526316, abs=5e-8)
+    assert response.sum() == pytest.approx(0.0, abs=1e-12)  # so that the sum does not walk
+    row = gyros(InstrumentErrors(output_noise=OutputNoise(0.9, THREE**2)), np.zeros((20_000, 3)))
+    # Numbers that are correlated over some ten samples tell a deviation to 1 or 2 %.
+    np.testing.assert_allclose(row.std(axis=0), np.sqrt(0.0105263) * THREE**2, rtol=0.05)
+
+
+def test_accelerometers_have_errors_of_their_own(row):
+    force = TriadErrors(
+        bias=1e-2 * THREE,
+        scale_plus=np.full(3, 1e-3),
+        noise=np.full(3, 1e-3),
+        pulse=np.array([0.01, 0, 0]),
+    )
+    errors, up = InstrumentErrors(accelerometer=force), np.full_like(row, 0.0981)
+
+    def sensed(*causes: str) -> np.ndarray:
+        angle, velocity = MeasurementUnit(errors.only(*causes), float(STEP))(row, up)
+        np.testing.assert_array_equal(angle, row)
+        return velocity
+
+    np.testing.assert_allclose(sensed("bias") - up, [1e-4 * THREE] * len(row), rtol=1e-9)
+    np.testing.assert_allclose(sensed("scale"), 1.001 * up, rtol=1e-14)
+    # 1200 numbers tell a deviation to 2 %.
+    assert (sensed("noise") - up).std() == pytest.approx(1e-3 * 0.1, rel=0.08)
+    counts = sensed("pulses")[:, 0] / 0.01
+    assert {*np.rint(counts)} == {9.0, 10.0} and np.abs(counts - np.rint(counts)).max() < 1e-9
+
+
+def test_a_unit_of_unbalanced_gyros_senses_acceleration_through_the_same_torquers(row):
+    heat = Heating(np.full(3, -2.6e-4), 150.0, np.radians(5) / 9.81)
+    unit = MeasurementUnit(InstrumentErrors(heating=heat), float(STEP))
+    fast, up = np.tile([0.0, 0.0, np.radians(200) / 100], (500, 1)), np.full((500, 3), 0.0981)
+    angle, velocity = unit(fast, up)
+    np.testing.assert_allclose(angle[0], fast[0], atol=1e-15)
+    np.testing.assert_allclose(velocity[0], up[0], atol=1e-14)
+    # The torquers that turn have warmed up; what they then say of the acceleration is off as well.
+    assert angle[-1, 2] > fast[-1, 2] * (1 + 1e-5)
+    assert np.abs(velocity[-1] - up[-1]).max() > 1e-5
 
 
 @each(

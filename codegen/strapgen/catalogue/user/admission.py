@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from collections.abc import Iterator
 
@@ -13,6 +14,7 @@ from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic import reading
 from strapgen.symbolic.evaluation import Direction, Wrapped
 from strapgen.symbolic.kernel import Kernel
 
@@ -23,6 +25,8 @@ _FUNCTION_OF = re.compile(
 )
 #: Functions that can be generated.
 _FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wrapped, sp.Max, sp.Piecewise)
+#: The step, the time, what an expression in JSON may hold, and what SymPy reads as numbers.
+_SYMBOLS_OF_SERIES = {"h", "t", "S", "E", "I", "cosine", "sine", *reading.FUNCTIONS, *reading.CONSTANTS}
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
 ALLOWED = (
     "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, asin, acos, Max, "
@@ -43,6 +47,7 @@ def require(kernel: Kernel) -> None:
         If a stage could not work on the kernel; the message names the fault.
     """
     names = [each.name for each in (kernel, *kernel.own)]
+    _require_unknowns(kernel)
     for each in (kernel, *kernel.own):
         _require_names(each)
         _require_functions(each, {*RESERVED, *names})
@@ -95,6 +100,24 @@ def _require_names(kernel: Kernel) -> None:
             seen.add(element)
 
 
+def _require_unknowns(kernel: Kernel) -> None:
+    """Check the names of the unknowns: text that holds them must be read again as it was meant."""
+    elements = {element for signal in kernel.signals for element in signal.elements} | {RESOLUTION}
+    if any(each.unknowns for each in kernel.own):
+        _refuse(kernel, "a kernel that comes with it holds unknowns; the step alone may")
+    for name in kernel.unknowns:
+        if not (name.isascii() and name.isidentifier()) or keyword.iskeyword(name):
+            _refuse(
+                kernel, f"{name!r} is no name for an unknown; letters, digits and underscores are allowed"
+            )
+        if name in elements:
+            _refuse(kernel, f"the unknown {name} is an element of a signal too; another name is needed")
+        if name in _SYMBOLS_OF_SERIES or re.fullmatch(r"[fw]\d+(_[xyz])?|r\d+|u\d+_[xyz]", name):
+            _refuse(
+                kernel, f"the unknown {name} has a name that series use themselves; another one is needed"
+            )
+
+
 def _require_functions(kernel: Kernel, others: set[str]) -> None:
     """Check that no function of a kernel has the name of another kernel's: both may be linked into one program."""
     other = _FUNCTION_OF.sub("", kernel.name)
@@ -112,7 +135,11 @@ def _require_texts(kernel: Kernel) -> None:
 
 
 def _require_formulas(kernel: Kernel) -> None:
-    known = {RESOLUTION, *(element for signal in kernel.inputs for element in signal.elements)}
+    known = {
+        RESOLUTION,
+        *kernel.unknowns,
+        *(element for signal in kernel.inputs for element in signal.elements),
+    }
     for stage in (*kernel.stages, *kernel.outputs):
         name = stage.signal.name
         if len(stage.expressions) != stage.signal.size:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.user.isolation import Record, installed_folders
+from strapgen.catalogue.user.user_kernel import UserKernel, packed
 from strapgen.support import cache
 from strapgen.support.exceptions import InputError
 from strapgen.support.timing import from_cache, timed
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel
 
 _KIND = "kernels"
-_KERNEL, _RECORD = "kernel.pickle", "record.json"
+_KERNEL, _HEAD, _RECORD = "kernel.pickle", "head.pickle", "record.json"
 
 
-def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kernel, Record]]) -> Kernel:
+def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kernel, Record]]) -> UserKernel:
     """Return a user's kernel from the cache, or derive it and put it there.
 
     Parameters
@@ -42,7 +43,7 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
     """
     key = cache.digest([cache.generator_digest(), sys.version, *_installed(), *what])
     with contextlib.suppress(InputError):  # no cache folder: derived every time
-        if (stored := _stored(key, folder)) is not None:
+        if (stored := _stored(key, folder, derive)) is not None:
             from_cache(f"kernel of {what[1]}")
             return stored
     with timed("derive", what[1]):
@@ -50,8 +51,8 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
     data = None if record.outside or not record.holds(folder) else _pickled(derived)
     if data is not None:
         with contextlib.suppress(InputError):
-            _store(key, data, record)
-    return derived
+            _store(key, data, packed(derived), record)
+    return UserKernel.of(derived)
 
 
 def _installed() -> list[str]:
@@ -65,23 +66,34 @@ def _installed() -> list[str]:
     )
 
 
-def _stored(key: str, folder: Path | None) -> Kernel | None:
+def _stored(key: str, folder: Path | None, derive: Callable[[], tuple[Kernel, Record]]) -> UserKernel | None:
     place = cache.lookup(_KIND, key)
     if place is None:
         return None
     try:
         record = Record(**json.loads(cache.read(place, _RECORD)))
-        if record.holds(folder):
-            stored: Kernel = pickle.loads(cache.read(place, _KERNEL))
-            return stored
+        if not record.holds(folder):
+            return None
+        data, head = cache.read(place, _KERNEL), cache.read(place, _HEAD)
+        if not head:
+            return UserKernel.of(pickle.loads(data))
+        return UserKernel(pickle.loads(head), lambda: _restored(data, derive))
     except Exception:  # of another Python, or removed meanwhile: derived again
         return None
-    return None
 
 
-def _store(key: str, data: bytes, record: Record) -> None:
+def _restored(data: bytes, derive: Callable[[], tuple[Kernel, Record]]) -> Kernel:
+    try:
+        stored: Kernel = pickle.loads(data)
+    except Exception:  # of another SymPy: derived again
+        stored, _ = derive()
+    return stored
+
+
+def _store(key: str, data: bytes, head: bytes | None, record: Record) -> None:
     def fill(draft: Path) -> None:
         (draft / _KERNEL).write_bytes(data)
+        (draft / _HEAD).write_bytes(head or b"")
         (draft / _RECORD).write_text(json.dumps(asdict(record)))
 
     cache.discard(_KIND, key)

@@ -11,11 +11,11 @@ import inspect
 import os
 import shlex
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.user import isolation, kernel_cache
+from strapgen.catalogue.user.user_kernel import UserKernel
 from strapgen.support import cache, checks, packages
 from strapgen.support.brief import full_text
 from strapgen.support.exceptions import InputError
@@ -41,7 +41,7 @@ def installed() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
-def load(name: str, **options: Any) -> Kernel:
+def load(name: str, **options: Any) -> UserKernel:
     """Return the checked kernel of a user's algorithm, from the cache if nothing has changed since it was derived.
 
     Parameters
@@ -53,7 +53,8 @@ def load(name: str, **options: Any) -> Kernel:
 
     Returns
     -------
-    Kernel
+    UserKernel
+        One from the cache loads SymPy when its formulas are needed.
 
     Raises
     ------
@@ -64,10 +65,10 @@ def load(name: str, **options: Any) -> Kernel:
     texts = [f"{option} {full_text(value)} {getattr(value, 'file', '')}" for option, value in options.items()]
     isolation.depends_on(f"loads {name}, another algorithm")
     find = _of_file if name.endswith(".py") else _of_entry_point
-    return replace(find(name, options, texts), arguments=arguments)
+    return find(name, options, texts).with_arguments(arguments)
 
 
-def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
+def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> UserKernel:
     path = Path(os.path.realpath(name))  # which a circle of links does not stop
     try:
         if not path.is_file():
@@ -97,7 +98,7 @@ def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
     return kernel_cache.kernel(["file", str(path), cache.digest([source]), *texts], path.parent, derive)
 
 
-def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Kernel:
+def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> UserKernel:
     point = installed()[name]
 
     def derive() -> tuple[Kernel, isolation.Record]:

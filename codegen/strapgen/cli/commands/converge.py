@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -22,11 +23,12 @@ from strapgen.cli.options import (
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, is_file, pairs
+from strapgen.cli.worker_options import WorkerOptions
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.experiments.convergence import Convergence
-    from strapgen.simulation.motions import Motion
+    from strapgen.catalogue import Choice
+    from strapgen.experiments.convergence import Convergence, LadderCase
 
 _Text = str | None
 
@@ -60,16 +62,32 @@ class Ladder:
         if is_file(self.motion or "") and any(BACKENDS[name].many_digits for name in names):
             raise InputError(f"motion {self.motion} is known in double alone; --backend numpy runs on it")
 
-    def profile(self) -> tuple[Motion, str]:
-        """Return the motion, and a description of the runs in words."""
-        from strapgen.simulation import motions, users_motions
+    @property
+    def parameters(self) -> Mapping[str, str]:
+        """The parameters of the motion."""
+        from strapgen.simulation import motions
 
-        parameters = pairs(self.settings or [])
-        if self.motion is None and not self.settings:
-            parameters = motions.GENERAL
-        profile = users_motions.any_motion(self.motion or "coning", self.duration, parameters)
-        words = ", ".join(f"{key}={value}" for key, value in parameters.items())
-        return profile, f"{self.duration} s of {profile.name} motion" + (f", {words}" if words else "")
+        return motions.GENERAL if self.motion is None and not self.settings else pairs(self.settings or [])
+
+    def words(self) -> str:
+        """Return a description of the runs, whose motion is checked."""
+        from strapgen.simulation import users_motions
+
+        profile = users_motions.any_motion(self.motion or "coning", self.duration, self.parameters)
+        words = ", ".join(f"{key}={value}" for key, value in self.parameters.items())
+        return f"{self.duration} s of {profile.name} motion" + (f", {words}" if words else "")
+
+    def cases(self, choices: Sequence[Choice], names: Sequence[str]) -> list[LadderCase]:
+        """Return a case for each algorithm on each back end."""
+        from strapgen.experiments.convergence import LadderCase
+
+        steps = tuple(listed("--step", self.steps))
+        motion, settings = self.motion or "coning", dict(self.parameters)
+        return [
+            LadderCase(choice, name, motion, settings, steps, self.duration)
+            for choice in choices
+            for name in names
+        ]
 
 
 @grouped
@@ -88,6 +106,7 @@ def converge(
             panel="Output",
         ),
     ] = None,
+    workers: WorkerOptions,
     output: Output,
 ) -> None:
     """Measure the order of a step and show it beside the predicted one.
@@ -103,19 +122,15 @@ def converge(
     most = limit("--fail-beyond", fail_beyond)
     ladder.check(names)
     choices = methods.choices(algorithm)
-    profile, words = ladder.profile()
-    steps = listed("--step", ladder.steps)
-
-    import numpy as np
+    count, cluster = workers.count(), workers.workers()
+    words, cases = ladder.words(), ladder.cases(choices, names)
 
     from strapgen.experiments import convergence
     from strapgen.reports import plots
     from strapgen.reports.convergence import convergence_report
 
-    cases = [(choice, name) for choice in choices for name in names]
-    with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
-        runs = (convergence.converge(choice, profile, steps, ladder.duration, name) for choice, name in cases)
-        orders = list(track(runs, "running", len(cases)))
+    runs = track(convergence.converge_all(cases, count, cluster), "running", len(cases))
+    orders = [outcome for _, outcome in sorted(runs, key=lambda run: run[0])]
     title = f"{words}; {', '.join(names)}"
     output.report(
         convergence_report(orders, title), lambda path: plots.convergence_image(orders, title, path)

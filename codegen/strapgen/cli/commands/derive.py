@@ -43,7 +43,10 @@ def derive(
     choice = method.choose(algorithm, step=False)
     from strapgen import pipeline
     from strapgen.library import generated_sources
-    from strapgen.reports.formulas import formulas_report
+    from strapgen.reports.formulas import formulas_report, unknown_formulas_report
 
     kernel = pipeline.derive(choice)
+    if kernel.unknowns and show in ("text", "latex"):
+        output.report(unknown_formulas_report(kernel, show))
+        return
     output.report(formulas_report(kernel, generated_sources.program(choice), show))

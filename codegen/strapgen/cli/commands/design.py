@@ -96,7 +96,7 @@ def design(
     several = contenders(brief, None if methods is None else listed("--method", methods))
     rows = track(judgements(file, several, results, count, cluster), "judging", len(several))
     ordered = in_order(one for row in rows for one in row)
-    runs = None if shown is None else _simulated(brief, file, ordered[:shown])
+    runs = None if shown is None else _simulated(brief, file, ordered[:shown], count)
     report = selection_report(brief, ordered, runs)
     if generate is not None:
         _write(brief, file, ordered, generate, report.written("text"))
@@ -104,12 +104,14 @@ def design(
     output.report(report, lambda path: selection_image(brief, ordered, title, path))
 
 
-def _simulated(brief: DesignBrief, file: Path, ordered: list[Judgement]) -> dict[str, Simulated]:
+def _simulated(
+    brief: DesignBrief, file: Path, ordered: list[Judgement], jobs: int | None
+) -> dict[str, Simulated]:
     """Return time simulations of the algorithms that meet the brief."""
-    from strapgen.experiments.selection.simulated import choice_of, run
+    from strapgen.experiments.selection.simulated import algorithm_named, run
 
     accepted = [one for one in ordered if one.meets]
-    steps = ((one.name, run(brief, one, choice_of(one, file))) for one in accepted)
+    steps = ((one.name, run(brief, one, algorithm_named(one, brief, file), jobs)) for one in accepted)
     return dict(track(steps, "running", len(accepted)))
 
 
@@ -117,13 +119,13 @@ def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Pat
     """Write the firmware of the cheapest algorithm that meets the brief."""
     from strapgen.cli.source_options import SourceOptions
     from strapgen.experiments.selection.firmware import firmware_files
-    from strapgen.experiments.selection.simulated import choice_of
+    from strapgen.experiments.selection.simulated import algorithm_named
 
     if not ordered or not ordered[0].meets:
         raise InputError(f"{file}: no algorithm meets the brief, so --generate has nothing to write")
     best = ordered[0]
     files = firmware_files(
-        brief, best, choice_of(best, file), report, f"strapgen design {shlex.quote(str(file))}"
+        brief, best, algorithm_named(best, brief, file), report, f"strapgen design {shlex.quote(str(file))}"
     )
     for path in SourceOptions(out=folder).write(files):
         typer.echo(f"wrote {path}", err=True)

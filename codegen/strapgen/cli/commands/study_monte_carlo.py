@@ -34,7 +34,7 @@ class RandomRunOptions:
         str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
     ] = "100"
     rate: Annotated[
-        str, option("--rate-deg-s", metavar="DEG_S", help="Rate of the steady turn about z in deg/s.")
+        str, option("--turn-deg-s", metavar="DEG_S", help="Rate of the steady turn about z in deg/s.")
     ] = "10"
     pulse: Annotated[
         str, option("--pulse-arcsec", metavar="ARCSEC", help="Angle of a pulse of the gyro; 0 for none.")
@@ -44,7 +44,7 @@ class RandomRunOptions:
         option("--noise-deg-sqrt-h", metavar="N", help="Random walk of the gyro in deg per root of an hour."),
     ] = "0.01"
     runs: Annotated[str, option("--runs", metavar="N", help="Number of runs.")] = "1000"
-    steps: Annotated[str, option("--steps", metavar="N", help="Steps of each run.")] = "1000"
+    steps: Annotated[str, option("--length", metavar="N", help="Number of steps of each run.")] = "1000"
     of: Annotated[
         str,
         option("--of", metavar="N", help="Runs of the whole sweep, for which the time is extrapolated."),
@@ -75,13 +75,13 @@ class RandomRunOptions:
         errors = Errors(
             math.radians(pulse / 3600),
             math.radians(noise) / 60 / math.sqrt(hertz),
-            math.radians(float(checks.number("rate-deg-s", self.rate) / hertz)),
+            math.radians(float(checks.number("turn-deg-s", self.rate) / hertz)),
         )
         if not errors.pulse and not errors.noise:
             raise InputError("pulse-arcsec and noise-deg-sqrt-h are both 0; an error above 0 is needed")
         steps, runs = (
             checks.count(name, checks.whole(name, text), largest=_MOST)
-            for name, text in (("steps", self.steps), ("runs", self.runs))
+            for name, text in (("length", self.steps), ("runs", self.runs))
         )
         seed = checks.count("seed", checks.whole("seed", self.seed), smallest=0, largest=_MOST)
         return SteadyRuns(choice, errors, steps, runs, (seed,), self.backend)
@@ -108,10 +108,10 @@ def study_monte_carlo(
     the runs took, and how long a sweep of more runs takes. Each run has random numbers of its own, so that the drift
     does not depend on the number of processes or of workers of a cluster.
 
-    Example: strapgen study monte-carlo euler --runs 500 --steps 200
+    Example: strapgen study monte-carlo euler --runs 500 --length 200
 
     Example: strapgen study monte-carlo euler --method coning-combined --increments 3 --pulse-arcsec 5 --runs 500
-    --steps 200 --jobs 2
+    --length 200 --jobs 2
     """
     output.check(algorithm, run.results, *method.files)
     if run.results is not None and output.file is not None and run.results.resolve() == output.file.resolve():
@@ -129,4 +129,4 @@ def study_monte_carlo(
     parts = list(track(random_runs(sweep, run.results, jobs, cluster), "running", len(cases(sweep))))
     seconds = None if resumed else time.monotonic() - begin
     mean = predicted(sweep.algorithm, sweep.errors, sweep.steps)
-    output.report(random_report(RandomStudy(sweep, sum(parts, MeanSquare()), mean, hertz, seconds, whole)))
+    output.report(random_report(RandomStudy(sweep, MeanSquare.of(parts), mean, hertz, seconds, whole)))

@@ -266,6 +266,8 @@ def vibration(
     second order in the amplitudes, derived from the algorithm itself. Several methods, or numbers of increments, are
     shown side by side.
 
+    Of a kernel of your own that holds unknowns you see the closed forms, without numbers of a vibration.
+
     For a fast loop alone, the continuous and the computed rate leave out a term in the slow cycle T_m: the slow loop
     adds that to both, so that the error is that of both loops.
 
@@ -273,15 +275,35 @@ def vibration(
     --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
     """
     output.check(algorithm, *methods.files, source.spectrum)
+    from strapgen.reports.vibration import closed_forms_report, vibration_report
+
+    if cases := _cases_with_unknowns(algorithm, methods, source, output):
+        output.report(closed_forms_report(cases))
+        return
     source.check(output)
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
-    from strapgen.reports.vibration import vibration_report
-
     output.report(
         vibration_report(outcomes, cases, f"{words}; step {source.step} s"),
         lambda path: _image(cases, source, output, path),
     )
+
+
+def _cases_with_unknowns(
+    algorithm: str, methods: AssessedMethods, source: VibrationSource, output: VibrationOutput
+) -> list[AssessedCase]:
+    """Return the cases of a user's kernel with unknowns, whose rates have closed forms but no numbers."""
+    if not algorithm.endswith(".py"):
+        return []
+    choices = methods.choices(algorithm, step=False)
+    if not any(choice.user_kernel is not None and choice.user_kernel.unknowns for choice in choices):
+        return []
+    if output.plot or source.spectrum or output.format not in ("text", "json"):
+        raise InputError(
+            f"{algorithm} holds unknowns: its rates have closed forms, as text or json, and no numbers"
+        )
+    source = replace(source, theta_y=source.theta_y or "0")
+    return [case for method in methods.each() for case in _assessed(algorithm, method, source)]
 
 
 def _check_known(algorithm: str, names: tuple[str, ...]) -> None:

@@ -32,7 +32,7 @@ _QUANTILE = 1.959963984540054
 ALL = "all"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensorScatter:
     """The error of the attitude that sensors cause, over many runs.
 
@@ -158,7 +158,7 @@ class SensorStudy:
     def _scatter(self, cause: str, errors: InstrumentErrors, runs: int, predicted: Array) -> SensorScatter:
         same = {*sensor_covariance.STEADY} - ({*sensor_covariance.DRAWN} if errors.drawn else set())
         count = 1 if {*errors.causes} <= same else runs
-        drifts = np.concatenate([part for part in self._runs(errors, count)])
+        drifts = self._drifts(cause, errors, count)
         mean = drifts.mean(axis=0)
         deviation = drifts.std(axis=0, ddof=1) if count > 1 else np.zeros_like(mean)
         low, high = deviation_interval(count - 1) if count > 1 else (1.0, 1.0)
@@ -168,6 +168,18 @@ class SensorStudy:
         return SensorScatter(
             cause, count, time, mean, deviation, low * deviation, high * deviation, expected, predicted
         )
+
+    def _drifts(self, cause: str, errors: InstrumentErrors, count: int) -> Array:
+        """Return the errors of the attitude of all runs, (runs, records, 3) in rad.
+
+        Pulses alone would be no noise where the body turns by whole ones: they are what they add to white noise.
+        """
+        noise = self._errors.only("noise")
+        if cause == "pulses" and any(noise.causes):
+            both = self._errors.only("noise", "pulses")
+            pairs = zip(self._runs(both, count), self._runs(noise, count), strict=True)
+            return np.concatenate([one - other for one, other in pairs])
+        return np.concatenate([*self._runs(errors, count)])
 
     def _runs(self, errors: InstrumentErrors, count: int) -> Iterator[Array]:
         """Yield the errors of the attitude of some runs at a time, (runs, records, 3) in rad."""

@@ -38,6 +38,9 @@ _SAMPLES: dict[str, tuple[tuple[int, ...], ...]] = {
 _HIGHEST_TAYLOR = 8
 #: Methods that are a reference, not an algorithm to fly.
 _REFERENCES = ("fit-exact",)
+#: The attitude in two speeds, and its fast cycles in a slow one.
+TWO_SPEED = "two-speed"
+_CYCLES = (2, 4, 8, 16)
 #: Objectives and samples of coefficients that are designed for a spectrum: see `coning.design`.
 _OBJECTIVES = ("worst", "random")
 _DESIGNED = ((4, 0), (1, 3), (3, 3), (1, 8))
@@ -52,10 +55,10 @@ class Contender:
     Parameters
     ----------
     method : str
-        A method of the catalogue, or "tuned-worst" or "tuned-random", whose coefficients a design for the vibration
-        gives.
+        A method of the catalogue; or "tuned-worst" or "tuned-random", whose coefficients a design for the vibration
+        gives; or "two-speed".
     increments, previous, ahead : int
-        Samples of a step, and samples from before it and from after it.
+        Samples of a step, and samples from before it and from after it; of two speeds the fast cycles in a slow one.
     """
 
     method: str
@@ -116,6 +119,7 @@ def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[C
         if method not in _REFERENCES and not _is_long_taylor(method)
         for samples in _SAMPLES.get(method) or [_own_samples(method)]
     ]
+    several += [Contender(TWO_SPEED, cycles) for cycles in _CYCLES]
     if isinstance(brief.environment, SpectralEnvironment) and _has_coning(brief.environment):
         several += [
             Contender(f"{TUNED}{objective}", *samples) for objective in _OBJECTIVES for samples in _DESIGNED

@@ -8,13 +8,13 @@ walk leave after the time of the budget. All are lengths of vectors in deg/h.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 import mpmath
 
-from strapgen.analysis.quantization_noise import quantization_noise
+from strapgen.analysis.quantization_noise import QuantizationNoise, quantization_noise
 from strapgen.backends import exact
 from strapgen.catalogue import Choice
 from strapgen.experiments.selection.brief import DesignBrief, GyroBrief
@@ -23,6 +23,7 @@ from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import assessment
 from strapgen.vibration.gyro import through_gyro
+from strapgen.vibration.mean_rates import Assessment
 
 #: Deg/h in a rad/s, and rad in an arc second.
 DEG_H = math.degrees(1) * 3600
@@ -110,22 +111,54 @@ def _mean_error(choice: Choice, brief: DesignBrief, quantity: str) -> float:
     """Return the length of the error of a mean rate."""
     if brief.environment is None:
         return 0.0
-    assessed = assessment.of(choice, quantity)
+    return mean_error(assessment.of(choice, quantity), brief, step_length(choice, brief.gyro))
+
+
+def mean_error(assessed: Assessment, brief: DesignBrief, step: Fraction, cycles: int | None = None) -> float:
+    """Return the length of the error of a mean rate under the vibration, seen through the gyro.
+
+    Parameters
+    ----------
+    assessed : Assessment
+    brief : DesignBrief
+    step : Fraction
+        Step in s; for a recursion its slow cycle.
+    cycles : int, optional
+        Fast cycles in the slow cycle of a recursion.
+    """
+    if brief.environment is None:
+        return 0.0
     if brief.gyro.bandwidth_hz is not None and brief.gyro.damping is not None:
         assessed = through_gyro(assessed, brief.gyro.bandwidth_hz, brief.gyro.damping)
-    return brief.environment.error(assessed, step_length(choice, brief.gyro))
+    return brief.environment.error(assessed, step, cycles)
 
 
 def quantization(choice: Choice, brief: DesignBrief) -> float:
     """Return the root mean square of the drift in deg/h that the gyro's pulses leave in a turn at the largest rate."""
     if not brief.gyro.pulse_arcsec:
         return 0.0
-    noise = quantization_noise(choice)
-    step = float(step_length(choice, brief.gyro))
+    return pulse_drift(quantization_noise(choice), brief, step_length(choice, brief.gyro))
+
+
+def over(brief: DesignBrief, seconds: Fraction | None) -> DesignBrief:
+    """Return a brief with another time of the budget in s; the brief itself for None."""
+    return brief if seconds is None else replace(brief, budget=replace(brief.budget, over_s=seconds))
+
+
+def pulse_drift(noise: QuantizationNoise, brief: DesignBrief, step: Fraction) -> float:
+    """Return the drift in deg/h of the noise of pulses over the time of the budget.
+
+    Parameters
+    ----------
+    noise : QuantizationNoise
+    brief : DesignBrief
+    step : Fraction
+        Step in s.
+    """
     pulse = float(brief.gyro.pulse_arcsec) * _ARCSEC
-    turn = math.radians(float(brief.max_rate_deg_s)) * step
-    steps = round(float(brief.budget.over_s) / step)
-    return math.degrees(math.sqrt(noise.mean_square(pulse, turn**2, steps))) / _hours(brief)
+    turn = math.radians(float(brief.max_rate_deg_s)) * float(step)
+    steps = round(float(brief.budget.over_s) / float(step))
+    return math.degrees(math.sqrt(noise.mean_square(pulse, steps * turn**2, steps))) / _hours(brief)
 
 
 def noise(brief: DesignBrief) -> float:

@@ -36,14 +36,16 @@ class Environment(Protocol):
     def highest_hz(self) -> float:
         """The highest frequency in Hz."""
 
-    def error(self, assessment: Assessment, step: Fraction) -> float:
+    def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the length of the error of the mean rate that an algorithm computes, in its unit.
 
         Parameters
         ----------
         assessment : Assessment
         step : Fraction
-            Step in s.
+            Step in s; for a recursion its slow cycle.
+        cycles : int, optional
+            Fast cycles in the slow cycle of a recursion.
 
         Raises
         ------
@@ -98,7 +100,7 @@ class LineEnvironment:
         """The highest frequency in Hz."""
         return max(line.frequency_hz for line in self.stated)
 
-    def error(self, assessment: Assessment, step: Fraction) -> float:
+    def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the error of the mean rate, see `Environment.error`."""
         total = 0.0
         for line in self.stated:
@@ -109,6 +111,7 @@ class LineEnvironment:
                 theta_y=line.theta_y,
                 phase=line.phase,
                 acceleration_y=line.acceleration_y,
+                cycles=cycles,
             ).error
         return abs(total)
 
@@ -138,9 +141,11 @@ class SpectralEnvironment:
         """The highest frequency in Hz."""
         return self.spectrum.edges[-1]
 
-    def error(self, assessment: Assessment, step: Fraction) -> float:
+    def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the error of the mean rate, see `Environment.error`."""
-        return abs(random_rates(assessment, self.spectrum, step, tolerance=_TOLERANCE).rates.error)
+        return abs(
+            random_rates(assessment, self.spectrum, step, cycles=cycles, tolerance=_TOLERANCE).rates.error
+        )
 
     def lines(self) -> tuple[Line, ...]:
         """Return lines at even distances df, of amplitudes c with c^2/2 = P |H|^2 df about each axis."""
@@ -208,7 +213,7 @@ class RecordedEnvironment:
         """The highest frequency in Hz."""
         return float(self.hertz[-1])
 
-    def error(self, assessment: Assessment, step: Fraction) -> float:
+    def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the length of the error of the mean rate about all axes, see `Environment.error`."""
         if assessment.resonant and self.highest_hz * step >= 1:
             raise InputError(
@@ -216,7 +221,7 @@ class RecordedEnvironment:
                 f"mean rate there; the recording reaches to {self.highest_hz:g} Hz"
             )
         width = self.hertz[1] - self.hertz[0]
-        factors = assessment.factors("error", self.hertz, step)
+        factors = assessment.factors("error", self.hertz, step, cycles)
         axes = {"angle_x": 0, "angle_y": 1}
         errors = []
         for turn in range(3):  # about z, x and y in turn

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design import coning_file
 from strapgen.experiments import project
 from strapgen.experiments.selection import causes
+from strapgen.experiments.selection.algorithm import Algorithm, AttitudeStep
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.candidates import TUNED
 from strapgen.experiments.selection.judgement import Judgement
+from strapgen.experiments.selection.two_speed import TwoSpeedLoops
 from strapgen.library import generated_sources
 
-#: The report, and the coefficients that a design has made.
-REPORT, COEFFICIENTS = "design.txt", "coefficients.toml"
+#: The report, the coefficients that a design has computed, and the description of two speeds.
+REPORT, COEFFICIENTS, SYSTEM = "design.txt", "coefficients.toml", "system.toml"
 
 
 def firmware_files(
-    brief: DesignBrief, judgement: Judgement, choice: Choice, report: str, command: str
+    brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, report: str, command: str
 ) -> dict[str, str]:
     """Return the files of a selected algorithm by their names.
 
@@ -28,8 +29,8 @@ def firmware_files(
     brief : DesignBrief
     judgement : Judgement
         Of an algorithm that meets the brief.
-    choice : Choice
-        Its step.
+    algorithm : Algorithm
+        The algorithm itself.
     report : str
         What the answer says.
     command : str
@@ -39,8 +40,14 @@ def firmware_files(
     -------
     dict of str to str
         The C and its header, CMakeLists.txt, main.c, a test of vectors, the report, and coefficients that were
-        designed for the brief.
+        designed for the brief. Of two speeds the C of a described system and its file.
     """
+    if isinstance(algorithm, TwoSpeedLoops):
+        options = f"--target c-fixed --word {brief.processor.word}"
+        files = dict(algorithm.sources(f"strapgen system {SYSTEM} {options}").step_files)
+        return files | {SYSTEM: algorithm.file(), REPORT: report}
+    assert isinstance(algorithm, AttitudeStep), "nothing else is selected"
+    choice = algorithm.choice
     settings = causes.settings(choice, brief, judgement.carry)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         choice = replace(choice, method=replace(choice.method, file=COEFFICIENTS))

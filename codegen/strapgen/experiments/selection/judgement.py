@@ -10,13 +10,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from strapgen.catalogue import Choice
-from strapgen.experiments import cost as costs
 from strapgen.experiments.selection import causes
+from strapgen.experiments.selection.algorithm import Algorithm
 from strapgen.experiments.selection.brief import DesignBrief, read_brief
 from strapgen.experiments.selection.candidates import STATES, Contender
 from strapgen.experiments.selection.causes import Rounding
-from strapgen.library import generated_sources
+from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.support.clusters import moved
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.processors import PROCESSORS
@@ -24,8 +23,6 @@ from strapgen.toolchain.processors import PROCESSORS
 #: The causes of a drift, in the order of a report; the first three are the software's.
 CAUSES = ("truncation", "coning", "rounding", "quantization", "noise")
 SOFTWARE = CAUSES[:3]
-#: Operations that cost next to nothing.
-_FREE = ("negate",)
 
 
 @dataclass(frozen=True)
@@ -157,14 +154,14 @@ class _Look:
 def judged(trial: Question) -> list[dict[str, Any]]:
     """Return the judgements of an algorithm with every state it can have, as plain JSON data."""
     brief = _brief(trial.path)
-    second_order = SecondOrder(brief)
+    second_order = SecondOrder()
     judgements = []
     for state in STATES:
         try:
-            choice = trial.contender.choice(state, trial.path)
+            algorithm = algorithm_of(trial.contender, state, brief, trial.path)
         except InputError:  # the state has no such step
             continue
-        judgements.append(vars(judge(brief, trial.contender, state, choice, second_order)))
+        judgements.append(vars(judge(brief, trial.contender, state, algorithm, second_order)))
     return judgements
 
 
@@ -174,23 +171,17 @@ def _brief(path: str) -> DesignBrief:
 
 
 class SecondOrder:
-    """What follows from a step to the second power of its increments, and is therefore the same with every state.
+    """What follows from a step to the second power of its increments, and is therefore the same with every state."""
 
-    Parameters
-    ----------
-    brief : DesignBrief
-    """
-
-    def __init__(self, brief: DesignBrief) -> None:
-        self._brief = brief
+    def __init__(self) -> None:
         self._known: dict[str, Any] = {}
 
-    def __call__(self, cause: Callable[[Choice, DesignBrief], Any], choice: Choice) -> Any:
-        """Return what a function of `causes` returns for a step; raises what it raises."""
+    def __call__(self, cause: Callable[[], Any]) -> Any:
+        """Return what a function of an `Algorithm` returns; raises what it raises."""
         name = cause.__name__
         if name not in self._known:
             try:
-                self._known[name] = cause(choice, self._brief)
+                self._known[name] = cause()
             except InputError as error:
                 self._known[name] = error
         if isinstance(self._known[name], InputError):
@@ -199,7 +190,7 @@ class SecondOrder:
 
 
 def judge(
-    brief: DesignBrief, contender: Contender, state: str, choice: Choice, second_order: SecondOrder
+    brief: DesignBrief, contender: Contender, state: str, algorithm: Algorithm, second_order: SecondOrder
 ) -> Judgement:
     """Return the judgement of an algorithm.
 
@@ -210,35 +201,32 @@ def judge(
     brief : DesignBrief
     contender : Contender
     state : str
-    choice : Choice
-        The step of both.
+    algorithm : Algorithm
+        The algorithm of both.
     second_order : SecondOrder
-        What is known from the same step with another state.
+        What is known from the same algorithm with another state.
     """
     look = _Look(brief)
-    step = causes.step_length(choice, brief.gyro)
-    counts = generated_sources.program(choice).operations
-    operations = sum(number for kind, number in counts.items() if kind not in _FREE)
-    look.figures["operations_per_s"] = operations / float(step)
+    operations = look.figures["operations_per_s"] = algorithm.operations_per_s()
     look.drift["noise"] = causes.noise(brief)
-    look.drift["truncation"] = causes.truncation(choice, brief)
+    look.drift["truncation"] = algorithm.truncation()
     try:
         if not look.excesses():
-            look.drift["coning"] = second_order(causes.coning, choice)
+            look.drift["coning"] = second_order(algorithm.coning)
         if not look.excesses() and brief.budget.limits_velocity:
-            _look_at_velocity(look, second_order(causes.sculling, choice))
+            _look_at_velocity(look, second_order(algorithm.sculling))
     except InputError as error:
         look.unknown["coning"] = str(error)
     if not look.excesses():
-        look.drift["quantization"] = second_order(causes.quantization, choice)
+        look.drift["quantization"] = second_order(algorithm.quantization)
     if not look.excesses():
         left = look.software_limit - math.fsum(look.drift[cause] or 0.0 for cause in SOFTWARE[:2])
-        look.rounding = causes.rounding(choice, brief, left)
+        look.rounding = algorithm.rounding(left)
         look.drift["rounding"] = look.rounding.deg_h
         if look.rounding.deg_h is None:
             look.unknown["rounding"] = look.rounding.reason
     if not look.excesses() and brief.processor.is_measured:
-        _measure(look, choice, float(step))
+        _measure(look, algorithm)
     excesses = look.excesses()
     binding = max(excesses, key=lambda name: excesses[name][0]) if excesses else None
     figures: Mapping[str, float | None] = look.figures
@@ -253,7 +241,7 @@ def judge(
         binding,
         "" if binding is None else excesses[binding][1],
         look.drift,
-        operations / float(step),
+        operations,
         look.rounding.carry,
         figures.get("velocity"),
         figures.get("position"),
@@ -269,15 +257,14 @@ def _look_at_velocity(look: _Look, error: float | None) -> None:
         look.figures |= {"velocity": error * over, "position": error * over**2 / 2}
 
 
-def _measure(look: _Look, choice: Choice, step: float) -> None:
+def _measure(look: _Look, algorithm: Algorithm) -> None:
     """Add what the fixed-point code costs on the processor of the brief."""
     cpu = look.brief.processor.cpu
     if shutil.which(PROCESSORS[cpu].compiler) is None:
         raise InputError(
             f"instructions and bytes on {cpu} are counted with {PROCESSORS[cpu].compiler}; it is not installed"
         )
-    settings = causes.settings(choice, look.brief, look.rounding.carry)
-    one = costs.cost(generated_sources.sources(choice, "c-fixed", settings), cpu)
-    look.figures["bytes"] = float(one.code_bytes + one.constant_bytes)
-    if one.executed is not None:
-        look.figures["instructions_per_s"] = one.executed / step
+    one = algorithm.cost(look.rounding.carry)
+    look.figures["bytes"] = one.bytes
+    if one.instructions_per_s is not None:
+        look.figures["instructions_per_s"] = one.instructions_per_s

@@ -7,21 +7,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from strapgen.backends import backend
-from strapgen.catalogue import Choice
+from strapgen.experiments.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
 from strapgen.experiments.selection import causes
+from strapgen.experiments.selection.algorithm import Algorithm
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.candidates import Contender
+from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.experiments.selection.environment import Line
 from strapgen.experiments.selection.judgement import Judgement
 from strapgen.simulation.motions import Motion, motion
 from strapgen.simulation.rate_profiles import CosineSum
 from strapgen.simulation.reference_attitudes import KNOT, ReferenceAttitude
-from strapgen.simulation.runs import Run, drift_between, simulate
+from strapgen.simulation.runs import Run
 
 #: Fewest steps of a run, and its longest time in s.
 _FEWEST, _LONGEST = 200, 10
@@ -30,6 +31,23 @@ _FEWEST_RECORDS = 100
 #: Substeps of the reference attitude in a period of the highest frequency.
 _SUBSTEPS = 24
 _AXES = 3
+#: Random runs, the steps of each, and where their random numbers begin.
+RANDOM_RUNS, _RANDOM_STEPS, _SEED = 2000, 200, 0
+
+
+class RandomDrift(NamedTuple):
+    """The root mean square of a drift in deg/h, of random runs.
+
+    Parameters
+    ----------
+    mean : float
+    low, high : float
+        Its 95 % interval.
+    """
+
+    mean: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -43,12 +61,17 @@ class Simulated:
     coning : float or None
         Drift in deg/h under the vibration, less the true one; None without vibration.
     rounding : float
-        Drift in deg/h between fixed point and double in the steady turn.
+        Drift in deg/h between fixed point and double in the steady turn; words of 64 bits run beside 40 digits.
+    quantization, noise : RandomDrift or None
+        Drift after the time of the budget that pulses and noise leave in the steady turn: that of shorter random runs,
+        times the factor by which it grows in the closed form. None without pulses or noise.
     """
 
     truncation: float
     coning: float | None
     rounding: float
+    quantization: RandomDrift | None
+    noise: RandomDrift | None
 
 
 @dataclass(frozen=True)
@@ -111,47 +134,90 @@ def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
     return Vibration(rates=rates, measured=measured)
 
 
-def choice_of(judgement: Judgement, path: str | Path) -> Choice:
-    """Return the step of a judgement.
+def algorithm_named(judgement: Judgement, brief: DesignBrief, path: str | Path) -> Algorithm:
+    """Return the algorithm of a judgement.
 
     Parameters
     ----------
     judgement : Judgement
+    brief : DesignBrief
     path : path
         The file of the brief, for which coefficients are designed again.
     """
     contender = Contender(judgement.method, judgement.increments, judgement.previous, judgement.ahead)
-    return contender.choice(judgement.state, str(path))
+    return algorithm_of(contender, judgement.state, brief, path)
 
 
-def run(brief: DesignBrief, judgement: Judgement, choice: Choice) -> Simulated:
+def run(brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: int | None = 1) -> Simulated:
     """Run an algorithm that meets a brief in time.
 
     Parameters
     ----------
     brief : DesignBrief
     judgement : Judgement
-    choice : Choice
-        The step of the judgement.
+    algorithm : Algorithm
+        The algorithm of the judgement.
+    jobs : int, optional
+        Number of processes of the random runs; None for one for each processor.
     """
-    step = causes.step_length(choice, brief.gyro)
+    step = algorithm.step
     steps = max(_FEWEST, math.floor(min(Fraction(_LONGEST), brief.budget.over_s) / step))
     turn = motion("constant", z_deg_s=brief.max_rate_deg_s)
-    double = backend(choice)
-    truth = simulate(double, turn, step, steps * step)
-    settings = causes.settings(choice, brief, judgement.carry)
-    fixed = backend(choice, backend="fixed-model", settings=settings)
-    row = fixed.representable(
-        turn.increments(step, steps, choice.increments or 1, choice.previous, choice.ahead)
-    )
     coning = None
     if brief.environment is not None:
         shaken = vibration(brief.environment.lines(), brief)
-        coning = _slope(simulate(double, shaken, step, steps * step, record=_record(step, steps)))
+        record = _record(step, steps)
+        coning = _slope(algorithm.run(shaken, steps - steps % int(record / step), record))
     return Simulated(
-        _slope(truth),
+        _slope(algorithm.run(turn, steps)),
         coning,
-        _apart(fixed.propagate(row), double.propagate(row), double, float(steps * step)),
+        algorithm.rounded_apart(turn, steps, judgement.carry),
+        _of_pulses(brief, judgement, algorithm, jobs),
+        _of_noise(brief, algorithm, jobs),
+    )
+
+
+def _of_pulses(
+    brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: int | None
+) -> RandomDrift | None:
+    """Return the drift of random runs with the gyro's pulses, as the closed form has it grow to the budget's time."""
+    if not brief.gyro.pulse_arcsec:
+        return None
+    pulse = math.radians(float(brief.gyro.pulse_arcsec) / 3600)
+    seconds = _RANDOM_STEPS * algorithm.step
+    expected = algorithm.quantization(seconds)
+    at_the_end = judgement.drift_deg_h["quantization"]
+    assert at_the_end is not None, "the algorithm meets the brief"
+    outcome = _random(brief, algorithm, Errors(pulse, 0.0, _turn(brief)), jobs)
+    return _drift(outcome, float(seconds), at_the_end / expected)
+
+
+def _of_noise(brief: DesignBrief, algorithm: Algorithm, jobs: int | None) -> RandomDrift | None:
+    """Return the drift of random runs with the gyro's noise, which falls with the root of the time."""
+    if not brief.gyro.noise_deg_sqrt_h:
+        return None
+    size = math.radians(brief.gyro.noise_deg_sqrt_h) / 60 / math.sqrt(brief.gyro.sample_hz)
+    outcome = _random(brief, algorithm, Errors(0.0, size, _turn(brief)), jobs)
+    seconds = float(_RANDOM_STEPS * algorithm.step)
+    return _drift(outcome, seconds, math.sqrt(seconds / float(brief.budget.over_s)))
+
+
+def _turn(brief: DesignBrief) -> float:
+    """Return the angle from sample to sample at the largest rate."""
+    return math.radians(float(brief.max_rate_deg_s / brief.gyro.sample_hz))
+
+
+def _random(brief: DesignBrief, algorithm: Algorithm, errors: Errors, jobs: int | None) -> MeanSquare:
+    """Return the squared angle at the end of random runs."""
+    runs = SteadyRuns(algorithm.steady(), errors, _RANDOM_STEPS, RANDOM_RUNS, (_SEED,))
+    return MeanSquare.of(random_runs(runs, jobs=jobs))
+
+
+def _drift(outcome: MeanSquare, seconds: float, factor: float) -> RandomDrift:
+    """Return a squared angle at the end of runs as a drift over the time of the budget."""
+    low, high = outcome.interval()
+    return RandomDrift(
+        *(factor * math.sqrt(square) / seconds * causes.DEG_H for square in (outcome.mean, low, high))
     )
 
 
@@ -161,12 +227,6 @@ def _record(step: Fraction, steps: int) -> Fraction:
     common = Fraction(math.lcm(step.numerator * knot.denominator, knot.numerator * step.denominator))
     common /= step.denominator * knot.denominator
     return common if steps * step >= _FEWEST_RECORDS * common else step
-
-
-def _apart(one: Any, other: Any, double: Any, seconds: float) -> float:
-    """Return the angle in deg/h between the ends of two runs."""
-    ends = [double.matrices(states[-1:]) for states in (one, other)]
-    return float(np.linalg.norm(drift_between(*ends)[-1])) / seconds * causes.DEG_H
 
 
 def _slope(run: Run) -> float:

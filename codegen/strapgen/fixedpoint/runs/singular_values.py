@@ -28,6 +28,8 @@ _SPACE, _QUATERNION = 3, 4
 _MOST_PRODUCTS = 400_000
 #: Vectors that three variables describe.
 _MOST_VECTORS = 2
+#: A square of a length that is above 1 in double is above 1.
+_LONGER = 1 + 2.0**-40
 #: Fraction bits of the length of an increment.
 _LENGTH_BITS = 40
 
@@ -190,5 +192,5 @@ def _samples(vectors: int) -> NDArray[np.float64]:
 
 
 def _is_outside(cube: Cube) -> bool:
-    """Tell whether the second vector is longer than the first anywhere in a part of the cube."""
-    return sum(low * low for low, _ in cube[1:]) > 1
+    """Tell whether the second vector is longer than the first anywhere in a part of the cube, in spite of rounding."""
+    return sum(low * low for low, _ in cube[1:]) > _LONGER

@@ -16,7 +16,7 @@ from strapgen.analysis.notation import LATEX, covariant_text
 from strapgen.analysis.series import PARTS, STEP, ErrorSeries
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.experiments.algorithm import Algorithm
+from strapgen.experiments.algorithm import AttitudeAlgorithm
 from strapgen.experiments.comparison import Comparisons
 from strapgen.experiments.convergence import Convergence
 from strapgen.ir.integer_program import FixedProgram
@@ -53,7 +53,7 @@ def _(kernel: Kernel) -> str | None:
 
 
 @latex.register
-def _(algorithm: Algorithm) -> str | None:
+def _(algorithm: AttitudeAlgorithm) -> str | None:
     return formulas.short_latex(algorithm.derive())
 
 

@@ -58,8 +58,8 @@ def sensor_report(rows: Sequence[SensorScatter], settings: dict[str, Any]) -> Re
         return "\n".join(
             [
                 head,
-                f"errors of the attitude after {rows[0].time[-1]:g} s in reference axes, beside a run with perfect "
-                "sensors;",
+                f"errors of the attitude after {rows[0].time[-1]:g} s in reference axes, positive if ahead of a run "
+                "with perfect sensors;",
                 "+-, from and to are intervals of 95 %; predicted to first order, in closed form",
                 "",
                 *TextTable(_COLUMNS, shown).lines(),

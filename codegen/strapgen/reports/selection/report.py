@@ -8,7 +8,7 @@ from typing import Any
 from strapgen.experiments.selection.answer import verdicts
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.judgement import CAUSES, Judgement
-from strapgen.experiments.selection.simulated import Simulated
+from strapgen.experiments.selection.simulated import RANDOM_RUNS, RandomDrift, Simulated
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
@@ -33,7 +33,7 @@ def selection_report(
     """
     return Report(
         lambda: _text(brief, ordered, simulated or {}),
-        lambda: [_as_dict(one) for one in ordered],
+        lambda: [_as_dict(one) | _runs(one, simulated or {}) for one in ordered],
         lambda: _flat(ordered),
         lambda: _table(brief, ordered, refused=True),
     )
@@ -49,6 +49,17 @@ def _as_dict(one: Judgement) -> dict[str, Any]:
         "operations_per_s": one.operations_per_s,
     }
     return first | {name: value for name, value in vars(one).items() if name not in first}
+
+
+def _runs(one: Judgement, simulated: Mapping[str, Simulated]) -> dict[str, Any]:
+    """Return the drifts of a time simulation as JSON data, if there is one."""
+    if one.name not in simulated:
+        return {}
+    run = vars(simulated[one.name])
+    drifts = {
+        cause: drift._asdict() if isinstance(drift, RandomDrift) else drift for cause, drift in run.items()
+    }
+    return {"simulated_deg_h": drifts}
 
 
 def _flat(ordered: Sequence[Judgement]) -> TextTable:
@@ -99,7 +110,7 @@ def _text(brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[s
     if simulated:
         lines += [
             "",
-            "drift in deg/h, predicted and in a time simulation",
+            f"drift in deg/h, predicted and in time; of random causes the 95 % interval of {RANDOM_RUNS} runs",
             "",
             *_simulated(accepted, simulated),
         ]
@@ -118,15 +129,18 @@ def _text(brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[s
 def _simulated(accepted: Sequence[Judgement], simulated: Mapping[str, Simulated]) -> list[str]:
     """Return predicted drifts beside those of time simulations."""
     columns = [Column("algorithm", "<")]
-    for cause in ("truncation", "coning", "rounding"):
-        columns += [Column("predicted", spec=_DRIFT, group=cause), Column("run", spec=_DRIFT, group=cause)]
+    for cause in CAUSES:
+        columns += [Column("predicted", spec=_DRIFT, group=cause), Column("run", group=cause)]
     rows = []
     for one in accepted:
         if one.name in simulated:
-            run = simulated[one.name]
-            pairs = [
-                (one.drift_deg_h[cause], getattr(run, cause))
-                for cause in ("truncation", "coning", "rounding")
-            ]
+            pairs = [(one.drift_deg_h[cause], _run(getattr(simulated[one.name], cause))) for cause in CAUSES]
             rows.append([one.name, *(value for pair in pairs for value in pair)])
     return TextTable(columns, rows).lines()
+
+
+def _run(drift: float | RandomDrift | None) -> str | None:
+    """Return the drift of a run, or the interval of random runs."""
+    if isinstance(drift, RandomDrift):
+        return f"{drift.low:.2g}..{drift.high:.2g}"
+    return None if drift is None else f"{drift:{_DRIFT}}"

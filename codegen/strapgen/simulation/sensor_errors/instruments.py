@@ -16,7 +16,7 @@ def zeros() -> Array:
     return np.zeros(3)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TriadErrors:
     """Errors of three gyros, or of three accelerometers; u stands for rad, or for m/s.
 
@@ -77,7 +77,7 @@ class Sampling:
     lost_as: str = "late"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WarmUp:
     """A rate that begins at switch-on, ``rate (1 - exp(-t/tau))``.
 
@@ -93,7 +93,7 @@ class WarmUp:
     tau: Array = field(default_factory=lambda: np.ones(3))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Heating:
     """Scale factors of torqued gyros that change with the heat of their torquers, see ``torquer-heating-errors``.
 
@@ -112,7 +112,7 @@ class Heating:
     unbalance: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OutputNoise:
     """Noise of an output whose sum stays bounded: ``b[n] = A b[n-1] + (1 - A)(w[n] - w[n-1])`` with white w.
 
@@ -147,7 +147,7 @@ CAUSES: dict[str, tuple[str, ...]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InstrumentErrors:
     """All errors of an inertial measurement unit.
 

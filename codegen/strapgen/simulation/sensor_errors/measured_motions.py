@@ -32,7 +32,7 @@ class _Progress:
     stop: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeasuredMotion(Motion):
     """A motion whose increments are those of sensors with errors, and whose attitude is the true one.
 

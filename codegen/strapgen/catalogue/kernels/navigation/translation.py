@@ -54,7 +54,7 @@ def translation(name: str) -> Kernel:
     return build.kernel(
         f"{name}-translation",
         "Velocity and position after a step, in axes that do not turn",
-        f"the integrals of {SAVAGE}, equations (44) and (57)",
+        f"derived: the integrals of {SAVAGE}, equations (44) and (57)",
         recursion=Recursion(
             ((VELOCITY.name, after(VELOCITY).name), (DISPLACEMENT.name, after(DISPLACEMENT).name)),
             kept=(VELOCITY.name, DISPLACEMENT.name),

@@ -1,0 +1,196 @@
+"""Throughput of ``euler rk4`` on two increments in double: ratios that hold on any machine, and their limits.
+
+C is compiled as strapgen compiles it, for the baseline of the processor's family. Rounds of all candidates are
+interleaved; the least time of each counts, since others on the machine only ever add to it. Each ratio is of times
+from the same run, and of processor time where one thread does the work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import strapgen
+from strapgen.catalogue import choose
+from strapgen.library import generated_sources
+from strapgen.toolchain import compiler
+
+#: Runs side by side, and the steps of each.
+RUNS, STEPS = 10_000, 20
+#: A call of ``strapgen generate`` whose text is in the cache.
+GENERATE = ("generate", "euler", "--method", "rk4", "--increments", "2", "--target", "c", "--force")
+
+
+def of_children() -> float:
+    """Return the processor time of the processes that this one has started, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def least(candidates: dict, rounds: int, clock=time.perf_counter) -> dict[str, float]:
+    """Return the least seconds of each candidate over interleaved rounds."""
+    times = dict.fromkeys(candidates, float("inf"))
+    for _ in range(rounds):
+        for name, function in candidates.items():
+            start = clock()
+            function()
+            times[name] = min(times[name], clock() - start)
+    return times
+
+
+def built(folder: Path) -> ctypes.CDLL:
+    """Return the loops and the chain, compiled into one library."""
+    sources = generated_sources.sources(choose("euler"), "c")
+    for name, text in sources.files.items():
+        (folder / name).write_text(text)
+    code = Path(__file__).with_name("throughput.c")
+    library = folder / "throughput.so"
+    options = [*compiler.C_FLAGS, "-shared", "-fPIC", f"-I{folder}", str(code), "-o", str(library), "-lm"]
+    subprocess.run([*compiler.command(), *options], check=True)
+    return ctypes.CDLL(str(library))
+
+
+class Loops:
+    """Calls of the compiled loops on fixed memory."""
+
+    def __init__(self, library: ctypes.CDLL, increments: np.ndarray) -> None:
+        self._library, self._increments = library, increments
+        self._transitions = np.ascontiguousarray(
+            strapgen.backend("euler", backend="c").step([0.0, 0.0, 0.0, 1.0], increments)
+        )
+        self._state = np.array([0.0, 0.0, 0.0, 1.0])
+        self._initial = np.tile(self._state, (len(increments), 1))
+        self._history = np.zeros((len(increments) + RUNS, 4))
+
+    def chain(self) -> None:
+        """Multiply the transitions one after the other."""
+        self._state[:] = 0.0, 0.0, 0.0, 1.0
+        self._library.chain(
+            ctypes.c_size_t(len(self._transitions)),
+            self._pointer(self._transitions),
+            self._pointer(self._state),
+        )
+
+    def propagate(self, runs: int, record_every: int) -> None:
+        """Propagate all increments as so many runs."""
+        counts = (runs, len(self._increments) // runs, record_every, 0)
+        arrays = (self._initial, self._increments, self._history)
+        status = self._library.euler_rk4_2_propagate(
+            *map(ctypes.c_size_t, counts), None, *map(self._pointer, arrays)
+        )
+        if status:
+            raise RuntimeError(f"the generated loop refused its arguments with status {status}")
+
+    @staticmethod
+    def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+        return ctypes.c_void_p(array.ctypes.data)
+
+
+def show(what: str, ratio: float, limit: float | None = None) -> None:
+    """Print a ratio beside its limit."""
+    print(f"{what:<78}{ratio:>8.2f}" + ("" if limit is None else f"   at most {limit:g}"))
+
+
+def loops(rounds: int) -> None:
+    """Print the ratios of loops in C."""
+    increments = np.random.default_rng(1).normal(scale=0.002, size=(RUNS * STEPS, 2, 3))
+    with tempfile.TemporaryDirectory() as folder:
+        calls = Loops(built(Path(folder)), increments)
+        times = least(
+            {
+                "chain": calls.chain,
+                "history": lambda: calls.propagate(1, 1),
+                "single": lambda: calls.propagate(1, len(increments)),
+                "many": lambda: calls.propagate(RUNS, STEPS),
+            },
+            rounds,
+        )
+    print(f"ns a step: {', '.join(f'{name} {t / len(increments) * 1e9:.2f}' for name, t in times.items())}")
+    show(
+        "a single run with history / the bare chain of quaternion products",
+        times["history"] / times["chain"],
+        1.35,
+    )
+    show(
+        f"one of {RUNS} runs without history / a single run, on one core",
+        times["many"] / times["single"],
+        0.55,
+    )
+
+
+def back_ends(rounds: int) -> None:
+    """Print the ratios of back ends as Python calls them, checks of the inputs included."""
+    c, numpy = (strapgen.backend("euler", backend=name) for name in ("c", "numpy"))
+    increments = np.random.default_rng(1).normal(scale=0.002, size=(RUNS * STEPS * 5, 2, 3))
+    states = c.step(c.identity, increments)
+    many = increments.reshape(RUNS, -1, 2, 3)
+    jobs = os.cpu_count() or 1
+    times = least(
+        {
+            "c": lambda: c.propagate(increments),
+            "numpy": lambda: numpy.propagate(increments),
+            "c, steps": lambda: c.step(states, increments),
+            "numpy, steps": lambda: numpy.step(states, increments),
+        },
+        rounds,
+        time.process_time,
+    )
+    show("numpy / C, single steps of many states", times["numpy, steps"] / times["c, steps"], 5)
+    show("numpy / C, one run with history", times["numpy"] / times["c"], 5)
+    times = least(
+        {
+            "one": lambda: c.propagate(many, many.shape[1]),
+            "all": lambda: c.propagate(many, many.shape[1], jobs=jobs),
+        },
+        rounds,
+    )
+    show(f"{jobs} threads / one, {RUNS} runs, elapsed time", times["all"] / times["one"])
+
+
+def processes(rounds: int) -> None:
+    """Print what generating from the cache takes beyond ``strapgen --help``."""
+    program = [sys.executable, "-m", "strapgen"]
+    with tempfile.TemporaryDirectory() as folder:
+        commands = {"--help": ("--help",), "generate": (*GENERATE, "--out", folder)}
+        times = least(
+            {
+                name: lambda words=words: subprocess.run(
+                    [*program, *words], check=True, stdout=subprocess.DEVNULL
+                )
+                for name, words in commands.items()
+            },
+            rounds,
+            of_children,
+        )
+        said = subprocess.run(
+            [sys.executable, "-X", "importtime", "-m", "strapgen", *GENERATE, "--out", folder],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stderr
+    show("generating from the cache less strapgen --help, s", times["generate"] - times["--help"], 0.15)
+    show("generating from the cache / strapgen --help", times["generate"] / times["--help"])
+    imported = any(line.rpartition("|")[2].strip() == "sympy" for line in said.splitlines())
+    print(f"it imports SymPy: {'yes' if imported else 'no'}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=40)
+    options = parser.parse_args()
+    loops(5 * options.rounds)
+    back_ends(max(1, options.rounds // 4))
+    processes(max(1, options.rounds // 4))
+
+
+if __name__ == "__main__":
+    main()

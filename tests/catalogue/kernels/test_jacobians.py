@@ -1,0 +1,113 @@
+"""Jacobians of attitude steps: difference quotients in many digits, counts beside general tools, and all targets."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from derived import kernel, program
+from fixed_inputs import corners_and_random
+from gathering import each
+from kernel_checks import require_what_numpy_computes, share_of_bound
+
+import strapgen
+from strapgen.catalogue import choose
+from strapgen.ir.fixed_settings import Settings
+from strapgen.support.exceptions import InputError
+
+#: Methods of every way to differentiate: few vectors, a rotation vector, stage by stage; with their samples.
+QUICK = {
+    ("euler", "rk4"): (2, 0, 0),
+    ("dcm", "rk4"): (2, 0, 0),
+    ("euler", "magnus4"): (2, 0, 0),
+    ("cayley-klein", "coning-combined"): (2, 1, 0),
+    ("euler", "rk3"): (3, 0, 0),
+}
+LONG = {
+    ("dcm", "coning-combined"): (3, 3, 0),
+    ("euler", "window-3-3"): (1, 3, 3),
+    ("cayley-klein", "taylor4"): (2, 0, 0),
+    ("dcm", "crouch-grossman3"): (2, 0, 0),
+    ("euler", "magnus6"): (3, 0, 0),
+    ("dcm", "munthe-kaas4"): (2, 0, 0),
+    ("euler", "fit-exact"): (2, 0, 0),
+    ("euler", "coning-shaped-8"): (1, 8, 0),
+}
+EVERY = [*QUICK, *(pytest.param(*case, marks=pytest.mark.long) for case in LONG)]
+
+
+def chosen(name, algorithm, method):
+    increments, previous, ahead = {**QUICK, **LONG}[algorithm, method]
+    return choose(name, method, increments, previous=previous, ahead=ahead)
+
+
+def differences(algorithm, method, state, increments):
+    """Return the Jacobians of the step itself by central differences in 40 digits, with what they leave below 1e-20."""
+    step = kernel(chosen(algorithm, algorithm, method))
+    names = [list(signal.elements) for signal in step.inputs]
+    with mpmath.workdps(60):
+        here = dict(
+            zip(names[0] + names[1], map(mpmath.mpf, [*state.ravel(), *increments.ravel()]), strict=True)
+        )
+        apart = mpmath.mpf(10) ** -12
+
+        def at(values):
+            return step.expand(values, lambda number: mpmath.mpf(number.p) / number.q)["next"]
+
+        matrices = []
+        for group in names:
+            columns = []
+            for name in group:
+                ends = [at(here | {name: here[name] + sign * apart}) for sign in (1, -1)]
+                columns.append([(a - b) / (2 * apart) for a, b in zip(*ends, strict=True)])
+            matrices.append(np.array(columns, float).T)
+    return matrices
+
+
+@pytest.mark.parametrize(("algorithm", "method"), EVERY)
+@pytest.mark.parametrize("size", [0.1, 1e-7], ids=["ordinary", "small"])
+def test_jacobians_are_the_limits_of_differences(algorithm, method, size, rng):
+    evaluate = strapgen.evaluator(chosen(f"{algorithm}-jacobian", algorithm, method))
+    state_signal, samples = evaluate.function.inputs
+    state = rng.normal(size=state_signal.shape)
+    if len(state_signal.shape) == 1:
+        state /= np.linalg.norm(state)
+    increments = rng.normal(size=samples.shape) * size
+    computed = evaluate(state, increments)
+    for one, other in zip(computed, differences(algorithm, method, state, increments), strict=True):
+        assert np.abs(one - other).max() <= 1e-12 * np.abs(other).max()
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "most"),
+    # What SymForce 0.10 writes for the same two Jacobians, by its own count of operations.
+    [("euler", 795), ("dcm", 1067)],
+)
+def test_they_take_fewer_operations_than_common_subexpressions_do(algorithm, most):
+    operations = program(choose(f"{algorithm}-jacobian", "rk4", 2)).operations
+    assert operations["multiply"] + operations["add"] < most
+
+
+@each("backend", ["c", "c-float"])
+def test_c_is_within_its_bounds_of_numpy(backend, rng):
+    choice = choose("euler-jacobian", "rk4", 2)
+    settings = Settings(largest_angle=Fraction(1, 10))
+    require_what_numpy_computes(
+        choice, backend, settings, lambda model, count: corners_and_random(model, count, rng)
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("word", [16, 32])
+def test_fixed_point_is_within_its_bounds(word, rng):
+    choice, settings = choose("euler-jacobian", "rk4", 2), Settings(word=word, largest_angle=Fraction(1, 10))
+    share = share_of_bound(choice, settings, lambda model, count: corners_and_random(model, count, rng))
+    assert share is not None
+    assert share > 0.02
+
+
+def test_rates_have_no_jacobian():
+    with pytest.raises(InputError, match="takes increments; rates at nodes do not go with it"):
+        choose("euler-jacobian", "rk4", rates=True)
