@@ -44,7 +44,7 @@ def test_a_kernel_that_would_fill_half_a_page_shows_its_repr_alone():
 
 def test_a_series_shows_its_leading_terms_in_vectors():
     text = ALGORITHM.series(terms=1)._repr_latex_()
-    assert r"\mathbf{d}_{5} &= \frac{1}{720}" in text and r"\boldsymbol\omega_{0}" in text
+    assert r"h^{5}\!:\ \mathbf{d} &= \frac{1}{720}" in text and r"\boldsymbol\omega_{0}" in text
     constant = ALGORITHM.series("constant", terms=1).step._repr_latex_()
     assert r"\mathrm{drift}_x &=" in constant and "h^{5}" in constant
 
@@ -178,3 +178,14 @@ def test_rotations_that_do_not_fit_are_refused(history):
     ):
         strapgen.to_rotation(history)
     assert len(strapgen.to_rotation(history, backend)) == len(history.time)
+
+
+def test_ipython_takes_what_objects_show(run):
+    formatters = pytest.importorskip("IPython.core.formatters")
+    pytest.importorskip("matplotlib")
+    shown, _ = formatters.DisplayFormatter().format(ALGORITHM.derive())
+    assert {"text/plain", "text/latex"} <= {*shown} and shown["text/plain"].startswith("<Kernel")
+    shown, _ = formatters.DisplayFormatter().format(run)
+    assert {"text/plain", "text/html"} <= {*shown} and "text/latex" not in shown
+    shown, _ = formatters.DisplayFormatter().format(strapgen.derive("euler", "magnus4", 2))
+    assert {*shown} == {"text/plain"}  # half a page of scalars

@@ -45,11 +45,12 @@ class ErrorAnalysis:
     _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
-        run = self.no_run or "no run"
+        run = self.no_run
         if self.run is not None:
             powers = [f"h^{power}" for power in self.run.secular]
             run = f"drift that adds up in a run {', '.join(powers) or 'none'}"
-        return f"{self.step!r}\n{run}".replace("<ErrorSeries ", "", 1).replace(">\n", "\n", 1)
+        step = repr(self.step).removeprefix("<ErrorSeries ").removesuffix(">")
+        return f"{step}\n{run}".strip()
 
     @property
     def growth_powers(self) -> list[int]:

@@ -79,10 +79,13 @@ def _(series: ErrorSeries) -> str | None:
     if series.invariant:
         power = min(series.invariant)
         one = series.invariant[power]
-        rows.append((rf"\mathbf{{d}}_{{{power}}}", covariant_text(one.drift, notation=LATEX)))
+        rows.append((rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX)))
         if one.symmetric:
             rows.append(
-                (rf"\mathbf{{Y}}_{{{power}}}", covariant_text(one.symmetric, symmetric=True, notation=LATEX))
+                (
+                    rf"h^{{{power}}}\!:\ \mathbf{{Y}}",
+                    covariant_text(one.symmetric, symmetric=True, notation=LATEX),
+                )
             )
     else:
         for part in PARTS:
