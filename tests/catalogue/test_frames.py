@@ -21,7 +21,8 @@ WITHOUT = {
     ),
     **dict.fromkeys(("mean", "next_mean"), "from the axes of one unit to those of another"),
     **dict.fromkeys(
-        ("state_jacobian", "increments_jacobian"), "each element is the derivative of one number by another"
+        ("state_jacobian", "increments_jacobian", "right_noise", "left_noise"),
+        "each element is the derivative of one number by another",
     ),
     "level_angles": "its axes, level with heading 0, are those of no other signal",
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),

@@ -159,4 +159,13 @@ VECTORS = {
         )
         for algorithm, words in ALGORITHMS.items()
     },
+    "error-state": StepVector(
+        "attitude error over a step: transition and noise input",
+        "jacobians",
+        "error_state",
+        (),
+        "rk4",
+        True,
+        True,
+    ),
 }

@@ -66,9 +66,9 @@ class CovariantFunction:
     >>> u = build.input(Signal.vector("u", "u"))
     >>> function = CovariantFunction(build, frame.quaternion([square * x, square * y, square * z], square), [u], "f_")
     >>> function.values()
-    [f_weight_0*u_x, f_weight_0*u_y, f_weight_0*u_z, f_product_0_0]
+    [f_product_0_0*u_x, f_product_0_0*u_y, f_product_0_0*u_z, f_product_0_0]
     >>> function.derivative(0, 0)
-    [f_weight_0 + 2*u_x**2, 2*u_x*u_y, 2*u_x*u_z, 2*u_x]
+    [f_product_0_0 + 2*u_x**2, 2*u_x*u_y, 2*u_x*u_z, 2*u_x]
     """
 
     def __init__(

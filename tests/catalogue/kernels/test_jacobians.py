@@ -11,6 +11,7 @@ from derived import kernel, program
 from fixed_inputs import corners_and_random
 from gathering import each
 from kernel_checks import require_what_numpy_computes, share_of_bound
+from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen.catalogue import choose
@@ -111,3 +112,37 @@ def test_fixed_point_is_within_its_bounds(word, rng):
 def test_rates_have_no_jacobian():
     with pytest.raises(InputError, match="takes increments; rates at nodes do not go with it"):
         choose("euler-jacobian", "rk4", rates=True)
+
+
+@pytest.mark.parametrize("method", ["magnus4", pytest.param("window-3-3", marks=pytest.mark.long), "rk4"])
+def test_small_errors_of_attitude_and_increments_go_through_a_step(method, rng):
+    """Both conventions against the step itself, of an attitude and of increments that are off by 1e-6 rad."""
+    increments, previous, ahead = {**QUICK, **LONG}.get(("euler", method), (2, 0, 0))
+    options = {"increments": increments, "previous": previous, "ahead": ahead}
+    matrices = strapgen.evaluator(choose("error-state", method, **options))
+    step = strapgen.evaluator(choose("euler", method, **options))
+    (samples,) = matrices.function.inputs
+    turns = rng.normal(size=samples.shape) * 0.05
+    errors, error = rng.normal(size=samples.shape) * 1e-6, rng.normal(size=3) * 1e-6
+    body = Rotation.random(rng=rng)
+    right, right_noise, left_noise = matrices(turns)
+    ends = [
+        Rotation.from_quat(step(start.as_quat(), increments))
+        for start, increments in ((body, turns), (body * Rotation.from_rotvec(error), turns + errors))
+    ]
+    in_body = (ends[0].inv() * ends[1]).as_rotvec()
+    in_reference = (ends[1] * ends[0].inv()).as_rotvec()
+    # Of second order in the errors, and of the length of the step's transition, which is 1 but for its order.
+    np.testing.assert_allclose(right @ error + right_noise @ errors.ravel(), in_body, atol=2e-11)
+    turned = body.apply(error + left_noise @ errors.ravel())
+    np.testing.assert_allclose(turned, in_reference, atol=2e-11)
+
+
+@pytest.mark.parametrize("method", ["magnus4", "coning-combined"])
+def test_the_left_noise_takes_velocity_increments_to_their_change(method, rng):
+    """Of dual numbers: the velocity change is the turn by the velocity increments in place of errors."""
+    matrices, change = (
+        strapgen.evaluator(choose(name, method, 2)) for name in ("error-state", "velocity-position")
+    )
+    turns, pushes = rng.normal(size=(2, 2, 3)) * 0.05
+    np.testing.assert_allclose(matrices(turns)[2] @ pushes.ravel(), change(turns, pushes)[0], atol=1e-15)

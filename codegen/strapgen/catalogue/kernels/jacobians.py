@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from strapgen.catalogue.kernels.attitude_step import chosen, smooth
-from strapgen.catalogue.kinematics import DCM, KINEMATICS, Kinematics
+from strapgen.catalogue.kinematics import DCM, EULER, KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import PHI, Method
 from strapgen.catalogue.methods.samples import Samples, increments_signal
 from strapgen.ir.signals import Signal
@@ -94,6 +94,53 @@ def jacobians(name: str, method: Method, counts: tuple[int, int, int]) -> Kernel
     )
 
 
+def error_state(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:
+    """Derive how a small error of the attitude goes through a step, and what errors of the increments add to it.
+
+    With the right error r, C_true = C (I + [r x]) in body axes, r+ = A^T r + R e for errors e of the increments, where
+    A turns from the body axes at the end of the step to those at its start. With the left error l,
+    C_true = (I + [l x]) C in reference axes, l+ = l + C L e with the attitude C at the start of the step.
+
+    Parameters
+    ----------
+    method : Method
+        The integration method.
+    increments, previous, ahead : int
+        Samples of the step, from before it and from after it.
+
+    Returns
+    -------
+    Kernel
+        Input ``increments`` (K, 3) in rad; outputs ``right_transition`` (3, 3), the matrix A^T, and ``right_noise`` and
+        ``left_noise`` (3, 3 K), the matrices R and L.
+    """
+    counts = increments, previous, ahead
+    build = KernelBuilder()
+    turn = transition(build, EULER, method, counts)
+    matrix = rotations.quaternion_matrix(turn.value).applyfunc(sp.expand)
+    build.output(
+        Signal.matrix(
+            "right_transition",
+            "F",
+            meaning="transition of a small attitude error, from the axes at the start of the step to those at its end",
+            frame="b to b",
+        ),
+        matrix.T,
+    )
+    for name, before, axes in (("right", False, "end"), ("left", True, "start")):
+        what = f"attitude error, in the axes at the {axes} of the step, by the increments"
+        columns = turn.angles(before)
+        build.output(_matrix(f"{name}_noise", (3, len(columns)), what, ""), _side_by_side(columns))
+    suffix, option, source = chosen(method, *counts)
+    return build.kernel(
+        f"error-state-{suffix}",
+        f"Attitude error over a step by {method.title} from {source}",
+        f"{method.source}; its derivatives",
+        order=method.step_order(*counts),
+        arguments=f"error-state {option}",
+    )
+
+
 @dataclass(frozen=True)
 class Turn:
     """The transition of a step under construction with what its derivatives are made of.
@@ -120,15 +167,36 @@ class Turn:
         """Add stages for the derivatives of the next state, and return one for every element of the increments."""
         along = []
         for place, part in enumerate(self.parts):
-            name = f"along_{place}"
             meaning = f"derivative of the next state along direction {place}"
-            shaped = sp.Matrix(*part.shape, list(part))
+            product = self.kinematics.product(state, part)
+            along.append(_stage(self.build, self.kinematics, f"along_{place}", meaning, product))
+        return self._summed(along)
+
+    def angles(self, before: bool) -> list[sp.Matrix]:
+        """Add stages for the small rotations by which the increments turn the end of the step, of Euler parameters.
+
+        Parameters
+        ----------
+        before : bool
+            Whether the rotations are in the axes at the start of the step, or in those at its end.
+        """
+        conjugate = rotations.quaternion_conjugate(self.value)
+        name, axes = ("left", "start") if before else ("right", "end")
+        along = []
+        for place, part in enumerate(self.parts):
+            pair = (part, conjugate) if before else (conjugate, part)
+            turned = 2 * rotations.quaternion_product(*pair)[:3, :]
+            meaning = f"rotation by direction {place}, axes at the {axes} of the step"
             along.append(
-                _stage(self.build, self.kinematics, name, meaning, self.kinematics.product(state, shaped))
+                self.build.stage(Signal.vector(f"{name}_{place}", f"{name}_{place}", meaning=meaning), turned)
             )
+        return self._summed(along)
+
+    def _summed(self, along: Sequence[sp.Matrix]) -> list[sp.Matrix]:
+        """Return the derivatives along the elements of the increments from those along the directions."""
         columns = []
         for weights in self.sums:
-            total = sp.zeros(*self.value.shape)
+            total = sp.zeros(*along[0].shape)
             for weight, part in zip(weights, along, strict=True):
                 if weight != 0:
                     total += weight * part
