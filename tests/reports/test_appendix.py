@@ -25,6 +25,9 @@ LONG = (
     "derive dcm --method rk3 --increments 3 --format latex",
     "derive euler --method rk4 --rates --format latex",
     "derive euler --method butcher6 --increments 3 --format latex",
+    "derive dcm --method magnus4 --format latex",
+    "derive dcm-orthonormalize --format latex",
+    "derive coning-fast --format latex",
     "derive dcm-from-euler --format latex",
     "derive euler --show operations --format latex",
     "derive euler --show program --format latex",
@@ -50,8 +53,8 @@ LONG = (
 
 
 def overfull(log: str) -> list[str]:
-    """Return what a log of pdflatex says of boxes wider than the page, and of errors."""
-    return re.findall(r"^(?:Overfull .hbox|!).*$", log, flags=re.MULTILINE)
+    """Return what a log of pdflatex says of boxes larger than the page, and of errors."""
+    return re.findall(r"^(?:Overfull .[hv]box|!).*$", log, flags=re.MULTILINE)
 
 
 def compiled(text: str, folder: Path) -> str:

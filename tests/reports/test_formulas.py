@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import derived
@@ -78,11 +79,38 @@ def test_a_step_is_written_in_vectors_as_the_page_on_its_canonical_form_writes_i
 
 def test_formulas_are_short_or_not_shown_at_a_glance():
     assert formulas.short_latex(pipeline.derive("euler", "rk4", 2)) == EULER.strip()
-    short = pipeline.derive("euler-product")
+    short = pipeline.derive("dcm-from-euler")
     assert formulas.short_latex(short) == formulas.elements_latex(short) == formulas.as_latex(short)
-    long = pipeline.derive("euler", "magnus4", 2)
+    long = pipeline.derive("cayley-klein", "butcher6", 3)
     assert formulas.short_latex(long) is None
     assert formulas.as_latex(long) == formulas.elements_latex(long)
+
+
+MAGNUS = r"""
+\begin{align*}
+\boldsymbol{\mu}_{0} &= \mathbf{d}_{1} + \mathbf{d}_{2} \\
+\boldsymbol{\mu}_{1} &= -\tfrac{1}{3} \mathbf{d}_{1} + \tfrac{1}{3} \mathbf{d}_{2} \\
+\boldsymbol{\phi} &= \boldsymbol{\mu}_{0} + \boldsymbol{\mu}_{0} \times \boldsymbol{\mu}_{1} \\
+\mathbf{p} &= \exp(\tfrac{1}{2} \boldsymbol{\phi}) \\
+\mathbf{e}^{+} &= \mathbf{e} \circ \mathbf{p}
+\end{align*}
+"""
+
+
+def test_stages_are_sums_and_products_of_vectors():
+    assert formulas.as_latex(pipeline.derive("euler", "magnus4", 2)) == MAGNUS.strip()
+    text = formulas.as_latex(pipeline.derive("dcm", "butcher6", 3))
+    assert text.count(" &= ") == 5 + 7 + 6 + 2  # rates at nodes, slopes, points, transition and product
+    assert r"\mathbf{k}_{2} &= \mathbf{x}_{2} [\mathbf{w}_{1/3}]_{\times} \\" in text
+
+
+def test_a_stage_that_differs_in_one_element_is_not_written_as_a_product():
+    kernel = pipeline.derive("euler-product")
+    assert r"&= \mathbf{e} \circ \mathbf{p}" in formulas.as_latex(kernel)
+    (stage,) = kernel.outputs
+    changed = replace(stage, expressions=(-stage.expressions[0], *stage.expressions[1:]))
+    wrong = replace(kernel, outputs=(changed,))
+    assert formulas.as_latex(wrong) == formulas.elements_latex(wrong)
 
 
 @pytest.mark.long

@@ -97,6 +97,12 @@ def test_latex_has_a_second_table_for_columns_that_a_page_does_not_hold():
     assert text.count("name &") == 3 and text.count("a long column 7") == 1
 
 
+def test_latex_has_another_table_for_rows_that_a_page_does_not_hold():
+    text = TextTable([Column("name", "<"), Column("n")], [("x", n) for n in range(100)]).as_latex()
+    assert text.count(r"\begin{tabular}{lr}") == 3 and text.count("name & n") == 3
+    assert all(f"x & {n} " in text for n in range(100))
+
+
 def test_html_says_what_the_cells_say():
     text = TextTable(COLUMNS, [("<b>", 0.5, 1e-12, "")]).as_html("a caption & more")
     assert "&lt;b&gt;" in text and "<b>" not in text and "a caption &amp; more" in text

@@ -11,6 +11,7 @@ import sympy as sp
 from strapgen.ir.program import Program
 from strapgen.lowering.canonical.vector_form import vector_form
 from strapgen.reports.display.latex import equations
+from strapgen.reports.display.stages import stages_latex
 from strapgen.reports.display.vectors import vectors_latex
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
@@ -20,6 +21,8 @@ from strapgen.targets.printer import ExactPrinter
 
 #: Most rows of formulas that are seen at a glance.
 _MOST_ROWS = 12
+#: Most lines of formulas in vectors that are.
+_MOST_LINES = 30
 _PROGRAM_COLUMNS = (Column("name", "<"), Column("value", "<"))
 _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
@@ -130,24 +133,30 @@ def program_as_data(program: Program) -> dict[str, str]:
 def as_latex(kernel: Kernel) -> str:
     """Return a kernel's formulas as one LaTeX align environment, broken at the width of a page.
 
-    A step is in vectors, their scalar and cross products, as its program computes it; any other is written element
-    by element, and so is a step whose vector form would be longer than its stages.
+    A step is in vectors, their scalar and cross products, as its program computes it. Where that would be longer than
+    the stages, these are written, as sums and products of vectors, quaternions (a vector has the scalar part 0) and
+    matrices; what is no such sum is written element by element.
 
     Parameters
     ----------
     kernel : Kernel
     """
-    form = vector_form(kernel)
-    return elements_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
+    return _in_vectors(kernel) or elements_latex(kernel)
 
 
 def short_latex(kernel: Kernel) -> str | None:
     """Return a kernel's formulas as LaTeX if a reader sees them at a glance; None for scalars of half a page."""
+    text = _in_vectors(kernel)
+    if text is None:
+        rows = sum(stage.signal.size for stage in (*kernel.stages, *kernel.outputs))
+        return elements_latex(kernel) if rows <= _MOST_ROWS else None
+    return text if len(text.splitlines()) <= _MOST_LINES else None
+
+
+def _in_vectors(kernel: Kernel) -> str | None:
+    """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
     form = vector_form(kernel)
-    if form is not None:
-        return vectors_latex(form, _state(kernel))
-    rows = sum(stage.signal.size for stage in (*kernel.stages, *kernel.outputs))
-    return elements_latex(kernel) if rows <= _MOST_ROWS else None
+    return stages_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
 
 
 def elements_latex(kernel: Kernel) -> str:

@@ -17,7 +17,9 @@ ANGLE, ERROR, SECONDS = ".3g", ".3e", ".6g"
 #: For each unit of a mean rate the unit that a person reads, and the factor to it.
 READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
 #: The width of a page in characters of a table in LaTeX, and the space between two columns.
-_PAGE, _BETWEEN = 68, 2
+_PAGE, _BETWEEN = 64, 2
+#: Lines of a table in LaTeX that a page holds.
+_HEIGHT = 36
 #: What stands in LaTeX for characters that it reads otherwise, or has not.
 _LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
@@ -140,7 +142,7 @@ class TextTable:
         )
 
     def as_latex(self) -> str:
-        """Return the table as tabular environments: several, with the first column in each, where one is too wide.
+        """Return the table as tabular environments: several where a page is too small, the first column in each.
 
         A column's header has the title of its group before it; powers of ten are written as such.
         """
@@ -152,7 +154,11 @@ class TextTable:
             ]
             for row, cells in zip(self.rows, self._cells(), strict=True)
         ]
-        parts = [self._tabular(part, heads, rows) for part in self._pages([heads, *rows])]
+        parts = [
+            self._tabular(part, heads, some)
+            for part in self._pages([heads, *rows])
+            for some in self._sheets(part, heads, rows)
+        ]
         return "\n\n\\medskip\n".join(parts)
 
     def _pages(self, lines: Sequence[Sequence[str]]) -> list[list[int]]:
@@ -164,6 +170,23 @@ class TextTable:
                 pages.append([0])
             pages[-1].append(k)
         return pages
+
+    def _sheets(
+        self, part: Sequence[int], heads: Sequence[str], rows: Sequence[Sequence[str]]
+    ) -> list[list[Sequence[str]]]:
+        """Return the rows of each environment of some columns, as many as a page holds."""
+        before = sum(max(len(_printed(row[k])) for row in [heads, *rows]) + _BETWEEN for k in part[:-1])
+        room = max(10, _PAGE - before - 8)
+        sheets: list[list[Sequence[str]]] = [[]]
+        height = 0
+        for row in rows:
+            lines = -(-max(1, len(_printed(row[part[-1]]))) // room)
+            if sheets[-1] and height + lines > _HEIGHT:
+                sheets.append([])
+                height = 0
+            sheets[-1].append(row)
+            height += lines
+        return sheets
 
     def _tabular(self, part: Sequence[int], heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         """Return some columns as one environment."""
