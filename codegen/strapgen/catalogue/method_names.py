@@ -122,7 +122,7 @@ class StepVector(NamedTuple):
 
 
 #: Vectors of a step that a method computes.
-VECTORS = {
+_VECTORS = {
     "rotation-vector": StepVector(
         "rotation vector of a step",
         "attitude_step",
@@ -168,4 +168,22 @@ VECTORS = {
         True,
         True,
     ),
+}
+
+#: Functions of `vector_jacobians` that derive the Jacobians of a vector.
+_JACOBIANS = {
+    "rotation-vector": "rotation_vector",
+    "sculling": "sculling",
+    "velocity-position": "velocity_and_position",
+}
+
+#: Vectors of a step that a method computes, and their Jacobians.
+VECTORS = {
+    **_VECTORS,
+    **{
+        f"{name}-jacobian": _VECTORS[name]._replace(
+            title=f"Jacobians of the {_VECTORS[name].title}", module="vector_jacobians", function=function
+        )
+        for name, function in _JACOBIANS.items()
+    },
 }

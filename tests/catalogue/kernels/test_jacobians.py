@@ -146,3 +146,41 @@ def test_the_left_noise_takes_velocity_increments_to_their_change(method, rng):
     )
     turns, pushes = rng.normal(size=(2, 2, 3)) * 0.05
     np.testing.assert_allclose(matrices(turns)[2] @ pushes.ravel(), change(turns, pushes)[0], atol=1e-15)
+
+
+#: Vectors of a step with a method and its samples.
+VECTORS = {
+    "rotation-vector": ("coning-combined", 2, 1),
+    "sculling": ("coning-compressed", 3, 0),
+    "velocity-position": ("magnus4", 2, 0),
+}
+
+
+@each("name", VECTORS)
+def test_jacobians_of_vectors_are_the_limits_of_differences(name, rng):
+    method, increments, previous = VECTORS[name]
+    options = (method, increments, False, previous)
+    vector = kernel(choose(name, *options))
+    evaluate = strapgen.evaluator(choose(f"{name}-jacobian", *options))
+    inputs = [rng.normal(size=signal.shape) * 0.1 for signal in evaluate.function.inputs]
+    computed = evaluate(*inputs)
+    computed = computed if isinstance(computed, tuple) else (computed,)
+    elements = [element for signal in vector.inputs for element in signal.elements]
+    apart = mpmath.mpf(10) ** -12
+    with mpmath.workdps(60):
+        here = dict(zip(elements, map(mpmath.mpf, np.concatenate([i.ravel() for i in inputs])), strict=True))
+
+        def at(values):
+            return vector.expand(values, lambda number: mpmath.mpf(number.p) / number.q)
+
+        found = iter(computed)
+        for signal in vector.inputs:
+            ends = [[at(here | {e: here[e] + sign * apart}) for sign in (1, -1)] for e in signal.elements]
+            for stage in vector.outputs:
+                output = stage.signal.name
+                columns = [
+                    [(a - b) / (2 * apart) for a, b in zip(high[output], low[output], strict=True)]
+                    for high, low in ends
+                ]
+                expected = np.array(columns, float).T
+                assert np.abs(next(found) - expected).max() <= 1e-12 * np.abs(expected).max()
