@@ -21,6 +21,7 @@ from strapgen.backends.increments import windows
 from strapgen.simulation.rate_profiles import PROFILES, RateProfile
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
@@ -89,6 +90,8 @@ class Motion:
 
     name: str
     parameters: dict[str, float]
+
+    __repr__ = short_repr
 
     def increments(
         self, step: Fraction, steps: int, samples: int, previous: int = 0, ahead: int = 0

@@ -43,4 +43,4 @@ def tableau(
     else:
         butcher = tableaux.TABLEAUX[checks.choice("method", method, tableaux.TABLEAUX)]
         tableaux.verify(butcher)
-    output.report(tableau_report(tableau_data(butcher)))
+    output.report(tableau_report(tableau_data(butcher), butcher))
