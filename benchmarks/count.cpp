@@ -46,6 +46,8 @@ inline Counted cos(Counted a) { return ::cos(a); }
 inline Counted pow(Counted a, Counted n) { return ::pow(a, int(n.value)); }
 }
 
+/* Runs work in vectors, which only numbers of the processor have. */
+#define COUNTED
 #define double Counted
 #include "step.inc"
 #undef double
