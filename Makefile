@@ -63,7 +63,8 @@ FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64
   picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck cmake
 
 EXAMINERS := frama-c-base gappa clang-tidy simavr valgrind qemu-user gcc-powerpc-linux-gnu \
-  libc6-dev-powerpc-cross gcc-i686-linux-gnu libc6-dev-i386-cross afl++ libclang-rt-14-dev coq libcoq-flocq libcoq-gappa
+  libc6-dev-powerpc-cross gcc-i686-linux-gnu libc6-dev-i386-cross afl++ libclang-rt-14-dev coq libcoq-flocq libcoq-gappa \
+  texlive-latex-base
 
 firmware-tools:
 	apt-get update -qq
