@@ -50,6 +50,19 @@ class Step:
     nodes: tuple[Number, ...] | None
     lowest: int = 0
 
+    @property
+    def increments_per_step(self) -> int:
+        """Number of increments of the step itself."""
+        beside = self.kernel.companions.beside if self.kernel.companions else 0
+        return int(self.kernel.inputs[1].shape[0]) - beside
+
+    @property
+    def intervals(self) -> range:
+        """Numbers of the sampling intervals that it takes: 0 is the first of the step, -1 the one before it."""
+        step_kernels = self.kernel.companions
+        assert step_kernels is not None, "checked by `step`"
+        return range(-step_kernels.previous, self.increments_per_step + step_kernels.ahead)
+
     def shown(self, number: Fraction) -> Fraction:
         """Return a coefficient of the error, rounded to the digits that the coefficients of the method support."""
         if not self.lowest:
@@ -150,12 +163,8 @@ def errors(attitude_step: Step, ring: Any, rate: Rate, top: int) -> dict[str, li
         "error", nine elements row by row, "scale", "skew" and "drift", three each: the outputs of the kernel
         error-matrix.
     """
-    both = (computed_matrix(attitude_step, ring, rate, top), true_matrix(ring, rate, top))
-    split = _error_matrix()
-    values: dict[str, Any] = {}
-    for signal, elements in zip(split.inputs, both, strict=True):
-        values |= zip(signal.elements, elements, strict=True)
-    parts: dict[str, list[Powers]] = split.expand(values, lambda value: constant(ring, value, top))
+    computed, true = computed_matrix(attitude_step, ring, rate, top), true_matrix(ring, rate, top)
+    parts = parts_of_error(computed, true, ring, top)
     if attitude_step.lowest:
         parts = {
             name: [
@@ -164,6 +173,18 @@ def errors(attitude_step: Step, ring: Any, rate: Rate, top: int) -> dict[str, li
             ]
             for name, elements in parts.items()
         }
+    return parts
+
+
+def parts_of_error(
+    computed: Sequence[Powers], true: Sequence[Powers], ring: Any, top: int
+) -> dict[str, list[Powers]]:
+    """Return the error matrix of a computed matrix, and its parts, as `errors` does."""
+    split = _error_matrix()
+    values: dict[str, Any] = {}
+    for signal, elements in zip(split.inputs, (computed, true), strict=True):
+        values |= zip(signal.elements, elements, strict=True)
+    parts: dict[str, list[Powers]] = split.expand(values, lambda value: constant(ring, value, top))
     return parts
 
 
@@ -222,6 +243,15 @@ def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list
     list of Powers
         The elements of the state, row-major.
     """
+    if attitude_step.nodes is None:
+        sampled = increments(ring, rate, attitude_step.increments_per_step, attitude_step.intervals, top)
+    else:
+        sampled = turns(ring, rate, attitude_step.nodes, top)
+    return state_of(attitude_step, sampled, ring, top)
+
+
+def state_of(attitude_step: Step, sampled: Sequence[Powers], ring: Any, top: int) -> list[Powers]:
+    """Return the state after one step from zero rotation, row by row, for samples that are series."""
     kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
     assert step_kernels is not None, "checked by `step`"
     state, samples = kernel.inputs
@@ -229,34 +259,20 @@ def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list
         name: constant(ring, sp.Rational(x.numerator, x.denominator), top)
         for name, x in zip(state.elements, step_kernels.identity, strict=True)
     }
-    if attitude_step.nodes is None:
-        first, count = -step_kernels.previous, samples.shape[0] - step_kernels.beside
-        sampled = increments(ring, rate, count, range(first, count + step_kernels.ahead), top)
-    else:
-        sampled = turns(ring, rate, attitude_step.nodes, top)
     values |= dict(zip(samples.elements, sampled, strict=True))
     return _evaluated(kernel, values, ring, top)
 
 
 def computed_matrix(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
-    """Return the direction cosine matrix after one step from zero rotation, row by row.
+    """Return the direction cosine matrix after one step from zero rotation, body to reference axes, row by row.
 
-    Parameters
-    ----------
-    attitude_step : Step
-    ring : PolyRing
-        Ring of the coefficients, over the field of the step.
-    rate : sequence of sequence of ring element
-        The rate in rad/s and its derivatives at the beginning of the step.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    list of Powers
-        Nine elements, body to reference axes.
+    Parameters are those of `computed_state`.
     """
-    elements = computed_state(attitude_step, ring, rate, top)
+    return matrix_of(attitude_step, computed_state(attitude_step, ring, rate, top), ring, top)
+
+
+def matrix_of(attitude_step: Step, elements: list[Powers], ring: Any, top: int) -> list[Powers]:
+    """Return the direction cosine matrix of a state, row by row."""
     step_kernels = attitude_step.kernel.companions
     if step_kernels is None or step_kernels.attitude is None:
         return elements

@@ -24,15 +24,14 @@ from functools import cache, lru_cache
 from itertools import combinations_with_replacement, groupby, product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from strapgen.catalogue.methods.derivative_words import Word, word_coefficient, words
+
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
     from strapgen.catalogue.methods.tableau import Tableau
 
 #: A rooted tree as the tuple of the subtrees of its root, in a fixed order.
 Tree: TypeAlias = "tuple[Tree, ...]"
-
-#: A product of derivatives of A(t), as the tuple of the orders of the derivatives, the last in time first.
-Word: TypeAlias = tuple[int, ...]
 
 
 # Trees
@@ -124,85 +123,60 @@ def weight_text(tree: Tree) -> str:
     return " ".join(["sum", f"b_{root}", *factors(tree, root)])
 
 
-# Words
-
-
-def words(order: int, derivatives: int | None = None) -> list[Word]:
-    """Return the products of derivatives of A(t) of an order, without derivatives above `derivatives` if it is set.
-
-    Parameters
-    ----------
-    order : int
-    derivatives : int, optional
-        Highest derivative.
-
-    Returns
-    -------
-    list of Word
-        The shortest first.
-
-    Examples
-    --------
-    >>> words(3)
-    [(2,), (1, 0), (0, 1), (0, 0, 0)]
-    >>> words(3, derivatives=0)
-    [(0, 0, 0)]
-    """
-    if order == 0:
-        return [()]
-    highest = order - 1 if derivatives is None else min(derivatives, order - 1)
-    products = [(k, *rest) for k in range(highest, -1, -1) for rest in words(order - 1 - k, derivatives)]
-    return sorted(products, key=len)
-
-
-def word_coefficient(word: Word) -> Fraction:
-    """Return the coefficient of a word in the exact solution, times the factorials of its derivatives.
-
-    Examples
-    --------
-    >>> word_coefficient((0, 1))  # int_0^1 int_0^s t dt ds
-    Fraction(1, 6)
-    """
-    return Fraction(1, math.prod(sum(k + 1 for k in word[place:]) for place in range(len(word))))
-
-
 # Tableaux
 
 
-class _Stages:
-    """The coefficients of a tableau in the smallest field that holds them, and vectors with one element per stage.
+class Stages:
+    """The coefficients of a tableau in a ring or field that holds them, and vectors with one element per stage.
 
-    Arithmetic is exact in fractions or in an algebraic field, so that a zero is recognized.
+    Arithmetic is exact, so that a zero is recognized.
+
+    Parameters
+    ----------
+    rows : sequence of sequence
+        The nodes, the weights, and the rows of the matrix below the diagonal.
+    rational, number : callable
+        Convert a fraction to an element, and an element to a number.
     """
 
-    def __init__(self, tableau: Tableau) -> None:
-        rows = [tableau.nodes, tableau.weights, *tableau.matrix]
-        if tableau.rational:
-            self.rational: Callable[[Fraction], Any] = Fraction
-            self.number: Callable[[Any], Number] = Fraction
-            converted: Sequence[Sequence[Any]] = rows
-        else:
-            import sympy as sp
-            from sympy.polys.constructor import construct_domain
-
-            values = [sp.sympify(value) for row in rows for value in row]
-            domain, elements = construct_domain(values, extension=True, field=True)
-            rest_of_elements = iter(elements)
-            converted = [[next(rest_of_elements) for _ in row] for row in rows]
-            self.rational = lambda value: domain.from_sympy(sp.Rational(value.numerator, value.denominator))
-            self.number = domain.to_sympy
-        self.nodes, self.weights, *self.matrix = converted
+    def __init__(
+        self,
+        rows: Sequence[Sequence[Any]],
+        rational: Callable[[Fraction], Any] = Fraction,
+        number: Callable[[Any], Any] = Fraction,
+    ) -> None:
+        self.rational, self.number = rational, number
+        self.nodes, self.weights, *self.matrix = rows
         self.zero, one = self.rational(Fraction(0)), self.rational(Fraction(1))
         self.ones = [one] * len(self.nodes)
         self.trees: dict[Tree, list[Any]] = {(): self.ones}
         self.branches: dict[Tree, list[Any]] = {(): [*self.nodes]}
         self.words: dict[Word, list[Any]] = {(): self.ones}
 
+    @classmethod
+    def of(cls, tableau: Tableau) -> Stages:
+        """Return the coefficients of a tableau as fractions, or in the smallest algebraic field that holds them."""
+        rows = [tableau.nodes, tableau.weights, *tableau.matrix]
+        if tableau.rational:
+            return cls(rows)
+        import sympy as sp
+        from sympy.polys.constructor import construct_domain
+
+        values = [sp.sympify(value) for row in rows for value in row]
+        domain, elements = construct_domain(values, extension=True, field=True)
+        rest_of_elements = iter(elements)
+        return cls(
+            [[next(rest_of_elements) for _ in row] for row in rows],
+            lambda value: domain.from_sympy(sp.Rational(value.numerator, value.denominator)),
+            domain.to_sympy,
+        )
+
     def applied(self, vector: list[Any]) -> list[Any]:
         """Return the matrix of the tableau times a vector."""
         return [self.sum(row, vector[: len(row)]) for row in self.matrix]
 
     def sum(self, left: Sequence[Any], right: Sequence[Any]) -> Any:
+        """Return the scalar product of two vectors."""
         return sum((x * y for x, y in zip(left, right, strict=True) if x and y), self.zero)
 
     def tree(self, tree: Tree) -> list[Any]:
@@ -234,16 +208,23 @@ class _Stages:
         """Return b' times a vector, minus the exact value."""
         return self.sum(self.weights, vector) - self.rational(exact)
 
+    def row_residuals(self) -> list[Any]:
+        """Return for every stage the sum of its row minus its node."""
+        sums = self.applied(self.ones)
+        return [total - node for total, node in zip(sums, self.nodes, strict=True)]
+
     def tree_residual(self, tree: Tree) -> Any:
+        """Return the elementary weight of a tree minus 1/gamma."""
         return self.residual(self.tree(tree), Fraction(1, density(tree)))
 
     def word_residual(self, word: Word) -> Any:
+        """Return the weight of a word minus its coefficient in the exact solution."""
         return self.residual(self.word(word), word_coefficient(word))
 
 
 @lru_cache(maxsize=32)
-def _stages(tableau: Tableau) -> _Stages:
-    return _Stages(tableau)
+def _stages(tableau: Tableau) -> Stages:
+    return Stages.of(tableau)
 
 
 def _holds(tableau: Tableau, defect: Any) -> bool:
@@ -256,8 +237,7 @@ def _holds(tableau: Tableau, defect: Any) -> bool:
 def row_residuals(tableau: Tableau) -> list[Number]:
     """Return for every stage the sum of its row minus its node."""
     stages = _stages(tableau)
-    sums = stages.applied(stages.ones)
-    return [stages.number(total - node) for total, node in zip(sums, stages.nodes, strict=True)]
+    return [stages.number(defect) for defect in stages.row_residuals()]
 
 
 def residuals(tableau: Tableau, order: int) -> list[tuple[Tree, Number]]:

@@ -108,17 +108,25 @@ def read(path: str | Path) -> Tableau:
     """
     data = toml_files.content(path, "a tableau", MOST_BYTES)
     try:
-        _check_keys(data)
-        name = coefficient_files.slug(data["name"])
-        if name in TABLEAUX:
-            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
-        tableau = replace(_tableau(data, name), file=checks.text("the name of the file", str(path)))
-        verify(tableau)
-        # A file may state less than the actual order.
-        tableau = replace(tableau, order=order_conditions.order(tableau, MOST_ORDER, known=tableau.order))
+        if "unknowns" in data:
+            raise InputError(
+                "its coefficients hold unknowns; strapgen tableau solves for them, and --set sets them"
+            )
+        return from_data(data, checks.text("the name of the file", str(path)))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return tableau
+
+
+def from_data(data: Mapping[str, Any], file: str = "") -> Tableau:
+    """Return the tableau of a file's content, checked; errors are those of `read`."""
+    _check_keys(data)
+    name = coefficient_files.slug(data["name"])
+    if name in TABLEAUX:
+        raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
+    tableau = replace(_tableau(data, name), file=file)
+    verify(tableau)
+    # A file may state less than the actual order.
+    return replace(tableau, order=order_conditions.order(tableau, MOST_ORDER, known=tableau.order))
 
 
 def _check_keys(data: Mapping[str, Any]) -> None:
@@ -135,8 +143,34 @@ def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
     """Return a tableau from the content of a file with all keys, after a check of its numbers and its shape."""
     nodes = _numbers("nodes", entries("nodes", data["nodes"]))
     stages = len(nodes)
-    if not 1 <= stages <= MOST_STAGES:
-        raise InputError(f"nodes has {stages} entries; from 1 to {MOST_STAGES} are allowed")
+    check_shape(data, stages)
+    embedded = data.get("embedded_weights")
+    tableau = Tableau(
+        name,
+        data["name"],
+        data["source"],
+        data["order"],
+        nodes,
+        tuple(_numbers(f"matrix row {number}", row) for number, row in enumerate(data["matrix"], 1)),
+        _numbers("weights", data["weights"]),
+        None if embedded is None else _numbers("embedded_weights", embedded),
+        _tolerance(data.get("tolerance", 0)),
+    )
+    if not tableau.rational:
+        _check_roots(tableau)
+    return tableau
+
+
+def check_shape(data: Mapping[str, Any], stages: int, most: int = MOST_STAGES) -> None:
+    """Check that the matrix and the weights of a file go with its number of stages.
+
+    Raises
+    ------
+    InputError
+        If they do not, or there are too many stages.
+    """
+    if not 1 <= stages <= most:
+        raise InputError(f"nodes has {stages} entries; from 1 to {most} are allowed")
     rows = entries("matrix", data["matrix"])
     if len(rows) != stages:
         raise InputError(f"matrix has {counted(len(rows), 'row')}; as many as nodes are needed: {stages}")
@@ -148,34 +182,16 @@ def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
                 f"matrix row {number} has {counted(length, 'entry', 'entries')}: "
                 f"{why}{needed(number - 1)}, left of the diagonal"
             )
-    embedded = data.get("embedded_weights")
-    tableau = Tableau(
-        name,
-        data["name"],
-        data["source"],
-        data["order"],
-        nodes,
-        tuple(_numbers(f"matrix row {number}", row) for number, row in enumerate(rows, 1)),
-        _weights("weights", data["weights"], stages),
-        None if embedded is None else _weights("embedded_weights", embedded, stages),
-        _tolerance(data.get("tolerance", 0)),
-    )
-    if not tableau.rational:
-        _check_roots(tableau)
-    return tableau
+    for what in ("weights", "embedded_weights"):
+        weights = entries(what, data.get(what, [None] * stages))
+        if len(weights) != stages:
+            raise InputError(
+                f"{what} has {counted(len(weights), 'entry', 'entries')}; as many as nodes are needed: {stages}"
+            )
 
 
 def _numbers(what: str, values: list[Any]) -> tuple[Number, ...]:
     return tuple(coefficients.number(f"{what}, entry {k}", value) for k, value in enumerate(values, 1))
-
-
-def _weights(what: str, value: Any, stages: int) -> tuple[Number, ...]:
-    weights = _numbers(what, entries(what, value))
-    if len(weights) != stages:
-        raise InputError(
-            f"{what} has {counted(len(weights), 'entry', 'entries')}; as many as nodes are needed: {stages}"
-        )
-    return weights
 
 
 def _tolerance(value: Any) -> Fraction:

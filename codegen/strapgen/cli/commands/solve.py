@@ -1,0 +1,117 @@
+"""The command ``strapgen solve`` states the conditions on unknown coefficients and solves them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import typer
+
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import MethodOptions, listed, option
+from strapgen.cli.output import Output, format_option
+from strapgen.cli.progress import waiting
+from strapgen.cli.sample_source import pairs
+from strapgen.support import checks
+from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.analysis.conditions import Demand
+
+_Text = str | None
+
+
+@dataclass(frozen=True)
+class SolutionOutput(Output):
+    """Where the families go, and in which format."""
+
+    format: Annotated[_Text, format_option(("text", "json"))] = "text"
+    formats: ClassVar[tuple[str, ...]] = ("text", "json")
+
+
+@grouped
+def solve(
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="A Python file with an algorithm of your own that has unknowns.",
+            show_default=False,
+        ),
+    ],
+    *,
+    order: Annotated[
+        str,
+        option(
+            "--order",
+            metavar="N",
+            help="Order that the step is to have: its error vanishes up to h^N.",
+            panel="Input",
+        ),
+    ],
+    on: Annotated[
+        str,
+        option(
+            "--on",
+            metavar="MOTION=N,...",
+            help="Motions on which it is to have the order N, without =N that of --order: general (any smooth rate); "
+            "polynomial, of the degree that the increments determine; coning. The last two hold to products of two "
+            "rates.",
+            panel="Input",
+        ),
+    ] = "general",
+    settings: Annotated[
+        list[str] | None,
+        option(
+            "--set",
+            metavar="KEY=VALUE...",
+            help="Value of a free parameter; shows the member of the family that has it.",
+            panel="Input",
+        ),
+    ] = None,
+    family: Annotated[
+        str, option("--family", metavar="N", help="Number of the family for --set.", panel="Input")
+    ] = "1",
+    method: Annotated[MethodOptions, Shown(only=("method", "tableau", "increments", "previous", "ahead"))],
+    output: Annotated[SolutionOutput, Shown(only=("out", "format"))],
+) -> None:
+    """Solve the conditions on the unknown coefficients of an algorithm.
+
+    An algorithm declares them with KernelBuilder.parameter. You see the conditions, every family of coefficients that
+    satisfies them, with its free parameters, and the leading error that it leaves. Linear conditions are solved
+    exactly, polynomial ones by elimination and Groebner bases within stated limits. If there is no solution, the answer
+    says why.
+
+    Example: strapgen solve examples/three_samples.py --order 5 --on polynomial
+
+    Example: strapgen solve examples/three_samples.py --order 4 --set a=57/80
+    """
+    output.check(algorithm, *method.files)
+    demands = _demands(on, checks.whole("--order", order))
+    choice = method.choose(algorithm)
+    from strapgen.analysis import solving
+    from strapgen.reports.error_analysis.unknowns import solved_report
+
+    with waiting(f"solving the conditions of {algorithm}"):
+        solved = solving.solve(choice, demands)
+    chosen = None
+    if settings:
+        if not solved.families:
+            raise InputError(f"--set: {solved.solution.reason}; there is no solution")
+        number = checks.count("family", checks.whole("--family", family), largest=len(solved.families))
+        chosen = solved.values(pairs(settings), number - 1)
+    output.report(solved_report(solved, chosen))
+
+
+def _demands(on: str, order: int) -> list[Demand]:
+    """Return the motions of the option --on, each with its order."""
+    from strapgen.analysis.conditions import Demand
+
+    demands = []
+    for text in listed("--on", on):
+        name, equals, number = text.partition("=")
+        demands.append(Demand(name, checks.whole("--on", number) if equals else order))
+    names = [demand.motion for demand in demands]
+    if repeated := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"--on has {repeated} twice; one order is needed")
+    return demands
