@@ -12,6 +12,7 @@ from strapgen.support.version import VERSION as __version__  # noqa: N811
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
     from strapgen import vibration as vibration
+    from strapgen.analysis import unknowns as unknowns
     from strapgen.backends import Backend as Backend
     from strapgen.backends import Evaluator as Evaluator
     from strapgen.backends import backend as backend
@@ -239,6 +240,7 @@ _NAMESPACES = {
     "sensors": "simulation.sensor_errors",
     "study": "experiments.word_length",
     "tableaux": "catalogue.methods.tableaux",
+    "unknowns": "analysis.unknowns",
     "vibration": "vibration",
     "window_design": "design.family",
     "windows": "catalogue.methods.windows",

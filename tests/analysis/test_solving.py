@@ -26,8 +26,8 @@ PAIRS = str(ROOT / "tests" / "data" / "algorithms" / "pairs.py")
 MILLER = {"a": sp.Rational(57, 80), "b": sp.Rational(33, 80)}
 
 
-def solved_pairs(increments: int, previous: int, *demands: Demand) -> SolvedStep:
-    return solve(strapgen.choose(PAIRS, increments=increments, previous=previous), demands)
+def solved_pairs(increments: int, previous: int, **orders: int) -> SolvedStep:
+    return solve(strapgen.choose(PAIRS, increments=increments, previous=previous), orders)
 
 
 def as_values(pairs: dict[tuple[int, int], Fraction]) -> dict[str, sp.Rational]:
@@ -36,24 +36,24 @@ def as_values(pairs: dict[tuple[int, int], Fraction]) -> dict[str, sp.Rational]:
 
 def test_the_three_sample_coefficients_for_a_polynomial_rate():
     """R. B. Miller, J. Guid. Control Dyn. 6 (1983) 287-291."""
-    solved = solve(strapgen.choose(EXAMPLE), [Demand("polynomial", 5)])
+    solved = solve(strapgen.choose(EXAMPLE), {"polynomial": 5})
     assert len(solved.families) == 1
     assert solved.values() == MILLER
 
 
 def test_the_three_sample_coefficients_for_coning():
     """The same paper: 9/20 of the first with the last sample, and 27/40 of neighbours."""
-    solved = solve(strapgen.choose(EXAMPLE), [Demand("coning", 6)])
+    solved = solve(strapgen.choose(EXAMPLE), {"coning": 6})
     assert solved.values() == {"a": sp.Rational(27, 40), "b": sp.Rational(9, 20)}
 
 
 def test_the_two_sample_coefficient(tmp_path):
-    solved = solved_pairs(2, 0, Demand("general", 4))
+    solved = solved_pairs(2, 0, general=4)
     assert solved.values() == {"k_0_1": sp.Rational(2, 3)}
 
 
 def test_a_family_of_fourth_order_has_the_order_that_the_series_shows():
-    solved = solve(strapgen.choose(EXAMPLE), [Demand("general", 4)])
+    solved = solve(strapgen.choose(EXAMPLE), {"general": 4})
     (family,) = solved.families
     assert [symbol.name for symbol in family.free] == ["a"]
     for value in (0, Fraction(-7, 3)):
@@ -65,7 +65,7 @@ def test_a_family_of_fourth_order_has_the_order_that_the_series_shows():
 
 
 def test_the_leading_error_is_the_next_power_and_the_least_of_it_is_a_minimum():
-    solved = solve(strapgen.choose(EXAMPLE), [Demand("general", 4)])
+    solved = solve(strapgen.choose(EXAMPLE), {"general": 4})
     ((leading,),) = solved.leading
     assert leading.power == 5
     a = sp.Symbol("a", real=True)
@@ -82,7 +82,7 @@ def test_the_leading_error_is_the_next_power_and_the_least_of_it_is_a_minimum():
 @pytest.mark.parametrize(("increments", "previous"), [(3, 0), (4, 0), (1, 2), (2, 1)])
 def test_uncompressed_coefficients_are_those_of_the_catalogue(increments, previous):
     samples = increments + previous
-    solved = solved_pairs(increments, previous, Demand("polynomial", 2 * samples - 1))
+    solved = solved_pairs(increments, previous, polynomial=2 * samples - 1)
     design = coning_coefficients.design(increments, previous, "uncompressed")
     assert solved.values() == as_values(design.pairs)
 
@@ -91,19 +91,19 @@ def test_uncompressed_coefficients_are_those_of_the_catalogue(increments, previo
 def test_compressed_coefficients_are_those_of_the_catalogue(increments, previous):
     samples = increments + previous
     design = coning_coefficients.design(increments, previous, "compressed")
-    solved = solved_pairs(increments, previous, Demand("coning", 2 * samples))
+    solved = solved_pairs(increments, previous, coning=2 * samples)
     (family,) = solved.families
     unused = {symbol.name: 0 for symbol in family.free}
     assert all(int(name.split("_")[-1]) < samples - 1 for name in unused)
     values = {name: value for name, value in solved.values(unused).items() if value}
     assert values == as_values({pair: c for pair, c in design.pairs.items() if c})
     # No coefficients reach the next power.
-    assert solved_pairs(increments, previous, Demand("coning", 2 * samples + 2)).families == ()
+    assert solved_pairs(increments, previous, coning=2 * samples + 2).families == ()
 
 
 def test_combined_coefficients_are_a_member_of_the_family_of_both():
     design = coning_coefficients.design(4, 0, "combined")
-    solved = solved_pairs(4, 0, Demand("coning", 8), Demand("polynomial", 5))
+    solved = solved_pairs(4, 0, coning=8, polynomial=5)
     (family,) = solved.families
     values = as_values(design.pairs)
     free = {symbol.name: values[symbol.name] for symbol in family.free}
@@ -175,6 +175,6 @@ def test_bad_input_gets_one_line(line, reason, capsys):
 
 
 def test_values_that_the_family_excludes_are_refused():
-    solved = solve(strapgen.choose(EXAMPLE), [Demand("general", 4)])
+    solved = solve(strapgen.choose(EXAMPLE), {"general": 4})
     with pytest.raises(InputError, match="there is no number 1"):
         solved.values({}, family=1)

@@ -103,22 +103,23 @@ class SolvedStep:
         Examples
         --------
         >>> from strapgen import choose
-        >>> solved = solve(choose("examples/three_samples.py"), [Demand("coning", 6)])
+        >>> solved = solve(choose("examples/three_samples.py"), {"coning": 6})
         >>> solved.values(), solved.substitute().unknowns
         ({'a': 27/40, 'b': 9/20}, ())
         """
         return self.kernel.substitute(self.values(parameters, family))
 
 
-def solve(choice: Choice, demands: Sequence[Demand]) -> SolvedStep:
+def solve(choice: Choice, order: int | Mapping[str, int]) -> SolvedStep:
     """State the conditions on the unknowns of a step, and solve them exactly.
 
     Parameters
     ----------
     choice : Choice
         An attitude step with unknowns.
-    demands : sequence of Demand
-        Motions and orders; all conditions have to hold together.
+    order : int or mapping of str to int
+        Order on a general motion, or orders by motion: "general" (any smooth rate), "polynomial", of the degree that
+        the increments determine, and "coning", the last two to products of two rates. All conditions have to hold.
 
     Returns
     -------
@@ -127,8 +128,18 @@ def solve(choice: Choice, demands: Sequence[Demand]) -> SolvedStep:
     Raises
     ------
     InputError
-        If the step has no unknowns, a condition cannot be stated, or they are beyond the limits of `elimination`.
+        If a motion or an order is not allowed, the step has no unknowns, a condition cannot be stated, or they are
+        beyond the limits of `elimination`.
+
+    Examples
+    --------
+    >>> from strapgen import choose
+    >>> solved = solve(choose("examples/three_samples.py"), {"polynomial": 5})
+    >>> solved.values()
+    {'a': 57/80, 'b': 33/80}
     """
+    orders = order if isinstance(order, Mapping) else {"general": order}
+    demands = [Demand(motion, each) for motion, each in orders.items()]
     attitude_step = one_step.step(choice)
     kernel = attitude_step.kernel
     if not kernel.unknowns:

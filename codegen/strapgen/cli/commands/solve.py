@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import typer
 
@@ -14,9 +14,6 @@ from strapgen.cli.progress import waiting
 from strapgen.cli.sample_source import pairs
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
-
-if TYPE_CHECKING:
-    from strapgen.analysis.conditions import Demand
 
 _Text = str | None
 
@@ -87,13 +84,13 @@ def solve(
     Example: strapgen solve examples/three_samples.py --order 4 --set a=57/80
     """
     output.check(algorithm, *method.files)
-    demands = _demands(on, checks.whole("--order", order))
+    orders = _orders(on, checks.whole("--order", order))
     choice = method.choose(algorithm)
     from strapgen.analysis import solving
     from strapgen.reports.error_analysis.unknowns import solved_report
 
     with waiting(f"solving the conditions of {algorithm}"):
-        solved = solving.solve(choice, demands)
+        solved = solving.solve(choice, orders)
     chosen = None
     if settings:
         if not solved.families:
@@ -103,15 +100,12 @@ def solve(
     output.report(solved_report(solved, chosen))
 
 
-def _demands(on: str, order: int) -> list[Demand]:
+def _orders(on: str, order: int) -> dict[str, int]:
     """Return the motions of the option --on, each with its order."""
-    from strapgen.analysis.conditions import Demand
-
-    demands = []
+    orders: dict[str, int] = {}
     for text in listed("--on", on):
         name, equals, number = text.partition("=")
-        demands.append(Demand(name, checks.whole("--on", number) if equals else order))
-    names = [demand.motion for demand in demands]
-    if repeated := next((name for name in names if names.count(name) > 1), None):
-        raise InputError(f"--on has {repeated} twice; one order is needed")
-    return demands
+        if name in orders:
+            raise InputError(f"--on has {name} twice; one order is needed")
+        orders[name] = checks.whole("--on", number) if equals else order
+    return orders
