@@ -213,7 +213,7 @@ BAD = {
     # tableau
     "tableau": "Missing argument",
     "tableau rk9": "method 'rk9' is not known (did you mean rk1, rk2 or rk3?); allowed: rk1, rk2, midpoint, ",
-    "tableau rk4 --format html": "format 'html' is not known (did you mean toml?); allowed: text, json, csv, markdown, ",
+    "tableau rk4 --format html": "format 'html' is not known (did you mean toml?); allowed: text, json, csv, markdown",
     "tableau none.toml": "none.toml cannot be read (No such file or directory)",
     "tableau ./file": "./file is not TOML (",
     "tableau .toml": ".toml cannot be read (No such file or directory)",
