@@ -15,7 +15,7 @@ help:
 	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
 	@echo "make test-modules  list anew which kernels the tests compile"
-	@echo "make mutants   put 370 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
+	@echo "make mutants   put 378 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
 	@echo "make check     generated code in step, ruff, mypy"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
@@ -63,7 +63,8 @@ FIRMWARE := gcc-arm-none-eabi picolibc-arm-none-eabi qemu-system-arm gcc-riscv64
   picolibc-riscv64-unknown-elf qemu-system-misc gcc-avr avr-libc clang cppcheck cmake
 
 EXAMINERS := frama-c-base gappa clang-tidy simavr valgrind qemu-user gcc-powerpc-linux-gnu \
-  libc6-dev-powerpc-cross gcc-i686-linux-gnu libc6-dev-i386-cross afl++ libclang-rt-14-dev coq libcoq-flocq libcoq-gappa
+  libc6-dev-powerpc-cross gcc-i686-linux-gnu libc6-dev-i386-cross afl++ libclang-rt-14-dev coq libcoq-flocq libcoq-gappa \
+  texlive-latex-base
 
 firmware-tools:
 	apt-get update -qq

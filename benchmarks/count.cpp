@@ -32,18 +32,33 @@ inline Counted operator-(Counted a)
     Counted::negate += !a.constant;
     return Counted(-a.value, a.constant);
 }
-inline Counted pow(Counted a, int n) { return n == 2 ? a * a : n == 3 ? a * a * a : a * a * (a * a); }
+inline Counted pow(Counted a, int n)
+{
+    return n < 0 ? Counted(1.0) / pow(a, -n) : n == 1 ? a : n == 2 ? a * a : n == 3 ? a * a * a : n == 4 ? a * a * (a * a) : a * pow(a, n - 1);
+}
+inline Counted sqrt(Counted a) { return Counted(std::sqrt(a.value), a.constant); }
+inline Counted sin(Counted a) { return Counted(std::sin(a.value), a.constant); }
+inline Counted cos(Counted a) { return Counted(std::cos(a.value), a.constant); }
 namespace std {
+inline Counted sqrt(Counted a) { return ::sqrt(a); }
+inline Counted sin(Counted a) { return ::sin(a); }
+inline Counted cos(Counted a) { return ::cos(a); }
 inline Counted pow(Counted a, Counted n) { return ::pow(a, int(n.value)); }
 }
 
+/* Runs work in vectors, which only numbers of the processor have. */
+#define COUNTED
 #define double Counted
 #include "step.inc"
 #undef double
 
+#ifndef OUTPUTS
+#define OUTPUTS STATE
+#endif
+
 int main()
 {
-    Counted state[STATE], samples[SAMPLES], next[STATE];
+    Counted state[STATE], samples[SAMPLES], next[OUTPUTS];
     for (int k = 0; k < STATE; ++k)
         state[k] = Counted(1.0 / (k + 2), false);
     for (int k = 0; k < SAMPLES; ++k)

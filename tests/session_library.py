@@ -22,9 +22,9 @@ from typing import Any
 import pytest
 
 from strapgen.catalogue import Choice, choose
-from strapgen.catalogue.method_names import METHODS, VECTORS
+from strapgen.catalogue.method_names import ALGORITHMS, METHODS, VECTORS
 from strapgen.catalogue.methods.windows import named_window
-from strapgen.catalogue.names import ALGORITHMS, KERNELS
+from strapgen.catalogue.names import KERNELS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources

@@ -13,12 +13,13 @@ from generators import Case
 LANGUAGE = "c"
 
 _ADAPTOR = """#include "{name}.c"
-#include "{name}_runs.c"
-#define HAS_LOOPS
 static inline void step(const double *state, const double *samples, double *next)
 {{
     {name}(state, samples, next);
 }}
+#ifndef COUNTED
+#include "{name}_runs.c"
+#define HAS_LOOPS
 static inline void loop(size_t steps, const double *samples, const double *state, double *history)
 {{
     {name}_propagate(1, steps, steps, 0, 0, state, samples, history);
@@ -27,6 +28,7 @@ static inline void batch(size_t runs, const double *states, const double *sample
 {{
     {name}_batch(runs, states, samples, next);
 }}
+#endif
 """
 
 

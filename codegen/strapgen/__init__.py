@@ -46,7 +46,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
     from strapgen.design import family as _family
     from strapgen.experiments import word_length as _word_length
+    from strapgen.experiments.algorithm import AttitudeAlgorithm as AttitudeAlgorithm
+    from strapgen.experiments.algorithm import algorithm as algorithm
     from strapgen.experiments.comparison import Comparison as Comparison
+    from strapgen.experiments.comparison import Comparisons as Comparisons
     from strapgen.experiments.comparison import compare as compare
     from strapgen.experiments.conformance import Finding as Finding
     from strapgen.experiments.conformance import check as check
@@ -82,6 +85,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.simulation.recording import read_rates as read_rates
     from strapgen.simulation.runs import Run as Run
     from strapgen.simulation.runs import simulate as simulate
+    from strapgen.simulation.scipy_rotations import from_rotation as from_rotation
+    from strapgen.simulation.scipy_rotations import to_rotation as to_rotation
     from strapgen.simulation.users_motions import read_motion as read_motion
     from strapgen.support.exceptions import CompilerError as CompilerError
     from strapgen.support.exceptions import InputError as InputError
@@ -143,8 +148,13 @@ _NAMES = {
     "catalogue.methods.tableaux": ("TABLEAUX",),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
+    "experiments.algorithm": (
+        "AttitudeAlgorithm",
+        "algorithm",
+    ),
     "experiments.comparison": (
         "Comparison",
+        "Comparisons",
         "compare",
     ),
     "experiments.conformance": (
@@ -194,6 +204,10 @@ _NAMES = {
     "simulation.runs": (
         "Run",
         "simulate",
+    ),
+    "simulation.scipy_rotations": (
+        "from_rotation",
+        "to_rotation",
     ),
     "simulation.users_motions": ("read_motion",),
     "support.exceptions": (

@@ -154,7 +154,8 @@ def test_runs_take_values(capsys):
     line = f"simulate {EXAMPLE} --constant a=9/8 --constant b=0 --motion constant --set x_deg_s=9 --step 1 --duration 2"
     with pytest.raises(SystemExit) as stop:
         main([*shlex.split(line), "--format", "json"])
-    assert stop.value.code == 0, capsys.readouterr().err
+    said = capsys.readouterr()
+    assert (stop.value.code, json.loads(said.out)["mean_drift_deg"] < 1e-12) == (0, True), said.err
     assert "--all and --constant do not go together" in refused("series --all --constant a=1", capsys)
 
 

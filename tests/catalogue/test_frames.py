@@ -20,6 +20,18 @@ WITHOUT = {
         "there is one number for each parity equation",
     ),
     **dict.fromkeys(("mean", "next_mean"), "from the axes of one unit to those of another"),
+    **dict.fromkeys(
+        (
+            *("state_jacobian", "increments_jacobian", "right_noise", "left_noise"),
+            *("rotation_vector_by_increments", "sculling_by_increments", "sculling_by_velocity_increments"),
+            *(
+                f"{part}_change_by_{by}"
+                for part in ("velocity", "position")
+                for by in ("increments", "velocity_increments")
+            ),
+        ),
+        "each element is the derivative of one number by another",
+    ),
     "level_angles": "its axes, level with heading 0, are those of no other signal",
     **dict.fromkeys(("deviation", "next_deviation", "heating_gain"), "there is one number for each gyro"),
 }

@@ -67,7 +67,7 @@ BAD = {
     "stress --algorithms ,": "--algorithm is ','; at least one value is needed",
     "stress --backends c-q7": "backend 'c-q7' is not known",
     "stress --carry some": "carry 'some' is not known",
-    "stress --format latex": "format 'latex' is not known; allowed: text, json, csv, markdown",
+    "stress --format html": "format 'html' is not known; allowed: text, json, csv, markdown, latex",
     # Along a recording in two speeds
     "strapdown dcm": "Missing option '--increments-csv'",
     f"strapdown dcm {LOG}": "fast-cycles is missing; an algorithm in two speeds needs it",
@@ -101,7 +101,7 @@ BAD = {
     "series euler --motion coning --plot a.png --out a.png": "two files are needed",
     "series --all --versus euler": "--all and --versus do not go together",
     "series --all --method heun": "method 'heun' is not known",
-    "series --all --format latex": "--all is a table; text, json, csv and markdown are allowed",
+    "derive euler --format latex --show nothing": "show 'nothing' is not known; allowed: text, latex, program",
     "stability euler --method heun": "method 'heun' is not known",
     "stability euler --method ,": "--method is ','; at least one value is needed",
     "stability euler --plot a.xyz": "file type 'xyz' is not known",
@@ -129,7 +129,7 @@ BAD = {
     "integrate": "No such command 'integrate'",
     "list --formatt json": "No such option: --formatt (did you mean --format?); --help shows all",
     "list euler": "kind 'euler' is not known; allowed: algorithms, methods",
-    "list --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown",
+    "list --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown, latex",
     "derive": "Missing argument",
     "simulate": "Missing argument",
     # converge and check
@@ -151,7 +151,7 @@ BAD = {
     "converge euler --method rk4 --tableau x.toml": "are both given; one is needed",
     "check error-matrix": "algorithm 'error-matrix' is no attitude step",
     "check none.py": "none.py is no file",
-    "check euler --format xml": "format 'xml' is not known; allowed: text, json, csv, markdown",
+    "check euler --format xml": "format 'xml' is not known; allowed: text, json, csv, markdown, latex",
     # vibration
     "vibration": "Missing argument",
     "vibration euler": "--step in s is needed",
@@ -213,7 +213,7 @@ BAD = {
     # tableau
     "tableau": "Missing argument",
     "tableau rk9": "method 'rk9' is not known (did you mean rk1, rk2 or rk3?); allowed: rk1, rk2, midpoint, ",
-    "tableau rk4 --format latex": "format 'latex' is not known; allowed: text, json, csv, markdown",
+    "tableau rk4 --format html": "format 'html' is not known (did you mean toml?); allowed: text, json, csv, markdown",
     "tableau none.toml": "none.toml cannot be read (No such file or directory)",
     "tableau ./file": "./file is not TOML (",
     "tableau .toml": ".toml cannot be read (No such file or directory)",
@@ -228,13 +228,13 @@ BAD = {
     "coning --samples 8 --previous 10 --form combined": "at most 17 are allowed for combined coefficients",
     "coning --samples 2 --form optimal": "form 'optimal' is not known; allowed: compressed, uncompressed, combined",
     "coning --samples 6 --previous 1 --terms": "are listed for up to 6 samples; 7 are given",
-    "coning --samples 2 --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown, toml",
+    "coning --samples 2 --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown, latex, toml",
     "coning --samples 2 --format toml": "--format toml writes a design; it goes with --objective",
     "derive rotation-vector --method rk4": "method of rotation-vector 'rk4' is not known; allowed: magnus2, magnus4",
     "derive rotation-vector --tableau kutta.toml": "rotation-vector goes with no tableau; allowed methods: magnus2",
     "derive sculling --method magnus4": "method of sculling 'magnus4' is not known; allowed: coning-compressed",
     "derive sculling --rates": "method coning-combined takes increments; rates at nodes do not go with it",
-    "derive velocity-position --rates": "velocity-position takes increments of angle and of velocity; rates do not go",
+    "derive velocity-position --rates": "velocity-position takes increments; rates at nodes do not go",
     "derive velocity-position --method rk99": "method of velocity-position 'rk99' is not known; allowed: rk1, rk2",
     "series velocity-position --motion constant": "series of velocity-position hold for any motion; --motion, --versus",
     "series velocity-position --terms 4": "terms is 4; a whole number from 1 to 3 is needed",
@@ -550,7 +550,7 @@ BAD = {
     "tables --table 6": "table is 6; a whole number from 1 to 5 is needed",
     "tables --table five": "table is 'five'; a whole number is needed",
     "tables --backend fortran": "backend 'fortran' is not known; allowed: numpy, c, c-float",
-    "tables --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown",
+    "tables --format yaml": "format 'yaml' is not known; allowed: text, json, csv, markdown, latex",
 }
 
 FILES = {

@@ -1,4 +1,4 @@
-"""Every result that is a table is written as text, JSON, comma-separated values and Markdown, into files or not."""
+"""Every result that is a table is written as text, JSON, CSV, Markdown and LaTeX, into files or not."""
 
 from __future__ import annotations
 
@@ -77,6 +77,8 @@ def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path, monkeypatch
         assert re.fullmatch(r"\|( :?-+:? \|)+", marked[1])
         width = {line.replace(r"\|", "").count("|") for line in marked}
         assert len(width) == 1
+        typeset = answer(f"{command} --format latex")
+        assert typeset.count("\\begin{") == typeset.count("\\end{") > 0
         drawn = DRAWN.get(command.split()[0], "") if find_spec("matplotlib") else ""
         json.loads(answer(f"{command} --format json{' --plot drawn.svg' if drawn else ''}"))
         assert not drawn or (tmp_path / "drawn.svg").read_text() == drawn

@@ -237,7 +237,7 @@ def test_a_file_is_shown_and_plotted(run, tmp_path):
         ("window show window-7-8", "window 'window-7-8' is not known (did you mean window-7-7"),
         ("window show none.toml", "none.toml cannot be read"),
         ("window show wrong.toml", "wrong.toml: the filter of c_1 gives "),
-        ("window show window-7-7 --format latex", "format 'latex' is not known"),
+        ("window show window-7-7 --format html", "format 'html' is not known"),
     ],
 )
 def test_what_cannot_be_shown_is_refused_in_one_line(words, message, run, tmp_path):

@@ -26,7 +26,7 @@ from strapgen.design.coning_file import written
 from strapgen.design.lines import Lines, of_spectrum
 from strapgen.simulation.drift import steady_drift
 from strapgen.simulation.motions import IntegratedMotion
-from strapgen.simulation.rate_profiles import CosineSum
+from strapgen.simulation.rate_motions.rate_profiles import CosineSum
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import Spectrum

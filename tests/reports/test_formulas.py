@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import derived
@@ -45,24 +46,71 @@ def test_text_has_every_formula(kernel):
             assert f"  {name} = {expression}" in lines
 
 
-def test_latex_has_a_row_for_every_formula(kernel):
-    text = formulas.as_latex(kernel)
+def test_latex_has_an_equation_for_every_formula(kernel):
+    text = formulas.elements_latex(kernel)
     assert text.startswith("\\begin{align*}\n") and text.endswith("\n\\end{align*}")
     rows = text.splitlines()[1:-1]
-    assert len(rows) == sum(stage.signal.size for stage in stages(kernel))
-    assert all(" &= " in row for row in rows)
+    assert sum(" &= " in row for row in rows) == sum(stage.signal.size for stage in stages(kernel))
+    assert all(" &= " in row or row.startswith("    &\\quad {} ") for row in rows)
     assert all(row.endswith(" \\\\") for row in rows[:-1]) and not rows[-1].endswith("\\\\")
     assert text.count("{") == text.count("}")
     assert "**" not in text
 
 
 def test_latex_names():
-    text = formulas.as_latex(pipeline.derive("euler", "rk1", 1))
+    text = formulas.elements_latex(pipeline.derive("euler", "rk1", 1))
     assert "e_{x}" in text
-    assert (
-        "\\mathit{half\\_turn\\_0}_{x} &= \\frac{d_{1 x}}{2}" in text
-        or "\\mathit{half\\_turn\\_0}_{x} &=" in text
-    )
+    assert "\\mathit{half\\_turn\\_0}_{x} &= \\frac{d_{1x}}{2}" in text
+
+
+EULER = r"""
+\begin{align*}
+\boldsymbol{\sigma} &= \mathbf{d}_{1} + \mathbf{d}_{2}, \quad A = \boldsymbol{\sigma} \cdot \boldsymbol{\sigma}, \quad B = \mathbf{d}_{1} \cdot \mathbf{d}_{2} \\
+\mathbf{p} &= (\tfrac{1}{2} - \tfrac{1}{48} A)\, \boldsymbol{\sigma} + (\tfrac{1}{3} - \tfrac{1}{48} A)\, \mathbf{d}_{1} \times \mathbf{d}_{2} \\
+p_s &= 1 - \tfrac{1}{8} A - \tfrac{1}{128} A^{2} + \tfrac{1}{24} A B \\
+\mathbf{e}^{+} &= \mathbf{e} \circ (\mathbf{p}, p_s)
+\end{align*}
+"""  # noqa: E501
+
+
+def test_a_step_is_written_in_vectors_as_the_page_on_its_canonical_form_writes_it():
+    assert formulas.as_latex(pipeline.derive("euler", "rk4", 2)) == EULER.strip()
+
+
+def test_formulas_are_short_or_not_shown_at_a_glance():
+    assert formulas.short_latex(pipeline.derive("euler", "rk4", 2)) == EULER.strip()
+    short = pipeline.derive("dcm-from-euler")
+    assert formulas.short_latex(short) == formulas.elements_latex(short) == formulas.as_latex(short)
+    long = pipeline.derive("cayley-klein", "butcher6", 3)
+    assert formulas.short_latex(long) is None
+    assert formulas.as_latex(long) == formulas.elements_latex(long)
+
+
+MAGNUS = r"""
+\begin{align*}
+\boldsymbol{\mu}_{0} &= \mathbf{d}_{1} + \mathbf{d}_{2} \\
+\boldsymbol{\mu}_{1} &= -\tfrac{1}{3} \mathbf{d}_{1} + \tfrac{1}{3} \mathbf{d}_{2} \\
+\boldsymbol{\phi} &= \boldsymbol{\mu}_{0} + \boldsymbol{\mu}_{0} \times \boldsymbol{\mu}_{1} \\
+\mathbf{p} &= \exp(\tfrac{1}{2} \boldsymbol{\phi}) \\
+\mathbf{e}^{+} &= \mathbf{e} \circ \mathbf{p}
+\end{align*}
+"""
+
+
+def test_stages_are_sums_and_products_of_vectors():
+    assert formulas.as_latex(pipeline.derive("euler", "magnus4", 2)) == MAGNUS.strip()
+    text = formulas.as_latex(pipeline.derive("dcm", "butcher6", 3))
+    assert text.count(" &= ") == 5 + 7 + 6 + 2  # rates at nodes, slopes, points, transition and product
+    assert r"\mathbf{k}_{2} &= \mathbf{x}_{2} [\mathbf{w}_{1/3}]_{\times} \\" in text
+
+
+def test_a_stage_that_differs_in_one_element_is_not_written_as_a_product():
+    kernel = pipeline.derive("euler-product")
+    assert r"&= \mathbf{e} \circ \mathbf{p}" in formulas.as_latex(kernel)
+    (stage,) = kernel.outputs
+    changed = replace(stage, expressions=(-stage.expressions[0], *stage.expressions[1:]))
+    wrong = replace(kernel, outputs=(changed,))
+    assert formulas.as_latex(wrong) == formulas.elements_latex(wrong)
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""Tables: one layout as text, comma-separated values and Markdown."""
+"""Tables: one layout as text, comma-separated values, Markdown, LaTeX and HTML."""
 
 from __future__ import annotations
 
@@ -74,3 +74,37 @@ def test_markdown_has_the_cells_of_the_text_and_their_alignment():
 def test_a_row_that_does_not_fit_its_columns_is_refused(row):
     with pytest.raises(ValueError, match=r"zip"):
         TextTable(COLUMNS, [row]).lines()
+
+
+def test_latex_has_rules_powers_of_ten_and_no_characters_that_it_reads_otherwise():
+    rows = [("a_b & 50%", -0.5, 1e-12, "x < y"), ("c", None, 2, "")]
+    assert TextTable(COLUMNS, rows).as_latex().splitlines() == [
+        r"\begin{tabular}{lrrl}",
+        r"\hline",
+        r"name & drift, deg & error & most from \\",
+        r"\hline",
+        r"a\_b \& 50\% & $-0.5$ & $1.000 \cdot 10^{-12}$ & x $<$ y \\",
+        r"c & - & $2.000 \cdot 10^{0}$ &  \\",
+        r"\hline",
+        r"\end{tabular}",
+    ]
+
+
+def test_latex_has_a_second_table_for_columns_that_a_page_does_not_hold():
+    columns = [Column("name", "<"), *(Column(f"a long column {k}") for k in range(8))]
+    text = TextTable(columns, [("x", *range(8))]).as_latex()
+    assert text.count(r"\begin{tabular}") == 3
+    assert text.count("name &") == 3 and text.count("a long column 7") == 1
+
+
+def test_latex_has_another_table_for_rows_that_a_page_does_not_hold():
+    text = TextTable([Column("name", "<"), Column("n")], [("x", n) for n in range(100)]).as_latex()
+    assert text.count(r"\begin{tabular}{lr}") == 3 and text.count("name & n") == 3
+    assert all(f"x & {n} " in text for n in range(100))
+
+
+def test_html_says_what_the_cells_say():
+    text = TextTable(COLUMNS, [("<b>", 0.5, 1e-12, "")]).as_html("a caption & more")
+    assert "&lt;b&gt;" in text and "<b>" not in text and "a caption &amp; more" in text
+    assert '<td style="text-align:right">1.000e-12</td>' in text
+    assert text.count("<th ") == 4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.simulation import rate_profiles
+from strapgen.simulation.rate_motions import rate_profiles
 from strapgen.simulation.reference_attitudes import KNOT, ReferenceAttitude
 from strapgen.support.exceptions import InputError
 

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import pytest
 
-from strapgen.targets.lines import fill_arguments, fill_definition, fill_expression
+from strapgen.targets.lines import fill, fill_arguments, fill_definition, fill_expression
 
 
-@pytest.mark.parametrize("fill", [fill_arguments, fill_expression])
-def test_a_line_may_be_as_long_as_the_width(fill):
+@pytest.mark.parametrize("filled", [fill_arguments, fill_expression])
+def test_a_line_may_be_as_long_as_the_width(filled):
     text = "first, second, third"
-    assert fill(text, "    ", len(text)) == text
-    assert fill(text, "    ", len(text) - 1) == "first, second,\n    third"
+    assert filled(text, "    ", len(text)) == text
+    assert filled(text, "    ", len(text) - 1) == "first, second,\n    third"
+
+
+def test_prose_is_wrapped_at_spaces_and_written_with_single_spaces_for_ends_of_lines():
+    text = "first second third"
+    assert fill(text, "    ", len(text)) == fill(f"{text} ", "", len(text) + 1) == text
+    assert fill(text, "    ", len(text) - 1) == "first second\n    third"
+    assert fill("first\nsecond", "", 40) == "first second"
+    assert fill("", "") == fill("  ", "") == ""
 
 
 @pytest.mark.parametrize("width", range(40, 60))

@@ -17,7 +17,7 @@ from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.simulation.drift import steady_drift
 from strapgen.simulation.motions import IntegratedMotion
-from strapgen.simulation.rate_profiles import CosineSum, ThroughGyro
+from strapgen.simulation.rate_motions.rate_profiles import CosineSum, ThroughGyro
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.support.exceptions import InputError
 from strapgen.vibration import of, through_gyro

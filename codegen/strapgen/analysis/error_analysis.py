@@ -14,6 +14,7 @@ from strapgen.analysis.growth import Growth, contraction, growth
 from strapgen.analysis.series import PARTS, ErrorSeries, series
 from strapgen.catalogue import Choice
 from strapgen.simulation.users_motions import is_file
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 
 
@@ -40,6 +41,17 @@ class ErrorAnalysis:
     run: RunDrift | None
     constant: ConstantRate | None
     no_run: str = ""
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        run = self.no_run
+        if self.run is not None:
+            powers = [f"h^{power}" for power in self.run.secular]
+            run = f"drift that adds up in a run {', '.join(powers) or 'none'}"
+        step = repr(self.step).removeprefix("<ErrorSeries ").removesuffix(">")
+        return f"{step}\n{run}".strip()
 
     @property
     def growth_powers(self) -> list[int]:

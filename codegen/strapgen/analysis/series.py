@@ -21,6 +21,7 @@ from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
 from strapgen.simulation.users_motions import is_file
 from strapgen.support import checks
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic import reading
 from strapgen.symbolic.power_series import Powers
@@ -63,6 +64,15 @@ class ErrorSeries:
     known: int
     invariant: dict[int, Invariants] = field(default_factory=dict)
     unknowns: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        order = "no error" if self.order is None else f"order {self.order}"
+        rows = {part: ", ".join(f"h^{power}" for power in self.coefficients(part)) for part in PARTS}
+        powers = "; ".join(f"{part} {text}" for part, text in rows.items() if text)
+        return f"of {self.kernel}, {self.motion} motion: {order}, known to h^{self.known}\n{powers}"
 
     @property
     def order(self) -> int | None:

@@ -25,6 +25,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import commit_late_sources
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 
@@ -75,6 +76,11 @@ class CommitLate:
     >>> unit.flush(), bool((unit.attitude == unit.now()).all())
     (3, True)
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"at the attitude {', '.join(f'{x:.6g}' for x in np.ravel(self.attitude))}"
 
     def __init__(
         self,

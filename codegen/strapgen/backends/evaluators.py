@@ -11,10 +11,28 @@ from numpy.typing import NDArray
 
 from strapgen.ir.sources import Sources
 from strapgen.support import checks
+from strapgen.support.brief import counted_shape, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted, needed
 
 Array = NDArray[Any]
+
+
+class StepInWords:
+    """What a back end of a step shows of itself."""
+
+    name: str
+    kernel: str
+    samples: int
+    takes: str
+    state_shape: tuple[int, ...]
+    dtype: Any
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        state = f"state {counted_shape(self.state_shape)} {self.dtype}"
+        return f"{self.name}: {self.kernel}, {self.samples} {self.takes} a step, {state}"
 
 
 class Evaluator(ABC):
@@ -29,6 +47,13 @@ class Evaluator(ABC):
     dtype : dtype
         Type of the results.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        ins = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.function.inputs)
+        outs = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.function.outputs)
+        return f"{self.sources.kernel} for {self.sources.target}\n{ins} -> {outs}"
 
     def __init__(self, sources: Sources, dtype: Any) -> None:
         self.sources = sources

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.evaluators import Array, Evaluator, StepInWords
 from strapgen.backends.increments import PART, run_parts
 from strapgen.backends.numpy_evaluator import NumpyEvaluator
 from strapgen.backends.step_sources import StepSources
@@ -18,7 +18,7 @@ from strapgen.support.exceptions import InputError
 from strapgen.targets.registry import NUMPY
 
 
-class Backend(ABC):
+class Backend(StepInWords, ABC):
     """An attitude algorithm that runs.
 
     It can be pickled, so that a pool of processes can run it: the sources of the step and of its kernels travel, and

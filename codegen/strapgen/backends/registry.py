@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.targets import BUILT_IN
 
@@ -62,6 +63,11 @@ ALIASES = {"c-q31": "c-fixed32", "c-q15": "c-fixed16"}
 
 class _Backends(Mapping[str, Entry]):
     """Back ends by name; one can be looked up by its other name, too."""
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return ", ".join(self)
 
     def __init__(self, entries: Mapping[str, Entry]) -> None:
         self._entries = entries

@@ -17,6 +17,7 @@ from strapgen.backends.loops import Cycles, LoopSources
 from strapgen.backends.registry import BACKENDS, evaluator_class, loops_class
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 
@@ -79,6 +80,11 @@ class TwoSpeed:
     >>> run.attitudes[-1].round(5)
     array([0.     , 0.     , 0.01   , 0.99995])
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"on {self.name}: {', '.join(sources.kernel for sources in self.loops)}"
 
     def __init__(
         self,

@@ -11,6 +11,7 @@ from strapgen.catalogue.choosing import choose, choose_step, standard, with_cons
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.loop_names import LOOPS
 from strapgen.catalogue.method_names import (
+    ALGORITHMS,
     INTEGRATORS,
     METHODS,
     STANDARD_METHODS,
@@ -19,7 +20,6 @@ from strapgen.catalogue.method_names import (
     StepVector,
 )
 from strapgen.catalogue.names import (
-    ALGORITHMS,
     COMPENSATION,
     KERNELS,
     LAYOUT_KERNELS,

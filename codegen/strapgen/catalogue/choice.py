@@ -14,6 +14,7 @@ from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS
 from strapgen.catalogue.user.user_kernel import UserKernel
+from strapgen.support.brief import full_text, short_repr
 
 if TYPE_CHECKING:
     from strapgen.symbolic.kernel import Kernel
@@ -56,6 +57,8 @@ class Choice:
     user_kernel: UserKernel | None = field(default=None, hash=False, repr=False)
     constants: Constants = ()
     layout: Layout | None = None
+
+    __repr__ = short_repr
 
     @classmethod
     def of_user(cls, kernel: Kernel | UserKernel) -> Choice:
@@ -106,10 +109,10 @@ class Choice:
         if self.user_kernel is not None:
             return f"{self.kernel} {self.user_kernel.text}"
         if self.method is not None and not isinstance(self.method, str):
-            return f"{self.kernel} {self.method!r} {self.method.file}"
+            return f"{self.kernel} {full_text(self.method)} {self.method.file}"
         words = [self.kernel, options(self.constants)]
         if self.layout is not None:
-            words += [repr(self.layout), self.layout.file]
+            words += [full_text(self.layout), self.layout.file]
         return " ".join(filter(None, words))
 
     @property

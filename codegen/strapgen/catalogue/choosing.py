@@ -12,14 +12,13 @@ from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue import layout as layout_files
 from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.layout import Layout
-from strapgen.catalogue.method_names import INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
+from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import EXACT, named_window
 from strapgen.catalogue.names import (
-    ALGORITHMS,
     KERNELS,
     LAYOUT_KERNELS,
     LEAST_WHOLE,
@@ -168,7 +167,7 @@ def _choose(
     assert not isinstance(method, (Window, ShapedConing)), "those are taken before"
     if name in VECTORS:
         if rates and VECTORS[name].every:
-            raise InputError(f"{name} takes increments of angle and of velocity; rates do not go with it")
+            raise InputError(f"{name} takes increments; rates at nodes do not go with it")
         if isinstance(method, Tableau) and not VECTORS[name].every:
             raise InputError(
                 f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"

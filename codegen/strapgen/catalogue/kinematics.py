@@ -14,6 +14,7 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import short_repr
 from strapgen.symbolic import rotations
 
 THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229"
@@ -63,6 +64,11 @@ class Kinematics:
     exponential: Callable[..., sp.Matrix]
     orthonormalize: str
     attitude: str | None
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"{self.name}: {self.title}, state {', '.join(self.state.elements)}"
 
 
 def cayley_klein_derivative(a: sp.Matrix, g: sp.Matrix) -> sp.Matrix:

@@ -8,6 +8,13 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
 
+#: Attitude algorithms, by the state they integrate.
+ALGORITHMS = {
+    "dcm": "direction cosine matrix",
+    "euler": "Euler parameters, scalar last",
+    "cayley-klein": "Cayley-Klein parameters, scalar first",
+}
+
 
 class Integrator(NamedTuple):
     """A method without a tableau; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
@@ -115,7 +122,7 @@ class StepVector(NamedTuple):
 
 
 #: Vectors of a step that a method computes.
-VECTORS = {
+_VECTORS = {
     "rotation-vector": StepVector(
         "rotation vector of a step",
         "attitude_step",
@@ -140,4 +147,43 @@ VECTORS = {
         True,
         True,
     ),
+    **{
+        f"{algorithm}-jacobian": StepVector(
+            f"Jacobians of a step by state and increments: {words}",
+            "jacobians",
+            algorithm.replace("-", "_"),
+            (),
+            "rk4",
+            True,
+            True,
+        )
+        for algorithm, words in ALGORITHMS.items()
+    },
+    "error-state": StepVector(
+        "attitude error over a step: transition and noise input",
+        "jacobians",
+        "error_state",
+        (),
+        "rk4",
+        True,
+        True,
+    ),
+}
+
+#: Functions of `vector_jacobians` that derive the Jacobians of a vector.
+_JACOBIANS = {
+    "rotation-vector": "rotation_vector",
+    "sculling": "sculling",
+    "velocity-position": "velocity_and_position",
+}
+
+#: Vectors of a step that a method computes, and their Jacobians.
+VECTORS = {
+    **_VECTORS,
+    **{
+        f"{name}-jacobian": _VECTORS[name]._replace(
+            title=f"Jacobians of the {_VECTORS[name].title}", module="vector_jacobians", function=function
+        )
+        for name, function in _JACOBIANS.items()
+    },
 }

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 from strapgen.catalogue.loop_names import LOOPS
-from strapgen.catalogue.method_names import VECTORS
+from strapgen.catalogue.method_names import ALGORITHMS, VECTORS
 from strapgen.catalogue.methods.windows import EXACT_TERMS
 from strapgen.catalogue.navigation_names import NAVIGATION
 from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
 from strapgen.catalogue.recipe import Recipe
 from strapgen.catalogue.redundancy_names import REDUNDANCY
 from strapgen.catalogue.sampling_names import SAMPLING
-
-#: Attitude algorithms, by the state they integrate.
-ALGORITHMS = {
-    "dcm": "direction cosine matrix",
-    "euler": "Euler parameters, scalar last",
-    "cayley-klein": "Cayley-Klein parameters, scalar first",
-}
-
 
 #: Largest number of angle increments in a step, and of increments beside them, from before the step and from after it.
 MOST_INCREMENTS = 8

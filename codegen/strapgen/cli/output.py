@@ -19,7 +19,7 @@ from strapgen.support.suggestions import alternatives
 if TYPE_CHECKING:
     from strapgen.reports.report import Report
 
-_TABLE = ("text", "json", "csv", "markdown")
+_TABLE = ("text", "json", "csv", "markdown", "latex")
 _PLAIN = ("text", "json")
 #: The value of --out that stands for the terminal.
 _TERMINAL = Path("-")

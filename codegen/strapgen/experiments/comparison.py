@@ -20,6 +20,7 @@ from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.runs import attitude, drift_between, require_finite
 from strapgen.support import checks, stages
+from strapgen.support.brief import notebook_html, short_repr, to_pandas
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.toolchain.code_size import code_size
 from strapgen.toolchain.compiler import compile_together
@@ -87,11 +88,29 @@ class Comparison:
     operations: dict[str, int]
     history: AngleHistory | None = field(default=None, repr=False, compare=False)
 
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        bound = "" if self.bound_rad is None else f", certified {self.bound_rad:.3g} rad"
+        angle = f"angle from the reference up to {self.max_abs_rad:.3g} rad{bound}"
+        return f"{self.backend}: {angle}\ndrift {self.drift_deg:.4g} deg, {self.ns_per_step:.1f} ns a step"
+
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as plain JSON data."""
         data = asdict(replace(self, history=None))
         del data["history"]
         return data
+
+
+class Comparisons(list[Comparison]):
+    """Back ends beside one reference, a `Comparison` each; a list that a notebook shows as a table."""
+
+    __repr__ = short_repr
+    _repr_html_ = notebook_html
+    to_pandas = to_pandas
+
+    def _in_words(self) -> str:
+        return "\n".join(f"{row.backend}: up to {row.max_abs_rad:.3g} rad from the reference" for row in self)
 
 
 def compare(
@@ -104,7 +123,7 @@ def compare(
     reference: str = "numpy",
     truth: Array | None = None,
     settings: Settings | None = None,
-) -> list[Comparison]:
+) -> Comparisons:
     """Run an algorithm on several back ends and compare each with a reference.
 
     Parameters
@@ -128,8 +147,8 @@ def compare(
 
     Returns
     -------
-    list of Comparison
-        In the order of `backends`.
+    Comparisons
+        A list of `Comparison`, in the order of `backends`.
 
     Raises
     ------
@@ -172,12 +191,12 @@ def compare(
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
-    return [
+    return Comparisons(
         _compared(name, load(name), d, states, matrices, truth)
         if isinstance(name, str)
         else _compared(name.name, name, d, states, matrices, truth)
         for name in backends
-    ]
+    )
 
 
 def _compared(

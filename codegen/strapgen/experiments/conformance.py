@@ -28,6 +28,7 @@ from strapgen.library import generated_sources
 from strapgen.simulation.exact_attitudes import step_of_increments
 from strapgen.simulation.motions import GENERAL, motion
 from strapgen.simulation.runs import attitude, drift_between, simulate
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.toolchain.compiler import compile_together
 
@@ -61,6 +62,8 @@ class Finding:
     text: str
     measured: float | None = None
     allowed: float | None = None
+
+    __repr__ = short_repr
 
     def as_dict(self) -> dict[str, Any]:
         """Return the finding as plain JSON data."""

@@ -24,6 +24,7 @@ from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import checks, stages
+from strapgen.support.brief import notebook_html, short_repr, to_pandas
 from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.resumable import side_by_side
@@ -80,6 +81,15 @@ class Convergence:
     rungs: tuple[Rung, ...]
     observed: float | None
     arguments: str = ""
+
+    __repr__ = short_repr
+    _repr_html_ = notebook_html
+    to_pandas = to_pandas
+
+    def _in_words(self) -> str:
+        observed = self.hidden if self.observed is None else f"{self.observed:.2f}"
+        ladder = f"{len(self.rungs)} steps"
+        return f"of {self.kernel} on {self.backend}, {ladder}: predicted order {self.predicted}, observed {observed}"
 
     @property
     def hidden(self) -> str:

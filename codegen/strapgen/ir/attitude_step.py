@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
+from strapgen.support.brief import short_repr
+
 #: Fraction bits to which the root of a square is rounded up.
 _ROOT_BITS = 64
 
@@ -96,6 +98,8 @@ class Companions:
     isometry: bool = False
     ahead: int = 0
     truncation: Truncation | None = None
+
+    __repr__ = short_repr
 
     @property
     def beside(self) -> int:

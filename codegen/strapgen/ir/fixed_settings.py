@@ -12,6 +12,7 @@ from strapgen.ir.formats import SHORTEST_WORD, Format, check_rounding, check_wor
 from strapgen.ir.sensor import DEFAULT_BITS, Sensor
 from strapgen.ir.signed_digits import MULTIPLICATIONS
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 #: Rounding errors that are fed back from step to step.
@@ -97,6 +98,8 @@ class Settings:
     state: str = ""
     multiply: str = "product"
     digits: int = 0
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         check_word(self.word)

@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.ir.fixed_interface import RoundingAccumulation
+from strapgen.support.brief import short_repr
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,14 @@ class RoundingBounds:
     step: StepRounding | None = None
     accumulation: RoundingAccumulation | None = None
     reason: str = ""
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        if self.reason:
+            return f"none known in {self.number}: {self.reason}"
+        worst = ", ".join(f"{name} {float(error):.2e}" for name, error in self.worst.items())
+        return f"of a call in {self.number}: {worst}"
 
     @property
     def unit(self) -> Fraction:

@@ -14,6 +14,7 @@ from typing import Any
 from strapgen.ir.fixed_interface import ErrorFeedback, Interface
 from strapgen.ir.formats import Format
 from strapgen.ir.program import Program
+from strapgen.support.brief import notebook_html, short_repr
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,16 @@ class FixedProgram:
     interface: Interface
     body: tuple[Value, ...]
     operations: dict[str, int]
+
+    __repr__ = short_repr
+    _repr_html_ = notebook_html
+
+    def _in_words(self) -> str:
+        formats = ", ".join(
+            f"{a.signal.name} {a.format}" for a in (*self.interface.inputs, *self.interface.outputs)
+        )
+        bounds = ", ".join(f"{name} {float(bound):.2e}" for name, bound in self.error_bounds.items())
+        return f"{self.name}: {self.program.title}\n{formats}\nerror bounds of a call: {bounds}"
 
     @property
     def word(self) -> int:

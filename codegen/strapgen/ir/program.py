@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import notebook_html, short_repr
 
 
 @dataclass(frozen=True)
@@ -73,10 +74,6 @@ class Operation:
 Node = Constant | Reference | Operation
 
 
-def _sinc(x: Any) -> Any:
-    return math.sin(x) / x if x else 1
-
-
 def _wrap(x: Any) -> Any:
     return x - math.tau if x > math.pi else x + math.tau if x < -math.pi else x
 
@@ -85,7 +82,6 @@ def _wrap(x: Any) -> Any:
 RESOLUTION = "resolution"
 #: The resolution of a double.
 DOUBLE_RESOLUTION = Fraction(1, 1 << 52)
-
 #: The function of each operation, on any ordered numbers; the integer, exact and float interpreters share it.
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -96,7 +92,7 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "sqrt": math.sqrt,
     "sin": math.sin,
     "cos": math.cos,
-    "sinc": _sinc,  # sin(x)/x, 1 at 0
+    "sinc": lambda x: math.sin(x) / x if x else 1,
     "atan2": math.atan2,
     "direction": math.atan2,  # atan2 up to whole turns
     "wrap": _wrap,  # an angle of at most one and a half turns, reduced to -pi to pi
@@ -194,6 +190,13 @@ class Program:
     recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
     function: str = ""
+
+    __repr__ = short_repr
+    _repr_html_ = notebook_html
+
+    def _in_words(self) -> str:
+        counts = ", ".join(f"{number} {kind}" for kind, number in self.operations.items() if number)
+        return f"{self.name}: {self.title}\n{counts or 'no operations'}; {self.temporaries} temporaries"
 
     def __post_init__(self) -> None:
         known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}

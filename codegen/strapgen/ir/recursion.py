@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from strapgen.support.brief import short_repr
+
 
 @dataclass(frozen=True)
 class Recursion:
@@ -26,6 +28,8 @@ class Recursion:
 
     states: tuple[tuple[str, str], ...]
     kept: tuple[str, ...] = ()
+
+    __repr__ = short_repr
 
     def as_dict(self) -> dict[str, Any]:
         """Return the recursion as plain JSON data."""

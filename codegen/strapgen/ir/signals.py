@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 
 #: Frames that the components of a signal can be in.
 FRAMES = {
@@ -77,6 +78,8 @@ class Signal:
     constraint: str = ""
     frame: str = ""
     over: str = ""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if math.prod(self.shape) != len(self.elements):

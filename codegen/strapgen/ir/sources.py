@@ -10,6 +10,7 @@ from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import notebook_html, short_repr
 
 if TYPE_CHECKING:
     from strapgen.ir.program import Program
@@ -67,6 +68,12 @@ class Sources:
     own: tuple[Program, ...] = ()
     runs: tuple[str, ...] = ()
     rounding: RoundingBounds | None = None
+
+    __repr__ = short_repr
+    _repr_html_ = notebook_html
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"
 
     @property
     def step_files(self) -> dict[str, str]:

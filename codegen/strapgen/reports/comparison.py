@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from strapgen.experiments.comparison import Comparison
@@ -22,8 +22,11 @@ _COLUMNS = (
     Column("bytes"),
     Column("operations", "<"),
 )
-
-
+#: The headers of these columns where nothing above the table states the units.
+_HEADERS = (
+    *("back end", "largest angle, rad", "rms angle, rad", "certified, rad", "largest, ulp", "drift, deg"),
+    *("ns/step", "bytes", "operations"),
+)
 _SYSTEM_COLUMNS = (
     Column("", "<"),
     Column("output", "<"),
@@ -73,14 +76,10 @@ def comparison_report(kernels: Sequence[ComparedKernel], reference: str, drift: 
 
 def _table(kernels: Sequence[ComparedKernel]) -> TextTable:
     """Return all figures of all rows; a column for every kind of operation."""
-    every = [(one.kernel, row) for one in kernels for row in one.rows]
-    kinds = list(dict.fromkeys(kind for _, row in every for kind in row.operations))
-    names = [field.name for field in fields(Comparison) if field.name not in ("operations", "history")]
-    values = [
-        [*(getattr(row, name) for name in names), *(row.operations.get(kind, 0) for kind in kinds), kernel]
-        for kernel, row in every
-    ]
-    return TextTable([Column(name) for name in (*names, *kinds, "kernel")], values)
+    table = figures_table([row for one in kernels for row in one.rows])
+    names = [one.kernel for one in kernels for _ in one.rows]
+    values = [[*row, name] for row, name in zip(table.rows, names, strict=True)]
+    return TextTable([*table.columns, Column("kernel")], values)
 
 
 def comparison_text(rows: Sequence[Comparison], title: str, reference: str, drift: str) -> str:
@@ -102,6 +101,23 @@ def comparison_text(rows: Sequence[Comparison], title: str, reference: str, drif
         "",
     ]
     return "\n".join([*lines, *TextTable(_COLUMNS, [_cells(row) for row in rows]).lines()])
+
+
+def comparison_table(rows: Sequence[Comparison]) -> TextTable:
+    """Return comparisons as a table for a reader, the units in its headers; parameters as for `comparison_text`."""
+    columns = [replace(column, header=header) for column, header in zip(_COLUMNS, _HEADERS, strict=True)]
+    return TextTable(columns, [_cells(row) for row in rows])
+
+
+def figures_table(rows: Sequence[Comparison]) -> TextTable:
+    """Return all figures of comparisons under the names of their fields, which have the units."""
+    names = [field.name for field in fields(Comparison) if field.name not in ("operations", "history")]
+    kinds = list(dict.fromkeys(kind for row in rows for kind in row.operations))
+    values = [
+        [*(getattr(row, name) for name in names), *(row.operations.get(kind, 0) for kind in kinds)]
+        for row in rows
+    ]
+    return TextTable([Column(name) for name in (*names, *kinds)], values)
 
 
 def _cells(row: Comparison) -> list[Any]:

@@ -123,7 +123,12 @@ def coning_report(design: Design, data: Mapping[str, Any]) -> Report:
         pairs = zip(data["pairs"], data["coefficients"], design.pairs.values(), strict=True)
         return TextTable(columns, [(older, newer, text, float(c)) for (older, newer), text, c in pairs])
 
-    return Report(lambda: coning_text(design, data), lambda: data, table)
+    def latex() -> str:
+        from strapgen.reports.display.methods import coning_latex  # loads SymPy
+
+        return coning_latex(design)
+
+    return Report(lambda: coning_text(design, data), lambda: data, table, latex=latex)
 
 
 def _samples_text(design: Design) -> str:

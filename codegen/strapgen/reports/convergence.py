@@ -56,18 +56,21 @@ def _cell(rung: Rung) -> str:
 
 def convergence_report(outcomes: Sequence[Convergence], title: str) -> Report:
     """Return outcomes as a report, whose table has a row for every step of every algorithm."""
-
-    def table() -> TextTable:
-        rows = [
-            (
-                *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
-                *(one.observed, one.predicted),
-            )
-            for one in outcomes
-            for rung in one.rungs
-        ]
-        return TextTable(_COLUMNS, rows)
-
     return Report(
-        lambda: convergence_text(outcomes, title), lambda: [one.as_dict() for one in outcomes], table
+        lambda: convergence_text(outcomes, title),
+        lambda: [one.as_dict() for one in outcomes],
+        lambda: ladder_table(*outcomes),
     )
+
+
+def ladder_table(*outcomes: Convergence) -> TextTable:
+    """Return a table with a row for every step of every algorithm."""
+    rows = [
+        (
+            *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
+            *(one.observed, one.predicted),
+        )
+        for one in outcomes
+        for rung in one.rungs
+    ]
+    return TextTable(_COLUMNS, rows)

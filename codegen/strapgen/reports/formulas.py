@@ -9,13 +9,20 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.program import Program
-from strapgen.reports.latex import align_environment
+from strapgen.lowering.canonical.vector_form import vector_form
+from strapgen.reports.display.latex import equations
+from strapgen.reports.display.stages import stages_latex
+from strapgen.reports.display.vectors import vectors_latex
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.kernel import Kernel, Stage
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import ExactPrinter
 
+#: Most rows of formulas that are seen at a glance.
+_MOST_ROWS = 12
+#: Most lines of formulas in vectors that are.
+_MOST_LINES = 30
 _PROGRAM_COLUMNS = (Column("name", "<"), Column("value", "<"))
 _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
@@ -101,7 +108,9 @@ def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
             return TextTable(_PROGRAM_COLUMNS, list(program_as_data(program).items()))
         return TextTable(_OPERATION_COLUMNS, _counts(program))
 
-    return Report(texts[show], data, table if show in ("program", "operations") else None)
+    if show in ("program", "operations"):
+        return Report(texts[show], data, table)
+    return Report(texts[show], data, latex=texts["latex"])
 
 
 def unknown_formulas_report(kernel: Kernel, show: str) -> Report:
@@ -122,18 +131,51 @@ def program_as_data(program: Program) -> dict[str, str]:
 
 
 def as_latex(kernel: Kernel) -> str:
-    """Return a kernel's formulas as one LaTeX align environment."""
+    """Return a kernel's formulas as one LaTeX align environment, broken at the width of a page.
+
+    A step is in vectors, their scalar and cross products, as its program computes it. Where that would be longer than
+    the stages, these are written, as sums and products of vectors, quaternions (a vector has the scalar part 0) and
+    matrices; what is no such sum is written element by element.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    """
+    return _in_vectors(kernel) or elements_latex(kernel)
+
+
+def short_latex(kernel: Kernel) -> str | None:
+    """Return a kernel's formulas as LaTeX if a reader sees them at a glance; None for scalars of half a page."""
+    text = _in_vectors(kernel)
+    if text is None:
+        rows = sum(stage.signal.size for stage in (*kernel.stages, *kernel.outputs))
+        return elements_latex(kernel) if rows <= _MOST_ROWS else None
+    return text if len(text.splitlines()) <= _MOST_LINES else None
+
+
+def _in_vectors(kernel: Kernel) -> str | None:
+    """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
+    form = vector_form(kernel)
+    return stages_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
+
+
+def elements_latex(kernel: Kernel) -> str:
+    """Return a kernel's formulas element by element as one LaTeX align environment."""
     names = {
         sp.Symbol(element, real=True): _latex_name(element)
         for signal in (*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs)))
         for element in signal.elements
     }
-    rows = [
-        f"{_latex_name(element)} &= {sp.latex(expression, symbol_names=names)}"
+    return equations(
+        (_latex_name(element), sp.latex(expression, symbol_names=names))
         for stage in (*kernel.stages, *kernel.outputs)
         for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
-    ]
-    return align_environment(rows)
+    )
+
+
+def _state(kernel: Kernel) -> str:
+    """Return the letter of the state: that of its elements."""
+    return kernel.inputs[0].elements[0].partition("_")[0]
 
 
 def _latex_name(element: str) -> str:

@@ -29,7 +29,7 @@ class Report:
     markdown : callable, optional
         Returns another table for Markdown, with the columns of the text.
     latex : callable, optional
-        Returns it as LaTeX.
+        Returns it as LaTeX; by default the table of Markdown, if there is one.
     indented : bool, optional
         Whether an object of JSON has a line for each of its parts.
     """
@@ -65,13 +65,17 @@ class Report:
             return table().as_markdown()
         if format == "latex" and self.latex is not None:
             return self.latex()
+        if format == "latex" and table is not None:
+            return table().as_latex()
         raise InputError(f"this result is not written as {format}; allowed: {', '.join(self.formats)}")
 
     @property
     def formats(self) -> tuple[str, ...]:
         """The formats in which the result can be written."""
-        tables = ("csv", "markdown") if self.table is not None else ()
-        return ("text", "json", *tables, *(("latex",) if self.latex is not None else ()))
+        tables = ("csv", "markdown", "latex") if self.table is not None else ()
+        return tuple(
+            dict.fromkeys(("text", "json", *tables, *(("latex",) if self.latex is not None else ())))
+        )
 
 
 def as_json(data: Any, indented: bool = True) -> str:

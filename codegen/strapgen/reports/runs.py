@@ -129,6 +129,25 @@ def run_table(run: Run) -> TextTable:
     return _table(header, np.hstack(columns).tolist())
 
 
+def largest_table(run: Run) -> TextTable:
+    """Return the largest errors of a run by axis, for a reader."""
+    parts = (("scale", AXES, run.scale), ("skew, deg", SKEW_PLANES, np.degrees(run.skew)))
+    rows = [
+        (f"{kind} {name}", float(np.abs(values[:, k]).max()), float(values[-1, k]))
+        for kind, names, values in (*parts, ("drift, deg", AXES, np.degrees(run.drift)))
+        for k, name in enumerate(names)
+    ]
+    columns = (Column("error", "<"), Column("largest", spec=".4g"), Column("at the end", spec=".4g"))
+    return TextTable(columns, rows)
+
+
+def history_elements(history: History) -> tuple[str, ...]:
+    """Return the names of the elements of a history's states; numbers where it has no names."""
+    return history.elements or tuple(
+        f"state_{k}" for k in range(1, 1 + int(np.prod(history.states.shape[1:])))
+    )
+
+
 def run_text(run: Run, settings: dict[str, Any], every: int | None = None) -> str:
     """Return a run as a report: the nine errors in time, the matrices at the end or every so often, the mean drift."""
     shown = _thinned(len(run.time))

@@ -8,6 +8,7 @@ from typing import Any
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.coefficients import text
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.reports.display.methods import method_latex
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
@@ -70,8 +71,15 @@ def tableau_text(data: Mapping[str, Any]) -> str:
     )
 
 
-def tableau_report(data: Mapping[str, Any]) -> Report:
-    """Return a tableau as a report, whose table has a row for each stage, then those of the weights."""
+def tableau_report(data: Mapping[str, Any], tableau: Tableau) -> Report:
+    """Return a tableau as a report, whose table has a row for each stage, then those of the weights.
+
+    Parameters
+    ----------
+    data : mapping
+        What `tableau_data` returns for the tableau.
+    tableau : Tableau
+    """
 
     def table() -> TextTable:
         stages = data["stages"]
@@ -85,7 +93,7 @@ def tableau_report(data: Mapping[str, Any]) -> Report:
         heads = [Column("row", "<"), Column("node", missing="")]
         return TextTable([*heads, *(Column(f"k{k}", missing="") for k in range(1, stages + 1))], rows)
 
-    return Report(lambda: tableau_text(data), lambda: data, table)
+    return Report(lambda: tableau_text(data), lambda: data, table, latex=lambda: method_latex(tableau))
 
 
 def _tableau_lines(data: Mapping[str, Any]) -> list[str]:

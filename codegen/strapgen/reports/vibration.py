@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import sympy as sp
-
-from strapgen.reports.latex import align_environment
+from strapgen.reports.display.expressions import expression_latex
+from strapgen.reports.display.latex import equations
 from strapgen.reports.report import Report, flat_table
 from strapgen.reports.table import READABLE_UNITS, Column, TextTable
 from strapgen.support.exceptions import InputError
@@ -242,5 +241,5 @@ def vibration_latex(cases: Sequence[AssessedCase]) -> str:
         letter = r"\dot\phi_z" if case.quantity == "drift" else r"\dot v_z"
         for part in ("continuous", "computed", "error"):
             index = rf"\mathrm{{{part}}}" if len(cases) == 1 else rf"\mathrm{{{part},\ {case.label}}}"
-            rows.append(f"{letter}^{{{index}}} &= {sp.latex(case.assessment.expression(part))}")
-    return align_environment(rows)
+            rows.append((f"{letter}^{{{index}}}", expression_latex(case.assessment.expression(part))))
+    return equations(rows)

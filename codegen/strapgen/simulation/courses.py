@@ -14,6 +14,7 @@ from strapgen.backends import BACKENDS, two_speed
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.recording import InertialRecording
 from strapgen.support import checks
+from strapgen.support.brief import Records, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.systems import two_speed_sources
 
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Course:
+class Course(Records):
     """Attitude and velocity along a recording, after each navigation cycle.
 
     Parameters
@@ -46,6 +47,12 @@ class Course:
     velocity_changes: Array
     elements: tuple[str, ...]
     unused: int
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        times = f"{self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else "none"
+        return f"of {len(self.time)} navigation cycles, {times}; {self.unused} increments unused"
 
 
 @dataclass(frozen=True)

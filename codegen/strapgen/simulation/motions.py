@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from strapgen import catalogue
 from strapgen.backends import evaluator
 from strapgen.backends.increments import windows
-from strapgen.simulation.rate_profiles import PROFILES, RateProfile
+from strapgen.simulation.rate_motions.rate_profiles import PROFILES, RateProfile
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.support import checks
-from strapgen.support.exceptions import InputError
+from strapgen.support.brief import short_repr
+from strapgen.support.parameters import parameters as settings_of
 
 Array = NDArray[np.float64]
 
@@ -89,6 +90,8 @@ class Motion:
 
     name: str
     parameters: dict[str, float]
+
+    __repr__ = short_repr
 
     def increments(
         self, step: Fraction, steps: int, samples: int, previous: int = 0, ahead: int = 0
@@ -253,22 +256,7 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
     >>> motion("coning", a_deg_s=10, b_rad_s=0.5, g_deg_s=0).parameters["b"]
     0.5
     """
-    known = keys(name)
-    allowed = [key for choices in known.values() for key in choices]
-    for key in settings:
-        checks.choice(f"key of motion {name}:", key, allowed)
-    if not settings:
-        raise InputError(f"motion {name} needs parameters; allowed: {', '.join(allowed)}")
-    parameters: dict[str, float] = {}
-    for parameter, choices in known.items():
-        used = [key for key in choices if key in settings]
-        if len(used) > 1:
-            raise InputError(f"motion {name}: {' and '.join(used)} are both given; one is needed")
-        if not used and parameter not in _DEFAULTS.get(name, {}):
-            raise InputError(f"motion {name} lacks {' or '.join(choices)}")
-        parameters[parameter] = _DEFAULTS.get(name, {}).get(parameter, 0.0)
-        for key in used:
-            parameters[parameter] = float(checks.number(key, settings[key])) * choices[key]
+    parameters = settings_of(f"motion {name}", keys(name), settings, _DEFAULTS.get(name, {}))
     if name == "cone":
         return _cone(**parameters)
     if name not in PROFILES:

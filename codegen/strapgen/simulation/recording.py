@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.backends import Backend
 from strapgen.backends.increments import StepWindows
+from strapgen.simulation.history import History as History
 from strapgen.simulation.recorded_columns import (
     PART,
     Columns,
@@ -23,6 +23,7 @@ from strapgen.simulation.recorded_columns import (
 from strapgen.simulation.recorded_rows import LineNumbers, RecordedRows, read_rows
 from strapgen.simulation.runs import require_finite
 from strapgen.support import checks, stages
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError, InputTypeError
 
 Array = NDArray[np.float64]
@@ -56,6 +57,12 @@ class Recording:
     interval: float
     increments: Array
 
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        times = f"{self.interval:g} s from {self.start:g} s"
+        return f"of {len(self.increments)} increments of {times}, up to {self.largest:.4g} rad"
+
     @property
     def largest(self) -> float:
         """Largest magnitude of an element of the increments, in rad."""
@@ -74,27 +81,7 @@ class InertialRecording(Recording):
 
     velocity_increments: Array
 
-
-@dataclass(frozen=True)
-class History:
-    """The attitude along a recording.
-
-    Parameters
-    ----------
-    time : array, (N,)
-        Times in s, on the clock of the recording.
-    states : array, (N, state shape)
-        States of the back end.
-    step : float
-        Step length in s.
-    unused : int
-        Number of increments at the end that do not fill a step.
-    """
-
-    time: Array
-    states: NDArray[Any]
-    step: float
-    unused: int
+    __repr__ = short_repr
 
 
 def _checked_intervals(path: Path, rows: RecordedRows) -> tuple[SampleIntervals, float]:
@@ -373,7 +360,7 @@ def propagate(
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
-    return History(time, states, step, unused)
+    return History(time, states, step, unused, backend.elements)
 
 
 def record_interval(what: str, value: float | str, step: float) -> int:

@@ -15,13 +15,14 @@ from strapgen.backends import Backend, evaluator
 from strapgen.backends.increments import PART, StepWindows
 from strapgen.simulation.motions import Motion
 from strapgen.support import checks, stages
+from strapgen.support.brief import Records, notebook_html, short_repr
 from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Records):
     """The records of a simulation.
 
     Parameters
@@ -43,6 +44,14 @@ class Run:
     scale: Array
     skew: Array
     drift: Array
+
+    __repr__ = short_repr
+    _repr_html_ = notebook_html
+
+    def _in_words(self) -> str:
+        drift = ", ".join(f"{np.degrees(value):.3g}" for value in self.drift_by_axis)
+        records = f"{len(self.time)} records, {self.time[0]:g} s to {self.time[-1]:g} s"
+        return f"of {records}\nmean drift {np.degrees(self.mean_drift):.3g} deg, largest about x, y, z {drift} deg"
 
     @property
     def drift_by_axis(self) -> Array:
@@ -277,9 +286,9 @@ def simulate(
         Interval of records in s, a multiple of the step; by default every step is recorded.
     pulse : number, optional
         Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
-    initial : array_like, (3, 3), optional
-        Direction cosine matrix at the start, body to reference; by default there is no rotation. The true attitude
-        is this matrix times that of the motion.
+    initial : array_like, (3, 3), or Rotation, optional
+        Direction cosine matrix at the start, body to reference, or SciPy's rotation; by default there is none. The true
+        attitude is this matrix times that of the motion.
 
     Returns
     -------
@@ -312,6 +321,8 @@ def simulate(
     if record_every > steps:
         raise InputError(f"record {float(interval):g} s is longer than the duration {float(total):g} s")
     checks.multiple("duration", total, "record interval", interval)
+    if hasattr(initial, "as_matrix"):  # a Rotation of SciPy
+        initial = initial.as_matrix()
     start = None if initial is None else initial_state(backend, initial)
     states = backend.propagate_parts(_samples(backend, motion, h, pulse), steps, record_every, every, start)
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.simulation.motions import Motion
-from strapgen.simulation.rate_profiles import CosineSum, random_sum
+from strapgen.simulation.rate_motions.rate_profiles import CosineSum, random_sum
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.parameters import parameters as settings_of
 
 Array = NDArray[np.float64]
 
@@ -206,20 +207,8 @@ def force(name: str, /, **settings: Any) -> SpecificForce:
     9.80665
     """
     known = keys(name)
-    allowed = [key for choices in known.values() for key in choices]
-    for key in settings:
-        checks.choice(f"key of force {name}:", key, allowed)
-    if not settings:
-        raise InputError(f"force {name} needs parameters; allowed: {', '.join(allowed)}")
-    parameters: dict[str, float] = {}
-    for parameter, choices in known.items():
-        used = [key for key in choices if key in settings]
-        if len(used) > 1:
-            raise InputError(f"force {name}: {' and '.join(used)} are both given; one is needed")
-        if not used and parameter in _NEEDED.get(name, ()):
-            raise InputError(f"force {name} lacks {' or '.join(choices)}")
-        for key in used:
-            parameters[parameter] = float(checks.number(key, settings[key])) * choices[key]
+    defaults = {parameter: 0.0 for parameter in known if parameter not in _NEEDED.get(name, ())}
+    parameters = settings_of(f"force {name}", known, settings, defaults)
     if parameters.get("frequency", 1.0) <= 0:
         raise InputError(f"frequency_hz is {parameters['frequency']:g}; a number above 0 is needed")
     return SpecificForce(name, parameters)

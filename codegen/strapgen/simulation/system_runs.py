@@ -151,7 +151,8 @@ def system_history(runner: SystemRunner, recording: Recording) -> History:
     values = course.values[cell.name]
     begin = np.array([[float(value) for value in cell.initial]]).reshape(1, *cell.signal.shape)
     time: Array = recording.start + step * np.arange(1 + len(values), dtype=np.float64)
-    return History(time, np.concatenate([begin, values]), step, course.unused)
+    states = np.concatenate([begin, values])
+    return History(time, states, step, course.unused, cell.signal.elements)
 
 
 @dataclass(frozen=True)

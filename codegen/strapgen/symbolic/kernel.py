@@ -12,6 +12,7 @@ from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import counted_shape, notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic import unknown_values
 from strapgen.symbolic.evaluation import evaluate
@@ -55,6 +56,12 @@ class Stage:
 
     signal: Signal
     expressions: tuple[sp.Expr, ...]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        shape = counted_shape(self.signal.shape)
+        return f"{self.signal.name} ({shape}, unit {self.signal.unit}): {self.signal.meaning}".rstrip(": ")
 
 
 def evaluate_stages(
@@ -137,6 +144,17 @@ class Kernel:
     arguments: str = ""
     notes: tuple[str, ...] = field(default=())
     unknowns: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        ins = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.inputs)
+        outs = ", ".join(
+            f"{stage.signal.name} ({counted_shape(stage.signal.shape)})" for stage in self.outputs
+        )
+        order = "" if self.order is None else f"; order {self.order.step}"
+        return f"{self.name}: {self.title}\n{ins} -> {outs}{order}"
 
     @property
     def identifier(self) -> str:
@@ -258,6 +276,14 @@ class KernelBuilder:
     >>> v.T
     Matrix([[v_x, v_y, v_z]])
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        parts = {"input": self.inputs, "stage": [s.signal for s in self.stages]}
+        parts["output"] = [s.signal for s in self.outputs]
+        names = {kind: ", ".join(signal.name for signal in signals) for kind, signals in parts.items()}
+        return "\n".join(f"{kind} {text or 'none'}" for kind, text in names.items())
 
     def __init__(self) -> None:
         self.inputs: list[Signal] = []

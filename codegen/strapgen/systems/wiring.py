@@ -12,6 +12,7 @@ from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, Signal
 from strapgen.ir.system import Cell, DescribedSystem, Push, Rate, SystemStage, Wire
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import unknown
 from strapgen.systems import built_in, system_file, wire_checks
@@ -41,6 +42,11 @@ class Description:
     programs: Mapping[str, Program]
     ranges: Mapping[str, Mapping[str, Fraction]]
     formats: Mapping[str, Mapping[str, str]]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"{self.system.name}: {', '.join(self.programs)}"
 
 
 def read_system(path: str | Path, sample_hz: Fraction | None = None) -> Description:

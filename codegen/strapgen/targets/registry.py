@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from strapgen.ir.sources import Sources
 from strapgen.support import checks, packages
+from strapgen.support.brief import short_repr
 from strapgen.support.cache import digest
 from strapgen.support.exceptions import InputError, StrapgenError
 from strapgen.support.packages import entry_points
@@ -65,6 +66,8 @@ class Target:
     language: str = ""
     number: str = ""
     folder: str = ""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in ("title", "language", "number", "folder"):
@@ -129,6 +132,11 @@ BUILT_IN = {
 
 class _Targets(Mapping[str, Target]):
     """The targets of strapgen, then those of entry points, each imported when it is looked up."""
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return ", ".join(self)
 
     def __getitem__(self, name: str) -> Target:
         if name in BUILT_IN:

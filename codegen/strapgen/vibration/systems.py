@@ -31,8 +31,10 @@ CHANNELS = (*ANGLES, *VELOCITIES)
 SAMPLES = ("increments", "increment", "turns", "velocity_increments", "velocity_increment")
 #: Kernels of the catalogue that accumulate sums over a slow cycle.
 RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
+#: Vectors of a step that have a mean rate.
+VECTORS = ("rotation-vector", "sculling", "velocity-position")
 #: Kernels of the catalogue that can be assessed.
-NAMES = (*catalogue.ALGORITHMS, *catalogue.VECTORS, *RECURSIONS)
+NAMES = (*catalogue.ALGORITHMS, *VECTORS, *RECURSIONS)
 #: The kernel that computes attitude and velocity after a step from its rotation vector and sculling term.
 _SLOW_LOOP = "dcm-two-speed-slow-2"
 #: The output that is the whole change of velocity, and not what comes on top of the sum of the increments.

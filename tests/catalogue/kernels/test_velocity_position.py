@@ -197,5 +197,5 @@ def test_translation_integrates_gravity_and_changes(name, rng):
 
 
 def test_rates_at_nodes_are_refused():
-    with pytest.raises(InputError, match="takes increments of angle and of velocity"):
+    with pytest.raises(InputError, match="takes increments; rates at nodes"):
         choose(NAME, "rk4", rates=True)

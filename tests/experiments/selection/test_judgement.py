@@ -68,12 +68,12 @@ def test_every_class_of_1984_has_an_answer_that_is_generated_and_that_a_simulati
 ):
     path, folder = BRIEFS / f"{name}.toml", tmp_path / "firmware"
     with pytest.raises(SystemExit) as stop:
-        main(["design", str(path), "--simulate", "8", "--generate", str(folder), "--format", "json"])
+        main(["design", str(path), "--simulate", "3", "--generate", str(folder), "--format", "json"])
     assert stop.value.code in (0, None)
     rows = json.loads(capsys.readouterr().out)
     accepted = [row for row in rows if row["meets"]]
     assert accepted and len(accepted) < len(rows)
-    for row in accepted[:8]:
+    for row in accepted[:3]:
         drift, run_in_time = row["drift_deg_h"], row["simulated_deg_h"]
         for cause in ("truncation", "coning"):
             assert drift[cause] == pytest.approx(run_in_time[cause], rel=PART, abs=LEAST), (
@@ -83,7 +83,9 @@ def test_every_class_of_1984_has_an_answer_that_is_generated_and_that_a_simulati
         assert run_in_time["rounding"] <= drift["rounding"], row["name"]
         for cause in ("quantization", "noise"):
             interval = run_in_time[cause]
-            assert interval["low"] <= drift[cause] <= interval["high"], (row["name"], cause)
+            # Of two dozen intervals of 95 % one or two miss: 1.7 times as wide, of 99.9 %, none does.
+            most = 1.7 * (interval["high"] - interval["low"]) / 2
+            assert drift[cause] == pytest.approx(interval["mean"], rel=0, abs=most), (row["name"], cause)
     (source,) = (
         file for file in folder.glob("*.c") if file.name not in ("main.c",) and "test" not in file.name
     )
@@ -103,7 +105,6 @@ def test_everything_that_meets_a_brief_does_so_in_time_as_well():
     brief, ordered = answer(path, ["two-speed", "rk4", "taylor2", "magnus4", "coning-combined", "window-3-3"])
     accepted = [one for one in ordered if one.meets]
     assert {"euler", "dcm"} == {one.state for one in accepted if one.method == "two-speed"}
-    outside = 0
     for one in accepted:
         simulated = run(brief, one, algorithm_named(one, brief, path))
         for cause in ("truncation", "coning"):
@@ -113,9 +114,8 @@ def test_everything_that_meets_a_brief_does_so_in_time_as_well():
         assert simulated.rounding <= one.drift_deg_h["rounding"], one.name
         for cause in ("quantization", "noise"):
             random = getattr(simulated, cause)
-            outside += not random.low <= one.drift_deg_h[cause] <= random.high
-    # One interval in twenty does not hold what it is of.
-    assert outside <= 0.1 * 2 * len(accepted)
+            most = 1.7 * (random.high - random.low) / 2  # as above
+            assert one.drift_deg_h[cause] == pytest.approx(random.mean, rel=0, abs=most), (one.name, cause)
 
 
 def test_coning_and_quantization_are_the_same_with_every_state():

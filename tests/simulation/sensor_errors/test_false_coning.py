@@ -11,7 +11,7 @@ import pytest
 import strapgen
 from strapgen import choose
 from strapgen.simulation.motions import IntegratedMotion
-from strapgen.simulation.rate_profiles import CosineSum
+from strapgen.simulation.rate_motions.rate_profiles import CosineSum
 from strapgen.simulation.reference_attitudes import ReferenceAttitude
 from strapgen.simulation.runs import drift_between, simulate
 from strapgen.simulation.sensor_errors.instruments import InstrumentErrors, TriadErrors

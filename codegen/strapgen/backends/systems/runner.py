@@ -20,6 +20,7 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.signals import CYCLE
 from strapgen.ir.system import Push, Rate, SystemStage
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.systems.bounds import SystemBounds, bounds
 from strapgen.systems.fitting import Fitted
@@ -39,6 +40,11 @@ class SystemRunner(ABC):
     backend : str
         Name of the back end.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"{self.system.name} on {self.backend}: {', '.join(self.fit.sources)}"
 
     def __init__(self, fit: Fitted, backend: str) -> None:
         self.fit = fit

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
+from itertools import count
+
+import sympy as sp
 
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import Method
@@ -10,6 +14,7 @@ from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.attitude_step import Companions, Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.symbolic.rotations import dot
 
 
 def step(
@@ -145,6 +150,31 @@ def chosen(method: Method, increments: int | None, previous: int = 0, ahead: int
     if method.conditions is not None:
         suffix, option = method.name, stated
     return suffix, option, source
+
+
+def smooth(build: KernelBuilder, kinematics: Kinematics, order: int) -> Kinematics:
+    """Return a kinematics whose exponential is a series, which has a derivative everywhere.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+        The kernel under construction, in which the square of each angle gets a name.
+    kinematics : Kinematics
+    order : int
+        Highest power of the rotation vector in the series.
+    """
+    numbers = count(1)
+
+    def exponential(v: sp.Matrix, *_: object) -> sp.Matrix:
+        name = f"square_{next(numbers)}"
+        named = build.stage(
+            Signal.vector(f"{name}_of", f"{name}_of", unit="rad", meaning="a rotation vector"), v
+        )
+        return kinematics.exponential(
+            named, order, build.value(name, dot(named, named), "square of its length")
+        )
+
+    return replace(kinematics, exponential=exponential)
 
 
 def product(name: str) -> Kernel:

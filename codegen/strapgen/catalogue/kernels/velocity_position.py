@@ -19,7 +19,7 @@ from itertools import pairwise
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.attitude_step import chosen
+from strapgen.catalogue.kernels.attitude_step import chosen, smooth
 from strapgen.catalogue.kernels.legendre_step import Coefficients, unfiltered
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods import fit_exact, legendre_vector, rotation_series, windowed
@@ -180,7 +180,9 @@ class _Turn:
         if rate.method.rotation_vector is not None:
             self._turn = rate.method.rotation_vector(build, rate.samples)
         else:
-            self._turn = build.stage(EULER.transition, rate.method.transition(build, _SERIES, rate.samples))
+            self._turn = build.stage(
+                EULER.transition, rate.method.transition(build, smooth(build, EULER, SERIES), rate.samples)
+            )
         self.stages = tuple(build.stages[begin:])
         if self._vector:
             square = build.value(
@@ -206,7 +208,3 @@ class _Turn:
             cross(self._turn, dual),
         )
         return dual + self._first * crossed + self._second * cross(self._turn, crossed)
-
-
-#: Euler parameters whose exponential is a series: it has a derivative everywhere.
-_SERIES = replace(EULER, exponential=lambda v, *rest: rotations.quaternion(v, SERIES))

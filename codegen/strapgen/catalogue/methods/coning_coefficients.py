@@ -28,6 +28,7 @@ from sympy.polys.matrices import DomainMatrix
 from strapgen.catalogue.methods import rotation_series
 from strapgen.catalogue.methods.rotation_series import Scalars, fraction
 from strapgen.support import checks
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 
 SOURCES = {
@@ -61,6 +62,12 @@ class Design:
     samples: int
     previous: int
     pairs: Scalars
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"{self.form}, {self.samples} samples, {self.previous} before them, {len(self.pairs)} coefficients"
 
     @cached_property
     def degree(self) -> int:

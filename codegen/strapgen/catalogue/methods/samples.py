@@ -12,6 +12,7 @@ from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.signals import Signal
+from strapgen.support.brief import short_repr
 from strapgen.symbolic.kernel import KernelBuilder
 
 
@@ -133,6 +134,13 @@ class Samples:
         ``fit(increments, previous, ahead)`` returns the rate in terms of the increments; by default the polynomial
         through them.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        if self.increments is None:
+            return "the rate at the nodes of the method"
+        return f"{self.increments} increments of the step, {self.previous} before it, {self.ahead} after it"
 
     def __init__(
         self,

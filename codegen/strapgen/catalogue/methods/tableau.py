@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from strapgen.support.brief import notebook_latex, short_repr
+
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
 
@@ -51,6 +53,12 @@ class Tableau:
     embedded_weights: tuple[Number, ...] | None = None
     tolerance: Fraction = Fraction(0)
     file: str = field(default="", compare=False, repr=False)
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"{self.name}: {self.title}, order {self.order}, {len(self.nodes)} stages"
 
     @property
     def option(self) -> str:

@@ -17,6 +17,7 @@ from strapgen.catalogue.methods import coefficient_files, coefficients, order_co
 from strapgen.catalogue.methods.coefficient_files import entries
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.support import checks, toml_files
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted, needed
 
@@ -43,6 +44,11 @@ class _BuiltIn(Mapping[str, Tableau]):
 
     They are sorted by order, with those of the thesis first within an order. Tests verify the files.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return ", ".join(self)
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

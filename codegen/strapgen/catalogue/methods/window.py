@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
 
@@ -101,6 +102,14 @@ class Window:
     start: tuple[Window, ...] = ()
     file: str = field(default="", compare=False, repr=False)
     sibling: bool = False
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        samples = f"{self.previous} samples before a step of {self.increments}, {self.ahead} ahead"
+        return (
+            f"{self.name}: {self.title}\n{samples}; {self.objective} to {float(self.band):.4g} rad a sample"
+        )
 
     @property
     def option(self) -> str:

@@ -18,6 +18,7 @@ from strapgen.catalogue.methods import coefficient_files, coefficients, window_c
 from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
 from strapgen.support import checks, toml_files
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
 
@@ -50,6 +51,11 @@ class _BuiltInWindows(Mapping[str, Window]):
 
     A file is called window-P-L, so that the names are known without reading it.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return ", ".join(self.titles)
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.catalogue.user import isolation, kernel_cache
 from strapgen.catalogue.user.user_kernel import UserKernel
 from strapgen.support import cache, checks, packages
+from strapgen.support.brief import full_text
 from strapgen.support.exceptions import InputError
 from strapgen.support.packages import entry_points
 
@@ -61,7 +62,7 @@ def load(name: str, **options: Any) -> UserKernel:
         If there is no such algorithm, its code fails, or what it returns is no attitude step.
     """
     arguments = _arguments(name, options)
-    texts = [f"{option} {value!r} {getattr(value, 'file', '')}" for option, value in options.items()]
+    texts = [f"{option} {full_text(value)} {getattr(value, 'file', '')}" for option, value in options.items()]
     isolation.depends_on(f"loads {name}, another algorithm")
     find = _of_file if name.endswith(".py") else _of_entry_point
     return find(name, options, texts).with_arguments(arguments)

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from strapgen.support.brief import full_text
+
 if TYPE_CHECKING:
     from strapgen.ir.attitude_step import Companions
     from strapgen.symbolic.kernel import Kernel, Stage
@@ -117,12 +119,12 @@ def packed(kernel: Kernel) -> bytes | None:
 def _text(kernel: Kernel) -> str:
     """Return a kernel as text, its formulas with the class of every part.
 
-    `repr` shows the number pi and a symbol of that name alike.
+    SymPy's own text shows the number pi and a symbol of that name alike.
     """
     from sympy import srepr
 
     def shown(stages: tuple[Stage, ...]) -> str:
-        return repr([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
+        return full_text([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
 
     rest = replace(kernel, stages=(), outputs=(), own=())
-    return " ".join([repr(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])
+    return " ".join([full_text(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])

@@ -31,8 +31,8 @@ def derive(
 ) -> None:
     """Show the formulas, the program or the operations of a kernel.
 
-    The program is lowered from the formulas. It and the operations are tables, which --format csv and --format markdown
-    write.
+    The program is lowered from the formulas. It and the operations are tables, which --format csv, markdown and latex
+    write; of the formulas, latex shows a step in vectors.
 
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """

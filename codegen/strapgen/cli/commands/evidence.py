@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from strapgen.evidence.subjects import Subject
     from strapgen.evidence.verdicts import Verdict
 
-_FORMATS = ("text", "json", "csv", "markdown")
+_FORMATS = ("text", "json", "csv", "markdown", "latex")
 
 
 @grouped

@@ -121,7 +121,7 @@ class SeriesOutput(Output):
         plot_option("the predicted and the simulated drift on --motion with the parameters --set"),
     ] = None
     format: Annotated[
-        _Text, format_option(("text", "latex", "json"), " With --all: text, json, csv or markdown.")
+        _Text, format_option(("text", "latex", "json"), " With --all: csv and markdown too.")
     ] = "text"
     formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex", "csv", "markdown")
 
@@ -252,8 +252,6 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
     }.items():
         if value is not None:
             raise InputError(f"--all and {name} do not go together")
-    if output.format == "latex":
-        raise InputError("--all is a table; text, json, csv and markdown are allowed, not latex")
     from strapgen import catalogue
     from strapgen.analysis import overview
     from strapgen.reports.error_analysis.overview import overview_report

@@ -89,7 +89,7 @@ def tableau(
     if output.format == "toml":
         output.deliver(toml_text(butcher))
     else:
-        output.report(tableau_report(tableau_data(butcher)))
+        output.report(tableau_report(tableau_data(butcher), butcher))
 
 
 def _families(method: str, output: Output) -> None:

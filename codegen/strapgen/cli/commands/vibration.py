@@ -13,7 +13,7 @@ import typer
 from strapgen.cli.band_options import GyroDamping
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, SeveralMethods, option, whole
-from strapgen.cli.output import Output, format_option, plot_option
+from strapgen.cli.output import Output, plot_option
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -224,8 +224,6 @@ class VibrationOutput(Output):
             help="Lowest and highest frequency of the plot in Hz.  [default: up to half the sampling frequency]",
         ),
     ] = None
-    format: Annotated[_Text, format_option((*Output.formats, "latex"))] = "text"
-    formats: ClassVar[tuple[str, ...]] = (*Output.formats, "latex")
 
     def frequencies(self, sampling: float, marked: float) -> tuple[float, float]:
         """Return the ends of the plot in Hz, checked like the marked frequency against the sampling frequency."""

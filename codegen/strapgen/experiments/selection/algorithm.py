@@ -21,6 +21,22 @@ from strapgen.simulation.runs import Run, drift_between, simulate
 FREE = ("negate",)
 
 
+#: Longest word whose rounding double shows, and most steps of a run in 40 digits, which takes their place.
+_LONGEST_WORD, _MOST_STEPS = 32, 4000
+
+
+def reference(brief: DesignBrief, steps: int) -> tuple[str, int]:
+    """Return the back end beside which fixed point is run, and the steps of that run: words may be finer than double.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    steps : int
+        Steps where that is double.
+    """
+    return ("numpy", steps) if brief.processor.word <= _LONGEST_WORD else ("exact", min(steps, _MOST_STEPS))
+
+
 class ProcessorCost(NamedTuple):
     """What an algorithm costs on a processor.
 
@@ -77,7 +93,7 @@ class Algorithm(Protocol):
         """Run the algorithm in double on a motion."""
 
     def rounded_apart(self, motion: Motion, steps: int, carry: str) -> float:
-        """Return the drift between fixed point and double at the end of a run on a motion."""
+        """Return the drift between fixed point and its reference at the end of a run on a motion."""
 
 
 class AttitudeStep:
@@ -140,8 +156,9 @@ class AttitudeStep:
         return simulate(backend(self.choice), motion, self.step, steps * self.step, record=record)
 
     def rounded_apart(self, motion: Motion, steps: int, carry: str) -> float:
-        """Return the drift between the integer model and double, on the increments of the integer model."""
-        choice, double = self.choice, backend(self.choice)
+        """Return the drift between the integer model and its reference, on the increments of the integer model."""
+        name, steps = reference(self._brief, steps)
+        choice, double = self.choice, backend(self.choice, backend=name)
         settings = causes.settings(choice, self._brief, carry)
         fixed = backend(choice, backend="fixed-model", settings=settings)
         row = fixed.representable(

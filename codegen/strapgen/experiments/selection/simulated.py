@@ -20,7 +20,7 @@ from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.experiments.selection.environment import Line
 from strapgen.experiments.selection.judgement import Judgement
 from strapgen.simulation.motions import Motion, motion
-from strapgen.simulation.rate_profiles import CosineSum
+from strapgen.simulation.rate_motions.rate_profiles import CosineSum
 from strapgen.simulation.reference_attitudes import KNOT, ReferenceAttitude
 from strapgen.simulation.runs import Run
 
@@ -61,7 +61,7 @@ class Simulated:
     coning : float or None
         Drift in deg/h under the vibration, less the true one; None without vibration.
     rounding : float
-        Drift in deg/h between fixed point and double in the steady turn.
+        Drift in deg/h between fixed point and double in the steady turn; words of 64 bits run beside 40 digits.
     quantization, noise : RandomDrift or None
         Drift after the time of the budget that pulses and noise leave in the steady turn: that of shorter random runs,
         times the factor by which it grows in the closed form. None without pulses or noise.

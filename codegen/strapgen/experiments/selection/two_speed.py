@@ -23,7 +23,7 @@ from strapgen.backends import evaluator, exact
 from strapgen.backends.systems import system_runner
 from strapgen.catalogue import Choice
 from strapgen.experiments.selection import causes
-from strapgen.experiments.selection.algorithm import FREE, ProcessorCost
+from strapgen.experiments.selection.algorithm import FREE, ProcessorCost, reference
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.causes import Rounding
 from strapgen.experiments.systems.cost import measured_budget
@@ -311,10 +311,11 @@ class TwoSpeedLoops:
         return simulate_system(runner, motion, steps * self.step, record)
 
     def rounded_apart(self, motion: Motion, steps: int, carry: str) -> float:
-        """Return the drift between the integer model and double on the same motion."""
+        """Return the drift between the integer model and its reference on the same motion."""
+        name, steps = reference(self.brief, steps)
         settings = Settings.of(word=self.brief.processor.word)
         description = self.fixed.description
-        runners = system_runner(description, "fixed-model", settings), system_runner(description, "numpy")
+        runners = system_runner(description, "fixed-model", settings), system_runner(description, name)
         ends = [simulate_system(runner, motion, steps * self.step).computed[-1:] for runner in runners]
         return float(np.linalg.norm(drift_between(*ends)[-1])) / float(steps * self.step) * causes.DEG_H
 

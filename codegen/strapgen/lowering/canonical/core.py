@@ -12,23 +12,8 @@ from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.lowering.canonical.vectors import Form, components, independent
 from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError
+from strapgen.symbolic.degrees import degree
 from strapgen.symbolic.kernel import Kernel, Stage, evaluate_stages
-
-
-@dataclass(frozen=True)
-class _Degree:
-    """The degree of a polynomial; sums and products of degrees follow those of the polynomials."""
-
-    value: int
-
-    def __add__(self, other: _Degree) -> _Degree:
-        return max(self, other, key=lambda degree: degree.value)
-
-    def __mul__(self, other: _Degree) -> _Degree:
-        return _Degree(self.value + other.value)
-
-    def __pow__(self, exponent: int) -> _Degree:
-        return _Degree(self.value * exponent)
 
 
 @dataclass(frozen=True)
@@ -70,12 +55,11 @@ class Core:
         NotCovariantError
             If the transition is no polynomial.
         """
-        vectors = {name: _Degree(1) for signal, _ in self.vectors.values() for name in signal.elements}
-        try:
-            known = evaluate_stages(self.stages, vectors, lambda number: _Degree(0))
-            return max(int(known[name].value) for name in self.transition.elements)
-        except (AttributeError, TypeError, ValueError):  # SymPy's errors where no sum or product is left
-            raise NotCovariantError("the transition is no polynomial") from None
+        elements = [name for signal, _ in self.vectors.values() for name in signal.elements]
+        highest = degree(self.stages, elements, self.transition.elements)
+        if highest is None:
+            raise NotCovariantError("the transition is no polynomial")
+        return highest
 
     def base(self) -> list[Form]:
         """Return independent vectors that span all the others."""

@@ -8,6 +8,7 @@ import sympy as sp
 
 from strapgen.analysis.growth import Stability
 from strapgen.analysis.notation import intervals_text
+from strapgen.reports.display.methods import stability_latex
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
@@ -29,6 +30,7 @@ def stability_report(stabilities: Sequence[Stability]) -> Report:
         lambda: stability_text(stabilities),
         lambda: [one.as_dict() for one in stabilities],
         lambda: _table(stabilities),
+        latex=lambda: stability_latex(stabilities),
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import sympy as sp
 
 from strapgen.analysis.ratios import STEP_ANGLE, Claim, Ratio, columns
-from strapgen.reports.latex import align_environment
+from strapgen.reports.display.latex import align_environment
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 

@@ -12,7 +12,8 @@ from strapgen.analysis.growth import Growth, contraction
 from strapgen.analysis.motion_rates import is_plain
 from strapgen.analysis.notation import LATEX, covariant_text, intervals_text, scalar_text
 from strapgen.analysis.series import PARTS, STEP
-from strapgen.reports.latex import align_environment, wrapped
+from strapgen.reports.display.expressions import expression_latex
+from strapgen.reports.display.latex import equations
 from strapgen.reports.report import Report
 
 
@@ -119,12 +120,10 @@ def series_latex(analysis: ErrorAnalysis) -> str:
     rows: list[tuple[str, str]] = []
     if step.invariant:
         for power, one in step.invariant.items():
-            rows.append(
-                (rf"h^{{{power}}}\!:\ \mathbf{{d}}", wrapped(covariant_text(one.drift, notation=LATEX)))
-            )
+            rows.append((rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX)))
             if one.symmetric:
                 text = covariant_text(one.symmetric, symmetric=True, notation=LATEX)
-                rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", wrapped(text)))
+                rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", text))
     else:
         for part in PARTS:
             rows += _latex_rows(rf"\mathrm{{{part}}}", step.expressions(part))
@@ -132,8 +131,8 @@ def series_latex(analysis: ErrorAnalysis) -> str:
         rows += _latex_rows(r"\dot{\mathrm{drift}}", _sums(analysis.run.secular))
         rows += _latex_rows(r"\mathrm{bounded}", _sums(analysis.run.bounded))
     if analysis.constant is not None:
-        rows.append((r"\delta(x)", sp.latex(analysis.constant.angle_lost)))
-        rows.append((r"\rho(x)^{2}", sp.latex(analysis.constant.stretch_squared)))
+        rows.append((r"\delta(x)", expression_latex(analysis.constant.angle_lost)))
+        rows.append((r"\rho(x)^{2}", expression_latex(analysis.constant.stretch_squared)))
     for name, symbol in (("length", r"|e| - 1"), ("determinant", r"\det C - 1")):
         terms = getattr(analysis.growth, name)
         if terms is None:
@@ -145,15 +144,16 @@ def series_latex(analysis: ErrorAnalysis) -> str:
             )
             rows.append((symbol, text or "0"))
         else:
-            rows.append((symbol, sp.latex(sp.Add(*(x * STEP**p for p, x in terms.items())))))
+            rows.append((symbol, expression_latex(sp.Add(*(x * STEP**p for p, x in terms.items())))))
     head = (
         f"% {step.kernel}, {step.motion} motion: what one step of length h loses\n"
         "% d: drift; Y: scale and skew, S(a, b) = a b' + b a'; delta: angle lost, rho: stretch, x = |w| h"
     )
-    return f"{head}\n{align_environment(f'  {left} &= {right}' for left, right in rows)}"
+    return f"{head}\n{equations(rows, head='  ')}"
 
 
 def _latex_rows(name: str, expressions: Sequence[sp.Expr]) -> list[tuple[str, str]]:
     return [
-        (f"{name}_{axis}", sp.latex(expression)) for axis, expression in zip("xyz", expressions, strict=True)
+        (f"{name}_{axis}", expression_latex(expression))
+        for axis, expression in zip("xyz", expressions, strict=True)
     ]

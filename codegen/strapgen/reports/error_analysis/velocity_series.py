@@ -7,7 +7,7 @@ from typing import Any
 
 from strapgen.analysis.notation import LATEX, TEXT, covariant_text, with_forces
 from strapgen.analysis.velocity_series import PARTS, VelocitySeries
-from strapgen.reports.latex import align_environment, wrapped
+from strapgen.reports.display.latex import equations
 from strapgen.reports.report import Report
 
 #: Names of the errors in LaTeX.
@@ -47,8 +47,8 @@ def _text(series: VelocitySeries) -> str:
 def _latex(series: VelocitySeries) -> str:
     notation = with_forces(LATEX, series.known, r"\mathbf{{f}}_{{{}}}".format)
     rows = [
-        rf"h^{{{power}}}\!:\ {_SYMBOLS[part]} &= {wrapped(covariant_text(one, notation=notation))}"
+        (rf"h^{{{power}}}\!:\ {_SYMBOLS[part]}", covariant_text(one, notation=notation))
         for part in PARTS
         for power, one in series.coefficients(part).items()
     ]
-    return align_environment(rows)
+    return equations(rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +26,26 @@ def plot_run(run: Run, title: str, path: str | Path) -> Path:
 def plot_history(history: History, elements: Sequence[str], title: str, path: str | Path) -> Path:
     """Plot an attitude history to a file; see `history_image`."""
     return write_file(path, history_image(history, elements, title, path))
+
+
+def run_figure(run: Run, title: str) -> Any:
+    """Return the figure of `run_image`."""
+    figure, grid = figures.grid_of_axes(3, 3, (12, 8))
+    parts = (
+        ("scale", "", run.scale, AXES),
+        ("skew", ", deg", np.degrees(run.skew), SKEW_PLANES),
+        ("drift", ", deg", np.degrees(run.drift), AXES),
+    )
+    for row, (kind, unit, values, names) in enumerate(parts):
+        for column, name in enumerate(names):
+            axes = grid[row, column]
+            axes.plot(run.time, values[:, column], color=figures.COLOURS[row], linewidth=1.4)
+            axes.set_title(f"{name} {kind}{unit}", loc="left", fontsize=10)
+            figures.style_over_time(axes)
+            if row == 2:
+                axes.set_xlabel("time, s")
+    figure.suptitle(figures.printable(title), fontsize=12)
+    return figure
 
 
 def run_image(run: Run, title: str, path: str | Path) -> bytes:
@@ -50,26 +70,16 @@ def run_image(run: Run, title: str, path: str | Path) -> bytes:
     InputError
         If the kind of image is unknown.
     """
-    figure, grid = figures.grid_of_axes(3, 3, (12, 8))
-    parts = (
-        ("scale", "", run.scale, AXES),
-        ("skew", ", deg", np.degrees(run.skew), SKEW_PLANES),
-        ("drift", ", deg", np.degrees(run.drift), AXES),
-    )
-    for row, (kind, unit, values, names) in enumerate(parts):
-        for column, name in enumerate(names):
-            axes = grid[row, column]
-            axes.plot(run.time, values[:, column], color=figures.COLOURS[row], linewidth=1.4)
-            axes.set_title(f"{name} {kind}{unit}", loc="left", fontsize=10)
-            figures.style_over_time(axes)
-            if row == 2:
-                axes.set_xlabel("time, s")
-    figure.suptitle(figures.printable(title), fontsize=12)
-    return figures.image(figure, path)
+    return figures.image(run_figure(run, title), path)
 
 
 def history_image(history: History, elements: Sequence[str], title: str, path: str | Path) -> bytes:
     """Return the elements of an attitude history against time; parameters and errors are those of `run_image`."""
+    return figures.image(history_figure(history, elements, title), path)
+
+
+def history_figure(history: History, elements: Sequence[str], title: str) -> Any:
+    """Return the figure of `history_image`."""
     states = history.states.reshape(len(history.time), -1)
     columns = 3 if len(elements) == 9 else 1
     rows = -(-len(elements) // columns)
@@ -83,11 +93,16 @@ def history_image(history: History, elements: Sequence[str], title: str, path: s
     for axes in grid[-1]:
         axes.set_xlabel("time, s")
     figure.suptitle(figures.printable(title), fontsize=12)
-    return figures.image(figure, path)
+    return figure
 
 
 def course_image(course: Course, title: str, path: str | Path) -> bytes:
     """Return attitude and velocity changes along a recording against time; otherwise as `run_image`."""
+    return figures.image(course_figure(course, title), path)
+
+
+def course_figure(course: Course, title: str) -> Any:
+    """Return the figure of `course_image`."""
     figure, grid = figures.grid_of_axes(2, 3, (12, 6))
     parts = (
         [f"{name}, deg" for name in ANGLES],
@@ -103,4 +118,4 @@ def course_image(course: Course, title: str, path: str | Path) -> bytes:
             if row == 1:
                 axes.set_xlabel("time, s")
     figure.suptitle(figures.printable(title), fontsize=12)
-    return figures.image(figure, path)
+    return figure

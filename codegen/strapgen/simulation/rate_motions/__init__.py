@@ -1,1 +1,1 @@
-"""Motions whose body rate is an expression: increments and attitude are integrated with proved bounds."""
+"""Motions of a body rate: profiles that are built in, and expressions that are integrated with proved bounds."""

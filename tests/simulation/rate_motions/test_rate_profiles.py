@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 import strapgen
-from strapgen.simulation import rate_profiles
+from strapgen.simulation.rate_motions import rate_profiles
 from strapgen.support.exceptions import InputError
 
 MOTIONS = {

@@ -1,0 +1,120 @@
+"""Writes tableaux, order conditions, coning coefficients and stretches as LaTeX, as the literature prints them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.analysis.growth import Stability
+from strapgen.catalogue.methods import order_conditions
+from strapgen.catalogue.methods.coning_coefficients import Design
+from strapgen.catalogue.methods.samples import sample_names
+from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.reports.display.expressions import expression_latex
+from strapgen.reports.display.latex import PAGE, equations, sum_text, width
+
+#: The highest order whose conditions stand below a tableau: there are eight.
+_MOST_CONDITIONS = 4
+
+
+def tableau_latex(tableau: Tableau) -> str:
+    """Return a tableau as books print it, or its coefficients stage by stage where that is wider than a page."""
+    rows = [
+        [_number(x) for x in (node, *row)] for node, row in zip(tableau.nodes, tableau.matrix, strict=True)
+    ]
+    bottom = [["", *map(_number, row)] for row in (tableau.weights, tableau.embedded_weights) if row]
+    stages = len(tableau.nodes)
+    filled = [[*row, *[""] * (1 + stages - len(row))] for row in (*rows, *bottom)]
+    if sum(max(width(row[k]) for row in filled) + 2 for k in range(1 + stages)) > PAGE:
+        return _by_stage(tableau)
+    lines = [" & ".join(row) for row in filled]
+    lines[stages] = r"\hline " + lines[stages]
+    body = " \\\\\n".join(lines)
+    return f"\\[\n\\begin{{array}}{{c|{'c' * stages}}}\n{body}\n\\end{{array}}\n\\]"
+
+
+def order_conditions_latex(order: int) -> str:
+    r"""Return the conditions up to an order, one for each rooted tree, as an align environment.
+
+    Parameters
+    ----------
+    order : int
+        From 1.
+
+    Examples
+    --------
+    >>> print(order_conditions_latex(2))
+    \begin{align*}
+    \sum b_{i} &= 1 \\
+    \sum b_{i} c_{i} &= \frac{1}{2}
+    \end{align*}
+    """
+    every = [tree for nodes in range(1, order + 1) for tree in order_conditions.trees(nodes)]
+    return equations(
+        (_weight(order_conditions.weight_text(tree)), _number(Fraction(1, order_conditions.density(tree))))
+        for tree in every
+    )
+
+
+def method_latex(tableau: Tableau) -> str:
+    """Return a tableau and below it the order conditions that it fulfils, up to the fourth order."""
+    return "\n\n".join([tableau_latex(tableau), order_conditions_latex(min(tableau.order, _MOST_CONDITIONS))])
+
+
+def coning_latex(design: Design) -> str:
+    """Return the rotation vector of a step by coning coefficients, and the mean drift that remains on coning."""
+    names = [_sample(name) for name in sample_names(design.samples, design.previous)]
+    terms = [(Fraction(1), name) for name in names[design.previous :]]
+    terms += [(c, rf"{names[older]} \times {names[newer]}") for (older, newer), c in design.pairs.items()]
+    symbols = {name: sp.Symbol(name) for name in ("alpha", "omega", "T")}
+    drift = sp.sympify(design.residual().expression, locals=symbols)
+    return equations(
+        [(r"\boldsymbol{\phi}", sum_text(terms)), (r"\delta\dot{\phi}", expression_latex(drift))]
+    )
+
+
+def stability_latex(stabilities: Sequence[Stability]) -> str:
+    r"""Return the squares of the stretches \rho of steps as functions of the angle x of a step in rad."""
+    return equations(
+        (rf"\rho_{{\mathrm{{{one.kernel}}}}}^{{2}}", expression_latex(one.stretch_squared))
+        for one in stabilities
+    )
+
+
+def _by_stage(tableau: Tableau) -> str:
+    """Return what is not zero in a tableau, a row for each stage and one for the weights."""
+    rows = []
+    for stage, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
+        parts = [rf"a_{{{stage},{place}}} = {_number(x)}" for place, x in enumerate(row, 1) if x]
+        rows.append((f"c_{{{stage}}}", _joined([_number(node), *parts])))
+    for letter, weights in (("b", tableau.weights), (r"\hat b", tableau.embedded_weights or ())):
+        named = [(f"{letter}_{{{place}}}", _number(x)) for place, x in enumerate(weights, 1) if x]
+        if named:
+            (left, right), *others = named
+            rows.append((left, _joined([right, *(f"{name} = {text}" for name, text in others)])))
+    return equations(rows)
+
+
+def _joined(parts: Iterable[str]) -> str:
+    return r", \quad ".join(parts)
+
+
+def _number(value: Fraction | sp.Expr) -> str:
+    return str(
+        sp.latex(sp.Rational(value.numerator, value.denominator) if isinstance(value, Fraction) else value)
+    )
+
+
+def _weight(text: str) -> str:
+    r"""Return an elementary weight: "sum b_i a_ij c_j^2" as \sum b_{i} a_{ij} c_{j}^2."""
+    return re.sub(r"_([a-z]+)", r"_{\1}", text.replace("sum", r"\sum", 1))
+
+
+def _sample(name: str) -> str:
+    """Return the letter of a sample, those before the step counted from zero backwards as in d_0, d_{-1}."""
+    kind, number = re.fullmatch(r"([a-z]+)(\d+)", name).groups()  # type: ignore[union-attr]
+    index = {"past": 1 - int(number), "d": int(number)}[kind]
+    return rf"\mathbf{{d}}_{{{index}}}"

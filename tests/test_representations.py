@@ -1,0 +1,197 @@
+"""Every public object shows itself in a few short lines."""
+
+from __future__ import annotations
+
+import inspect
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import strapgen
+from strapgen.support.brief import LINES, WIDTH, full_text, short_repr
+
+TURN = np.full((8, 2, 3), 0.01)
+
+
+def kernel() -> strapgen.Kernel:
+    return strapgen.derive("euler", "rk4", 2)
+
+
+def program() -> strapgen.Program:
+    return strapgen.lower(kernel())
+
+
+def stepper(name: str = "numpy") -> strapgen.Backend:
+    return strapgen.backend("euler", "rk4", 2, name)
+
+
+def recording() -> strapgen.Recording:
+    return strapgen.Recording(0.0, 0.01, np.full((20, 3), 1e-3))
+
+
+def inertial() -> strapgen.InertialRecording:
+    return strapgen.InertialRecording(0.0, 0.01, np.full((20, 3), 1e-3), np.full((20, 3), 0.1))
+
+
+def builder() -> strapgen.KernelBuilder:
+    build = strapgen.KernelBuilder()
+    build.input(strapgen.Signal.vector("rate", "w"))
+    return build
+
+
+def run() -> strapgen.Run:
+    motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    return strapgen.simulate(stepper(), motion, "0.125", 10)
+
+
+def convergence() -> strapgen.Convergence:
+    coning = strapgen.motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
+    return strapgen.converge(strapgen.choose("euler", "rk4", 2), coning, ["1/8", "1/16"], 1, "numpy")
+
+
+#: An object of each public class that a user may hold.
+OBJECTS: dict[str, Callable[[], Any]] = {
+    "AttitudeAlgorithm": lambda: strapgen.algorithm("euler", "rk4", increments=2),
+    "Backend": stepper,
+    "Evaluator": lambda: strapgen.evaluator("euler-from-dcm"),
+    "CommitLate": lambda: strapgen.CommitLate("window-3-3"),
+    "GapError": lambda: strapgen.GapError("a sample is lost"),
+    "SampleKind": lambda: next(iter(strapgen.SampleKind)),
+    "SystemRunner": lambda: strapgen.system_runner(strapgen.read_system("two-speed-euler")),
+    "TwoSpeed": lambda: strapgen.TwoSpeed("euler"),
+    "Choice": lambda: strapgen.choose("euler", strapgen.TABLEAUX["butcher6"], 3, previous=1),
+    "Kinematics": lambda: strapgen.DCM,
+    "Samples": lambda: strapgen.Samples(strapgen.KernelBuilder(), 2),
+    "Tableau": lambda: strapgen.TABLEAUX["dormand-prince8"],
+    "Window": lambda: strapgen.WINDOWS["window-7-7"],
+    "Comparisons": lambda: strapgen.compare("euler", "rk4", 2, ["numpy"], TURN),
+    "Comparison": lambda: strapgen.compare("euler", "rk4", 2, ["numpy"], TURN)[0],
+    "Finding": lambda: next(iter(strapgen.check(strapgen.choose("euler", "rk4", 2)))),
+    "Convergence": convergence,
+    "Companions": lambda: kernel().companions,
+    "Order": lambda: kernel().order,
+    "Settings": lambda: strapgen.Settings.of(word=16, max_rate_deg_s=400, step="0.01", increments=2),
+    "RoundingBounds": lambda: strapgen.rounding_bounds(program()),
+    "Format": lambda: strapgen.Format(32, 30),
+    "FixedProgram": lambda: strapgen.quantize(program()),
+    "Program": program,
+    "Recursion": lambda: strapgen.derive("coning-fast").recursion,
+    "Signal": lambda: kernel().inputs[1],
+    "Sources": lambda: strapgen.generate(program(), "c"),
+    "Course": lambda: strapgen.course("euler", inertial(), fast_cycles=2),
+    "Motion": lambda: strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10),
+    "History": lambda: strapgen.propagate(stepper(), recording()),
+    "InertialRecording": inertial,
+    "Recording": recording,
+    "Run": run,
+    "CompilerError": lambda: strapgen.CompilerError("no C compiler"),
+    "InputError": lambda: strapgen.InputError("step is 0"),
+    "InputTypeError": lambda: strapgen.InputTypeError("step is None"),
+    "MissingExtraError": lambda: strapgen.MissingExtraError("plots need matplotlib"),
+    "StrapgenError": lambda: strapgen.StrapgenError("step is 0"),
+    "Kernel": kernel,
+    "KernelBuilder": builder,
+    "Stage": lambda: kernel().stages[0],
+    "Target": lambda: strapgen.TARGETS["c"],
+}
+
+
+def too_long(text: str) -> bool:
+    lines = text.split("\n")
+    return not 1 <= len(lines) <= LINES or max(map(len, lines)) > WIDTH
+
+
+def test_every_public_object_shows_itself_in_five_lines():
+    """Values of the package itself, and one of each class; functions and modules show themselves as Python does."""
+    objects = {name: getattr(strapgen, name) for name in strapgen.__all__}
+    classes = {name for name, value in objects.items() if inspect.isclass(value)}
+    assert classes == {*OBJECTS}
+    values = {
+        name: value
+        for name, value in objects.items()
+        if not isinstance(value, type | types.FunctionType | types.ModuleType)
+    }
+    texts = {name: repr(value) for name, value in values.items()}
+    texts |= {name: repr(build()) for name, build in OBJECTS.items()}
+    assert {name: text for name, text in texts.items() if too_long(text)} == {}
+    unspoken = {name: text for name, text in texts.items() if " object at 0x" in text}
+    assert unspoken == {}
+
+
+def test_a_repr_that_is_too_long_is_seen():
+    assert too_long("\n".join("abcdef")) and too_long("a" * (WIDTH + 1)) and not too_long("a\nb")
+
+
+def test_what_a_repr_says():
+    assert repr(kernel()) == (
+        "<Kernel euler-rk4-2: Euler parameters: step by classical fourth-order Runge-Kutta method from 2\n"
+        "  angle increments\n"
+        "  state (4), increments (2 x 3) -> next (4); order 4>"
+    )
+    assert repr(program()).endswith("\n  30 add, 38 multiply; 14 temporaries>")
+    assert repr(strapgen.choose("euler", "rk4", 2)) == "Choice(name='euler', method='rk4', increments=2)"
+    assert repr(strapgen.Settings()) == "Settings()"
+    assert repr(strapgen.Settings(word=16)) == "Settings(word=16)"
+
+
+@dataclass(frozen=True)
+class Held:
+    """A dataclass with a value that is long in full."""
+
+    numbers: tuple[int, ...]
+    factor: Fraction = Fraction(1)
+
+    __repr__ = short_repr
+
+
+def test_the_whole_text_of_a_value_tells_what_its_repr_leaves_out():
+    """Keys of the cache consist of it, so two values that differ must never share it."""
+    one, other = Held((*range(100),)), Held((*range(99), 0))
+    assert repr(one) == repr(other) == "Held(numbers=<100 entries>)"
+    assert full_text(one) != full_text(other)
+    assert full_text(Held((1,))) == "Held(numbers=(1,), factor=Fraction(1, 1))"
+    method = strapgen.TABLEAUX["rk4"]
+    changed = strapgen.Tableau(**{**vars(method), "weights": (Fraction(1), *method.weights[1:])})
+    assert repr(method) == repr(changed)
+    assert strapgen.choose("euler", method, 2) != strapgen.choose("euler", "rk4", 2)
+    assert full_text(method) != full_text(changed)
+    assert strapgen.Choice("euler", method, 2).identity != strapgen.Choice("euler", changed, 2).identity
+
+
+@pytest.mark.parametrize("word", [8, 16, 32])
+def test_a_field_that_differs_from_its_default_is_shown(word):
+    assert (f"word={word}" in repr(strapgen.Settings(word=word))) is (word != 32)
+
+
+def test_the_noun_and_the_functions_agree():
+    algorithm = strapgen.algorithm("euler", "rk4", increments=2)
+    assert algorithm.derive() == kernel()
+    assert algorithm.program() == program()
+    assert algorithm.c().files == strapgen.generate(program(), "c").files
+    assert algorithm.name == kernel().name
+    motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    runs = [
+        algorithm.simulate("coning", "0.125", 10, a_deg_s=10, b_deg_s=10, g_deg_s=10),
+        algorithm.simulate(motion, "0.125", 10),
+    ]
+    assert all(np.array_equal(one.computed, run().computed) for one in runs)
+    (row,) = algorithm.compare(TURN, ["numpy"], reference="numpy")
+    assert row.max_abs_rad == 0 and row.operations == program().operations
+    series = algorithm.series("constant", terms=1)
+    assert series.step.order == 4 and not too_long(repr(series))
+
+
+def test_the_noun_refuses_what_does_not_go_together():
+    algorithm = strapgen.algorithm("euler", "rk4", increments=2)
+    motion = strapgen.motion("constant", z_deg_s=1)
+    with pytest.raises(
+        strapgen.InputError, match=r"^z_deg_s belong to the name of a motion, not to a Motion$"
+    ):
+        algorithm.simulate(motion, "0.1", 1, z_deg_s=1)
+    with pytest.raises(strapgen.InputError, match=r"^algorithm 'dcm-product' is no attitude step"):
+        strapgen.algorithm("dcm-product")
