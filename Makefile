@@ -125,6 +125,7 @@ bench: $(BENCH)
 	.venv-bench/bin/python benchmarks/fixed_point.py
 	.venv-bench/bin/python benchmarks/backends.py
 	.venv-bench/bin/python benchmarks/throughput.py
+	.venv-bench/bin/python benchmarks/jacobians.py
 
 generate: $(READY)
 	$(BIN)/strapgen generate --all

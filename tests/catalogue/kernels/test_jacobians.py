@@ -83,8 +83,8 @@ def test_jacobians_are_the_limits_of_differences(algorithm, method, size, rng):
 
 @pytest.mark.parametrize(
     ("algorithm", "most"),
-    # What SymForce 0.10 writes for the same two Jacobians, by its own count of operations.
-    [("euler", 795), ("dcm", 1067)],
+    # The fewest that SymForce, wrenfold and CasADi take, as benchmarks/jacobians.py counts them on their code.
+    [("euler", 708), ("dcm", 954)],
 )
 def test_they_take_fewer_operations_than_common_subexpressions_do(algorithm, most):
     operations = program(choose(f"{algorithm}-jacobian", "rk4", 2)).operations
