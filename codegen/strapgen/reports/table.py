@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
+from strapgen.support.units import STANDARD_GRAVITY
+
 #: How numbers of a kind are written: angles in deg or rad, errors, times and steps in s.
 ANGLE, ERROR, SECONDS = ".3g", ".3e", ".6g"
 #: For each unit of a mean rate the unit that a person reads, and the factor to it.
-READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / 9.80665)}
+READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / STANDARD_GRAVITY)}
 #: The width of a page in characters of a table in LaTeX, and the space between two columns.
 _PAGE, _BETWEEN = 64, 2
 #: Lines of a table in LaTeX that a page holds.

@@ -19,6 +19,7 @@ from strapgen.simulation.rate_motions.rate_profiles import CosineSum, random_sum
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.support.parameters import parameters as settings_of
+from strapgen.support.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ FORCES: dict[str, dict[str, str]] = {
 }
 #: Endings of the keys of a parameter by its unit, and the factor of each to SI units.
 _ENDINGS = {
-    "m/s^2": {"m_s2": 1.0, "g": 9.80665},
+    "m/s^2": {"m_s2": 1.0, "g": STANDARD_GRAVITY},
     "Hz": {"hz": 1.0},
     "rad": {"deg": math.radians(1), "rad": 1.0},
     "m": {"m": 1.0},

@@ -14,11 +14,12 @@ from strapgen.simulation.motions import Motion
 from strapgen.simulation.specific_forces import SpecificForce
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+from strapgen.support.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
 #: Gravity in m/s^2, reference axes with z up.
-GRAVITY = (0.0, 0.0, -9.80665)
+GRAVITY = (0.0, 0.0, -STANDARD_GRAVITY)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from gathering import each
 from strapgen.simulation.sensor_errors.dither import dither_amplitude, dithered_laser_noise
 from strapgen.simulation.sensor_errors.error_file import CLASSES, read
 from strapgen.support.exceptions import InputError
+from strapgen.support.units import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[3]
 DEG_H = np.radians(1 / 3600)
@@ -76,22 +77,22 @@ def test_every_key_is_read_in_its_unit(tmp_path):
     np.testing.assert_allclose(gyro.scale_plus, [1e-4] * 3)
     np.testing.assert_allclose(gyro.scale_minus, [1e-6, 2e-6, 3e-6])
     np.testing.assert_allclose(gyro.misalignment, DEG_H * np.array([[0, 1, 2], [3, 0, 4], [5, 6, 0]]))
-    assert gyro.terms["B_zx"] == pytest.approx(2 * DEG_H / 9.81)
-    assert gyro.terms["E_yz"] == pytest.approx(0.1 * DEG_H / 9.81**2)
+    assert gyro.terms["B_zx"] == pytest.approx(2 * DEG_H / STANDARD_GRAVITY)
+    assert gyro.terms["E_yz"] == pytest.approx(0.1 * DEG_H / STANDARD_GRAVITY**2)
     assert gyro.terms["J_yz"] == 1e-4
     # A noise N in deg/sqrt(h) leaves N sqrt(t/h) deg, a walk K in deg/h/sqrt(h) a bias of K sqrt(t/h) deg/h.
     assert gyro.noise[0] * np.sqrt(3600) == pytest.approx(np.radians(0.6))
     assert gyro.random_walk[0] * np.sqrt(3600) == pytest.approx(6 * DEG_H)
-    assert force.random_walk[0] * np.sqrt(3600) == pytest.approx(60 * 9.81e-6)
+    assert force.random_walk[0] * np.sqrt(3600) == pytest.approx(60 * STANDARD_GRAVITY * 1e-6)
     np.testing.assert_allclose(gyro.pulse, 3 * DEG_H)
     np.testing.assert_allclose(gyro.bandwidth_hz, [80, 80, 60])
-    np.testing.assert_allclose(force.bias, 9.81e-4)
-    np.testing.assert_allclose(force.noise, 20 * 9.81e-6)
+    np.testing.assert_allclose(force.bias, 100e-6 * STANDARD_GRAVITY)
+    np.testing.assert_allclose(force.noise, 20e-6 * STANDARD_GRAVITY)
     np.testing.assert_allclose(force.pulse, 0.01)
     # 9.81 micro-g at one g squared is N g^2 = 9.81e-6 g.
-    assert force.terms["N_zz"] * 9.81**2 == pytest.approx(9.81e-6 * 9.81)
+    assert force.terms["N_zz"] * STANDARD_GRAVITY**2 == pytest.approx(9.81e-6 * STANDARD_GRAVITY)
     assert errors.heating.tau == 150 and errors.heating.gain[0] == -2.6e-4
-    assert errors.heating.unbalance == pytest.approx(np.radians(5) / 9.81)
+    assert errors.heating.unbalance == pytest.approx(np.radians(5) / STANDARD_GRAVITY)
     assert errors.output_noise.rms[0] == pytest.approx(DEG_H)
     assert len([*errors.causes]) == 14 and errors.needs_acceleration
 
@@ -115,7 +116,7 @@ def test_the_classes_are_those_of_the_table(name):
     np.testing.assert_allclose(errors.gyro.noise, np.radians(noise) / 60)
     np.testing.assert_allclose(errors.gyro.scale_plus, scale * 1e-6)
     assert errors.gyro.misalignment[0, 1] == pytest.approx(alignment * DEG_H)
-    np.testing.assert_allclose(errors.accelerometer.bias, force_bias * 9.81e-6)
+    np.testing.assert_allclose(errors.accelerometer.bias, force_bias * STANDARD_GRAVITY * 1e-6)
     np.testing.assert_allclose(errors.accelerometer.scale_minus, force_scale * 1e-6)
     assert errors.accelerometer.misalignment[2, 1] == pytest.approx(force_alignment * DEG_H)
 

@@ -22,6 +22,7 @@ from strapgen.simulation.sensor_errors.instruments import (
 )
 from strapgen.support import checks, toml_files
 from strapgen.support.exceptions import InputError
+from strapgen.support.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ _MOST_BYTES, _LARGEST = 1 << 16, 1e9
 _DEG_H = math.radians(1 / 3600)
 _ARCSEC = math.radians(1 / 3600)
 #: m/s^2 of a g.
-_G = 9.81
+_G = STANDARD_GRAVITY
 _MICRO_G = _G * 1e-6
 
 #: Numbers on three axes by key: the field, the factor to SI units, and whether they may be below zero.
