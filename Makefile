@@ -8,7 +8,7 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types firmware-tools cost evidence evidence-page evidence-tools faults fuzz
+  check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page evidence-tools faults fuzz
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -16,7 +16,7 @@ help:
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
 	@echo "make test-modules  list anew which kernels the tests compile"
 	@echo "make mutants   put 378 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
-	@echo "make check     generated code in step, ruff, mypy"
+	@echo "make check     generated code in step, ruff, mypy, spelling and prose"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"
 	@echo "make cost      measure generated/COST.md anew, with the tools of make firmware-tools"
@@ -98,7 +98,7 @@ mutants: $(TOOLS)
 
 # Side by side, each part's output in one piece.
 check: $(TOOLS)
-	@$(MAKE) --no-print-directory -j --output-sync=target check-generated check-style check-layout check-types
+	@$(MAKE) --no-print-directory -j --output-sync=target check-generated check-style check-layout check-types check-prose
 
 check-generated:
 	$(BIN)/strapgen generate --all --check
@@ -108,6 +108,9 @@ check-layout:
 	$(BIN)/ruff format --check .
 check-types:
 	$(BIN)/mypy
+check-prose:
+	$(BIN)/codespell
+	$(BIN)/python tests/prose.py
 
 # The other generators bring their own requirements: they get an environment of their own, each by itself, so that one
 # that cannot be installed is missing alone; the report says so.
