@@ -44,6 +44,8 @@ toc_object_entries_show_parents = "hide"
 add_module_names = False
 python_display_short_literal_types = True
 
+pygments_style = "a11y-high-contrast-light"
+pygments_dark_style = "github-dark"
 html_theme = "furo"
 html_title = "strapgen"
 html_static_path = ["static", "../_build/vendor"]
