@@ -401,6 +401,8 @@ BAD = {
     # frontier
     "frontier --method rk9": "method 'rk9' is not known",
     "frontier --method rk4:2+x": "number of samples in rk4:2+x is 'x'; a whole number is needed",
+    "frontier --method rk4:2 --set a=1": "--set goes with --motion",
+    "frontier --method rk4:2 --motion conin --jobs 1": "motion 'conin' is not known",
     "frontier --method rk4:2 --sample-hz 0": "sample-hz is 0; a number above 0 is needed",
     "frontier --method rk4:2 --duration 0.001": "duration 0.001 s is shorter than a step of rk4:2 at 100 Hz",
     "frontier --method rk4:2 --jobs 0": "jobs is 0; a whole number from 1 to 1024 is needed",
