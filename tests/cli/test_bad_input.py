@@ -278,7 +278,7 @@ BAD = {
     f"simulate euler --initial-deg 1,2,x {CONSTANT}": "initial-deg is 'x'",
     f"simulate euler --rates --pulse-arcsec 1 {CONSTANT}": "kernel euler-rk4-rates takes rates; a pulse goes with",
     f"simulate euler --motion missing.py {TIMES}": "motion missing.py is no file; a Python file with functions",
-    "converge euler --motion missing.py": "motion missing.py is known in double alone; --backend numpy runs on it",
+    "converge euler --motion missing.py": "motion missing.py is no file",
     "converge euler --backend numpy --motion missing.py": "motion missing.py is no file",
     f"compare euler --motion missing.py {TIMES}": "motion missing.py is no file",
     "study word-length --motion missing.py": "motion missing.py is no file",
