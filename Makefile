@@ -9,7 +9,7 @@ BENCH := .venv-bench/.ready
 DOCS := .venv/.ready-for-docs
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page evidence-tools faults fuzz docs docs-serve
+  check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page evidence-tools faults fuzz release-check docs docs-serve
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -27,6 +27,7 @@ help:
 	@echo "make evidence-page  the same, and write generated/EVIDENCE.md anew"
 	@echo "make faults    kill commands, fill disks and move clocks for four minutes; see that nothing wrong is left"
 	@echo "make fuzz      try drawn inputs on the C, the readers and the command line for five minutes"
+	@echo "make release-check  build the archives in dist/; have the wheel pass the tests away from the sources"
 	@echo "make docs      build the documentation as a site that needs no network: docs/_build/html/index.html"
 	@echo "make docs-serve  the same, at http://127.0.0.1:8000 for the page that runs strapgen in the browser"
 	@echo "make clean     remove .venv and what tools left behind"
@@ -144,6 +145,19 @@ evidence: $(READY)
 	$(BIN)/strapgen evidence --all --complete --page generated/EVIDENCE.md --check
 evidence-page: $(READY)
 	$(BIN)/strapgen evidence --all --complete --page generated/EVIDENCE.md
+
+# The wheel is built from the source archive, and passes the archive's tests without the sources beside it; the tests of
+# the sources themselves, their layout and faults in them, stay out.
+release-check: $(TOOLS)
+	rm -rf dist build/release
+	$(BIN)/python -m build --outdir dist .
+	mkdir -p build/release
+	tar -xf dist/strapgen-*.tar.gz -C build/release --strip-components 1
+	mv build/release/codegen build/release/sources
+	$(PYTHON) -m venv build/release/.venv
+	build/release/.venv/bin/python -m pip install --disable-pip-version-check "$$(ls dist/*.whl)[dev]"
+	cd build/release && .venv/bin/python -m pytest -n auto --dist worksteal -m "not long" \
+	  --ignore tests/test_architecture.py --ignore tests/test_mutants.py tests
 
 faults: $(TOOLS)
 	$(BIN)/python tests/faults.py --seconds 240
