@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from docutils import nodes
+
 from strapgen import __version__
 
 project = "strapgen"
@@ -48,7 +49,7 @@ pygments_style = "a11y-high-contrast-light"
 pygments_dark_style = "github-dark"
 html_theme = "furo"
 html_title = "strapgen"
-html_static_path = ["static", "../_build/vendor"]
+html_static_path = ["static"]  # build.py adds what npm brings
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False

@@ -40,7 +40,9 @@ SECTIONS = (
         "You need C for a processor, with bounds that you can sign and tests that come with it.",
         (
             *_docs("fixed-point", "design", "generated-code", "microcontrollers", "evidence", "misra"),
-            *_docs("check-foreign-code", "recorded-data", "sensor-errors", "redundancy", "calibration", "speed"),
+            *_docs(
+                "check-foreign-code", "recorded-data", "sensor-errors", "redundancy", "calibration", "speed"
+            ),
         ),
     ),
     Section(
@@ -56,7 +58,12 @@ SECTIONS = (
         "Extend",
         "docs/paths/extend.md",
         "You bring a method, an algorithm, a motion or a language of your own.",
-        ("docs/own-algorithms.md", "examples/toy_target/README.md", "docs/architecture.md", "CONTRIBUTING.md"),
+        (
+            "docs/own-algorithms.md",
+            "examples/toy_target/README.md",
+            "docs/architecture.md",
+            "CONTRIBUTING.md",
+        ),
     ),
     Section(
         "Understand",
@@ -84,7 +91,9 @@ SECTIONS = (
         "docs/reference/index.md",
         "You look up a command, a Python name or an option.",
         (
-            *_docs("README", "command-line", "reference/commands/index", "python-api", "reference/python/index"),
+            *_docs(
+                "README", "command-line", "reference/commands/index", "python-api", "reference/python/index"
+            ),
             *("generated/COST.md", "generated/EVIDENCE.md"),
             *("benchmarks/RESULTS.md", "benchmarks/FIXED_POINT.md", "examples"),
         ),

@@ -37,15 +37,16 @@ def pages() -> dict[str, str]:
 
 
 def _index(known: dict[str, tuple[Any, CommandHelp]]) -> str:
-    lines = ["# Commands", "", "What `--help` says of every command. The page on [the command line](/command-line.md)", ""]
-    lines[2] = "Every command with its arguments and options, as its `--help` shows them. "
-    lines[2] += "[The command line](/command-line.md) shows them at work."
+    about = "Every command with its arguments and options, as its `--help` shows them. "
+    lines = ["# Commands", "", f"{about}[The command line](/command-line.md) shows them at work."]
     for heading, names in COMMANDS.items():
         lines += ["", f"## {heading}", "", "| command | what it does |", "|---|---|"]
         for name in names:
             for words in (name, *(other for other in known if other.startswith(f"{name} "))):
                 page, anchor = name, f"#{_anchor(words)}" if words != name else ""
-                lines.append(f"| [`{words}`]({page}.md{anchor}) | {_escaped(known[words][1].paragraphs[0])} |")
+                lines.append(
+                    f"| [`{words}`]({page}.md{anchor}) | {_escaped(known[words][1].paragraphs[0])} |"
+                )
     entries = [f"{name} <{name}>" for names in COMMANDS.values() for name in names]
     return "\n".join([*lines, "", "```{toctree}", ":hidden:", "", *entries, "```", ""])
 

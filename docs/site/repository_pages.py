@@ -10,7 +10,15 @@ from typing import Any
 #: A folder with more files than this is listed, but its files are plain copies in place of pages.
 MOST_PAGES = 60
 _LEXERS = {
-    **{".py": "python", ".c": "c", ".h": "c", ".toml": "toml", ".yml": "yaml", ".md": "markdown", ".mk": "make"},
+    **{
+        ".py": "python",
+        ".c": "c",
+        ".h": "c",
+        ".toml": "toml",
+        ".yml": "yaml",
+        ".md": "markdown",
+        ".mk": "make",
+    },
     ".j2": "jinja",
 }
 _ASIDE = "---\norphan: true\nnosearch: true\n---\n"
@@ -70,7 +78,13 @@ def folder_page(path: str, files: list[str], orphan: bool) -> str:
     inside = [name for name in files if name.startswith(f"{path}/")]
     folders = sorted({"/".join(name.split("/")[: depth + 1]) for name in inside if name.count("/") > depth})
     here = [name for name in inside if name.count("/") == depth]
-    lines = [_ASIDE if orphan else "", f"# {Path(path).name}/", "", f"The folder `{path}` of the repository holds:", ""]
+    lines = [
+        _ASIDE if orphan else "",
+        f"# {Path(path).name}/",
+        "",
+        f"The folder `{path}` of the repository holds:",
+        "",
+    ]
     lines += [f"- [{Path(name).name}/]({Path(name).name})" for name in folders]
     lines += [f"- [{Path(name).name}]({Path(name).name})" for name in here]
     return "\n".join(lines) + "\n"

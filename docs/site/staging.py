@@ -61,8 +61,13 @@ def home(text: str) -> str:
     cards += [":::::", ""]
     first = re.search(r"^!\[.*\n\n", text, re.MULTILINE)
     place = first.end() if first else len(text)
-    return text[:place] + "\n".join(cards) + "\n" + text[place:] + "\n" + _toctree(
-        [(section.title, section.landing) for section in SECTIONS], hidden=True
+    return (
+        text[:place]
+        + "\n".join(cards)
+        + "\n"
+        + text[place:]
+        + "\n"
+        + _toctree([(section.title, section.landing) for section in SECTIONS], hidden=True)
     )
 
 
@@ -85,7 +90,9 @@ def landing(root: Path, section: Section, text: str) -> str:
     asked = questions(root)
     rows = [f"| [](/{site_file(page)}) | {asked[page]} |" for page in pages if page in asked]
     table = ["| page | the question that it answers |", "|---|---|", *rows, ""] if rows else []
-    return "\n".join([text, "## The pages of this section", "", *table, _toctree([("", p) for p in pages], bool(rows))])
+    return "\n".join(
+        [text, "## The pages of this section", "", *table, _toctree([("", p) for p in pages], bool(rows))]
+    )
 
 
 def _toctree(entries: list[tuple[str, str]], hidden: bool) -> str:
