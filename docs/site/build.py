@@ -2,7 +2,8 @@
 
     python docs/site/build.py [FOLDER]
 
-The site is in FOLDER/html; FOLDER is docs/_build unless another one is named.
+The site is in FOLDER/html; FOLDER is docs/_build unless another one is named. What npm brings stays in
+docs/_build/vendor for the next build.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+BUILD = ROOT / "docs" / "_build"
 sys.path.insert(0, str(HERE))
 
 import mathjax  # noqa: E402
@@ -146,31 +148,25 @@ def main(arguments: list[str]) -> int:
     arguments : list of str
         The folder for the site, or nothing.
     """
-    out = Path(arguments[0] if arguments else ROOT / "docs" / "_build").resolve()
+    if len(arguments) > 1:
+        return _refuse(f"docs: one folder is allowed, not {len(arguments)}: {' '.join(arguments)}")
+    out = Path(arguments[0]).resolve() if arguments else BUILD
     try:
-        mathjax.vendor(out / "vendor" / "mathjax")
+        mathjax.vendor(BUILD / "vendor" / "mathjax")
     except RuntimeError as error:
-        print(f"docs: {error}", file=sys.stderr)
-        return 2
+        return _refuse(f"docs: {error}")
     stage_pages(out / "source")
-    options = [
-        "-b",
-        "html",
-        "-c",
-        str(HERE),
-        "-d",
-        str(out / "doctrees"),
-        "-W",
-        "--keep-going",
-        "-q",
-        "-j",
-        "auto",
-    ]
-    command = [sys.executable, "-m", "sphinx", *options, str(out / "source"), str(out / "html")]
-    steps = [command]
+    options = ["-c", str(HERE), "-d", str(out / "doctrees"), "-W", "--keep-going", "-q", "-j", "auto"]
+    options += ["-D", f"html_static_path=static,{BUILD / 'vendor'}"]
+    steps = [[sys.executable, "-m", "sphinx", "-b", "html", *options, str(out / "source"), str(out / "html")]]
     if (HERE / "try" / "vendor.py").is_file():
         steps.append([sys.executable, str(HERE / "try" / "vendor.py"), str(out / "html")])
     return next((status for step in steps if (status := subprocess.run(step).returncode)), 0)
+
+
+def _refuse(line: str) -> int:
+    print(line, file=sys.stderr)
+    return 2
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ pygments_style = "a11y-high-contrast-light"
 pygments_dark_style = "github-dark"
 html_theme = "furo"
 html_title = "strapgen"
-html_static_path = ["static", "../_build/vendor"]
+html_static_path = ["static"]  # build.py adds what npm brings
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
@@ -64,7 +64,7 @@ html_theme_options = {
     "dark_css_variables": {"color-brand-primary": "#6cb8e6", "color-brand-content": "#6cb8e6"},
     "top_of_page_buttons": [],
 }
-mathjax_path = "mathjax/tex-svg.js"
+mathjax_path = "mathjax/tex-svg-full.js"
 mathjax3_config = {"options": {"enableMenu": False}}
 copybutton_exclude = ".linenos, .gp, .go"
 

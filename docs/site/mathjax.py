@@ -10,10 +10,10 @@ import tarfile
 import tempfile
 from pathlib import Path
 
-#: The last release in which one file holds all fonts as outlines; it loads nothing else.
+#: The last release in which one file holds all extensions, and all fonts as outlines; it loads nothing else.
 PACKAGE = "mathjax@3.2.2"
 SHA512 = "Bt+SSVU8eBG27zChVewOicYs7Xsdt40qm4+UpHyX7k0/O9NliPc+x77k1/FEsPsjKPZGJvtRZM1vO+geW0OhGw=="
-_MEMBERS = {"package/es5/tex-svg.js": "tex-svg.js", "package/LICENSE": "LICENSE"}
+_MEMBERS = {"package/es5/tex-svg-full.js": "tex-svg-full.js", "package/LICENSE": "LICENSE"}
 
 
 def vendor(folder: Path) -> None:

@@ -37,11 +37,8 @@ def pages() -> dict[str, str]:
 
 
 def _index(known: dict[str, tuple[Any, CommandHelp]]) -> str:
-    opening = (
-        "Every command with its arguments and options, as its `--help` shows them. "
-        "[The command line](/command-line.md) shows them at work."
-    )
-    lines = ["# Commands", "", opening, ""]
+    about = "Every command with its arguments and options, as its `--help` shows them. "
+    lines = ["# Commands", "", f"{about}[The command line](/command-line.md) shows them at work."]
     for heading, names in COMMANDS.items():
         lines += ["", f"## {heading}", "", "| command | what it does |", "|---|---|"]
         for name in names:

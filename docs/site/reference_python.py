@@ -6,7 +6,6 @@ import importlib
 import inspect
 import re
 import types
-from pathlib import Path
 from typing import Any
 
 #: Titles of the pages by the folder of the package that defines the names, in the order of a reader's first day.
@@ -46,8 +45,12 @@ def summary(value: Any) -> str:
     value : object
         A function, a class or a module.
     """
-    paragraph = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
-    return re.split(r"(?<=[.:;])\s", paragraph)[0].rstrip(":;")
+    return _first_sentence((inspect.getdoc(value) or "").split("\n\n")[0])
+
+
+def _first_sentence(text: str) -> str:
+    first = re.split(r"(?<=[.:;])\s", " ".join(text.split()))[0]
+    return f"{first.rstrip('.:;')}."
 
 
 def comment(module: str, name: str) -> str:
@@ -76,7 +79,8 @@ def members(namespace: Any) -> list[str]:
     names = getattr(namespace, "__all__", None) or [
         name
         for name, value in vars(namespace).items()
-        if getattr(value, "__module__", "") == namespace.__name__ and not name.startswith("_")
+        if (getattr(value, "__module__", "") or "").startswith(namespace.__name__)
+        and not name.startswith("_")
     ]
     return [n for n in names if isinstance(getattr(namespace, n), type | types.FunctionType)]
 
@@ -107,7 +111,7 @@ def _about(name: str) -> str:
     value = getattr(strapgen, name)
     if isinstance(value, type | types.FunctionType):
         return summary(value)
-    return re.split(r"(?<=[.:;])\s", comment(f"strapgen.{strapgen._EXPORTS[name]}", name))[0].rstrip(":;")
+    return _first_sentence(comment(f"strapgen.{strapgen._EXPORTS[name]}", name))
 
 
 def _rows(rows: dict[str, str], role: str = "py:obj") -> list[str]:
@@ -147,14 +151,3 @@ def _entry(full: str, value: Any = None) -> list[str]:
         return [f".. {kind}:: {full}", "   :members:", ""]
     text = comment(f"strapgen.{strapgen._EXPORTS[name]}", name)
     return [f".. py:data:: {full}", "", f"   {text}", ""]
-
-
-def source(folder: Path) -> dict[str, str]:
-    """Return the pages by the paths of their files.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the pages on the site.
-    """
-    return {f"{folder.as_posix()}/{name}.rst": text for name, text in pages().items()}

@@ -110,12 +110,7 @@ def _cell(cell: dict[str, Any]) -> str:
         data = output.get("data", {})
         plain = "".join(output.get("text", data.get("text/plain", "")))
         if "text/latex" in data:
-            parts.append(_formula("".join(data["text/latex"])))
+            parts.append(f"```{{math}}\n:no-wrap:\n\n{''.join(data['text/latex'])}\n```")
         elif plain:
             parts.append(f"```text\n{plain.rstrip()}\n```")
     return "\n\n".join(parts)
-
-
-def _formula(latex: str) -> str:
-    body = latex.strip().removeprefix(r"\[").removesuffix(r"\]").strip()
-    return f"```{{math}}\n{body.replace('{align*}', '{aligned}')}\n```"
