@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mpmath
 import sympy as sp
@@ -17,14 +17,15 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.analysis import one_step
 from strapgen.analysis.motion_rates import CONSTANT
-from strapgen.analysis.prediction import Matrix, Prediction, Transfer, follow
 from strapgen.analysis.series import PARTS, STEP
-from strapgen.backends import exact
 from strapgen.catalogue import Choice
-from strapgen.simulation.motions import Motion
 from strapgen.symbolic import evaluation, rotations
 from strapgen.symbolic.kernel import Kernel, evaluate_stages
 from strapgen.symbolic.power_series import Powers, constant, field, function
+
+if TYPE_CHECKING:
+    from strapgen.analysis.prediction import Matrix, Prediction, Transfer
+    from strapgen.simulation.motions import Motion
 
 #: The angle of a step, |w| h.
 ANGLE = sp.Symbol("x", positive=True)
@@ -323,6 +324,9 @@ def errors_after(
     >>> round(float(found.scale[-1][0]), 4), round(float(found.drift[-1][1]), 6)
     (0.4086, 0.007019)
     """
+    from strapgen.analysis.prediction import follow  # runs need numpy; closed forms do not
+    from strapgen.backends import exact
+
     closed_form = constant_rate(choice)
     names = sp.symbols("stretch along lost steps axis_x axis_y axis_z")
     product = sp.lambdify(names, _product(*names), "mpmath")

@@ -13,7 +13,7 @@ from strapgen.analysis.constant_rate import ConstantRate, constant_rate
 from strapgen.analysis.growth import Growth, contraction, growth
 from strapgen.analysis.series import PARTS, ErrorSeries, series
 from strapgen.catalogue import Choice
-from strapgen.simulation.users_motions import is_file
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 

@@ -6,11 +6,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
@@ -19,11 +17,15 @@ from strapgen.analysis.notation import scalar_text
 from strapgen.analysis.one_step import Step
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
-from strapgen.simulation.users_motions import is_file
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.polynomials import Polynomial
 from strapgen.symbolic.rotations import cross_elements, dot
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 #: Decimal digits of an irrational coefficient.
 _DIGITS = 60
@@ -245,6 +247,8 @@ class Stability:
         -------
         array, (...)
         """
+        import numpy as np
+
         squares = sp.lambdify(ANGLE, self.stretch_squared, "numpy")(angles)
         factors: NDArray[np.float64] = np.sqrt(np.broadcast_to(np.asarray(squares, np.float64), angles.shape))
         return factors

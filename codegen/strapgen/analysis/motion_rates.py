@@ -11,7 +11,7 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.catalogue.kernels.motion_models import MOTIONS, MotionModel
 from strapgen.simulation.rate_motions.expressions import time_symbol
-from strapgen.simulation.users_motions import is_file, rate_expressions
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks
 
 #: Time at the beginning of a step.
@@ -87,6 +87,8 @@ def of_file(motion: str, count: int) -> Callable[[sp.Expr], sp.Expr]:
         ``inserted(expression)`` takes an expression in ``w0_x``, ``w0_y``, ... and returns one in the time t. It is not
         simplified, which may take for ever; 0 is told by its value at two times.
     """
+    from strapgen.simulation.users_motions import rate_expressions  # numpy checks what a file says
+
     vector = sp.Matrix(list(rate_expressions(motion)))
     derivatives: dict[sp.Symbol, sp.Expr] = {}
     for j in range(count):

@@ -19,7 +19,7 @@ from strapgen.analysis.invariants import Invariants, invariants, matrix
 from strapgen.analysis.notation import covariant_text
 from strapgen.analysis.one_step import Step, errors
 from strapgen.catalogue import Choice
-from strapgen.simulation.users_motions import is_file
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks
 from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError

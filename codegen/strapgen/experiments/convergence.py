@@ -21,8 +21,9 @@ from strapgen.ir.attitude_step import Order
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments, uncertainty
 from strapgen.simulation.motions import Motion
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.simulation.runs import largest_increment, simulate
-from strapgen.simulation.users_motions import any_motion, is_file
+from strapgen.simulation.users_motions import any_motion
 from strapgen.support import checks, stages
 from strapgen.support.brief import notebook_html, short_repr, to_pandas
 from strapgen.support.clusters import Bundle, Cluster, moved

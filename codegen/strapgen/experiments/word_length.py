@@ -19,8 +19,9 @@ from strapgen.backends.increments import pulses
 from strapgen.experiments.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.motions import Motion
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.simulation.runs import attitude, drift_between
-from strapgen.simulation.users_motions import any_motion, is_file
+from strapgen.simulation.users_motions import any_motion
 from strapgen.support import cache, checks
 from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError

@@ -12,14 +12,13 @@ from functools import lru_cache
 
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.limits import largest_magnitude
-from strapgen.fixedpoint.runs.accumulation import transition_growth
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.fixed_interface import RoundingAccumulation
 from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.float_interface import Condition, RoundingBounds, StepRounding
 from strapgen.ir.program import Operation, Program, Result, walk
+from strapgen.rounding import proved
 from strapgen.rounding.errors import ComputedNumbers
-from strapgen.rounding.exact_ranges import ExactRanges
 from strapgen.rounding.expressions import Expressions
 from strapgen.rounding.no_bound import NoBoundError
 from strapgen.rounding.number_formats import NUMBERS
@@ -41,6 +40,8 @@ class _Analysis:
             for name in signal.elements
         }
         self.expressions = Expressions.of(program)
+        from strapgen.rounding.exact_ranges import ExactRanges  # loads numpy, as only proofs do
+
         exact = ExactRanges(program, self.expressions, box)
         self.ranges, self.conditions = exact.ranges, tuple(exact.conditions)
         self._slopes = slopes(self.expressions, self.ranges)
@@ -83,7 +84,7 @@ def rounding_bounds(
     -------
     RoundingBounds
         With `errors` for every element of every output, in the unit of the output. They are empty where no bound is
-        known, and `reason` says why.
+        known, and `reason` says why; where numpy is missing, nothing is known but what `proved.load` was told.
 
     Raises
     ------
@@ -105,6 +106,8 @@ def rounding_bounds(
     for name in settings.ranges:
         checks.choice(f"input of {program.kernel}", name, names)
     format_ = NUMBERS[number]
+    if not _has_numpy():
+        return proved.bounds(program, number, format_.precision)
     known = {*settings.ranges, *TURNING}
     for signal in program.inputs:
         if signal.bound is None and not signal.constraint and signal.name not in known:
@@ -139,6 +142,14 @@ def rounding_bounds(
         step,
         None if step is None else _accumulation(program, dict(limits), step, *outputs.values()),
     )
+
+
+def _has_numpy() -> bool:
+    try:
+        import numpy  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def _left_out(program: Program, analysis: _Analysis) -> Fraction | None:
@@ -193,6 +204,8 @@ def _accumulation(
     whole = max(_length(errors[k : k + width]) for k in rows)
     parts = max(_length(step.local[k : k + width]) for k in rows) + length * _length(step.transition)
     sizes = tuple(largest[signal.name] for signal in program.inputs[1:] for _ in signal.elements)
+    from strapgen.fixedpoint.runs.accumulation import transition_growth
+
     growth = transition_growth(program, transition, sizes, width, 1 + _length(step.away))
     return RoundingAccumulation(Fraction(0), up(min(whole, parts)), Fraction(0), growth)
 

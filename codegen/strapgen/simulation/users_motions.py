@@ -33,6 +33,7 @@ from strapgen.backends import backend
 from strapgen.simulation.motions import Motion, motion
 from strapgen.simulation.rate_motions.expressions import rate_of
 from strapgen.simulation.rate_motions.motion import RateMotion
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks, packages
 from strapgen.support.exceptions import InputError
 
@@ -216,11 +217,6 @@ def any_motion(
             f"{name} has its own numbers; --set goes with a motion that strapgen list motions shows"
         )
     return read_motion(name, duration)
-
-
-def is_file(name: str) -> bool:
-    """Tell whether the name of a motion is that of a file."""
-    return name.endswith(".py")
 
 
 def require_consistent(users: Motion, duration: float | str | Fraction) -> None:

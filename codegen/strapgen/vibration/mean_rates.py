@@ -6,21 +6,24 @@ accurate enough, and from as many digits as are needed where terms cancel.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mpmath
-import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.vibration.response import Form, Pair
 from strapgen.vibration.systems import T_L, T_M, F, T
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 #: Amplitudes of the angles in rad, of the acceleration in m/s^2, and the phase in rad, equations (65) and (70).
 THETA_X, THETA_Y, PHI, D_Y = sp.symbols("theta_x theta_y phi D_y", real=True)
@@ -221,7 +224,7 @@ class Assessment:
             **self.lengths(step, cycles),
         }
         values = [_accurate(self._exactly[part], list(arguments.values())) for part in PARTS]
-        if not all(map(np.isfinite, values)):
+        if not all(map(math.isfinite, values)):
             if not self.resonant:
                 raise InputError(
                     f"{self.kernel}: the rates at {frequency_hz} Hz are beyond the range of double"
@@ -287,6 +290,8 @@ class Assessment:
             The mean rate is the real part of the factor times the first amplitude times the conjugate of the second;
             the complex amplitude of a channel is c in Re(c exp(j omega t)).
         """
+        import numpy as np  # rates at one frequency do without it
+
         hertz = np.asarray(frequencies, float)
         lengths = list(self.lengths(step, cycles).values())
         functions = self._in_double[part]
@@ -325,6 +330,8 @@ class _Function(NamedTuple):
 
 
 def _values(function: _Function, hertz: NDArray[np.float64], lengths: list[Fraction]) -> NDArray[np.float64]:
+    import numpy as np
+
     times = list(map(float, lengths))
     with np.errstate(all="ignore"):
         values = np.broadcast_to(function.value(hertz, *times), hertz.shape).astype(float)

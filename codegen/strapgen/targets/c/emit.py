@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, names_in, walk
@@ -19,6 +18,9 @@ from strapgen.targets.names import C, function_name, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,8 @@ class CPrinter(Printer):
 
 def _nearest_single(value: Fraction) -> np.float32:
     """Return the nearest single; rounding to double first could miss it."""
+    import numpy as np  # C in double is printed without it
+
     near = np.float32(float(value))
     candidates = (near, np.nextafter(near, np.float32(-np.inf)), np.nextafter(near, np.float32(np.inf)))
     return min(candidates, key=lambda c: (abs(Fraction(float(c)) - value), int(c.view(np.uint32)) & 1))
