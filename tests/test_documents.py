@@ -23,7 +23,9 @@ from strapgen.catalogue.methods import tableaux
 from strapgen.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCS = {path.stem: path.read_text() for path in sorted((ROOT / "docs").glob("*.md"))}
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "paths").glob("*.md")])
+#: The pages by their names below docs/, without the ending.
+DOCS = {path.relative_to(ROOT / "docs").with_suffix("").as_posix(): path.read_text() for path in PAGES}
 README = (ROOT / "README.md").read_text()
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
 #: A newcomer decides in so many lines of the README whether to read on.
@@ -190,7 +192,7 @@ def anchors(text: str) -> set[str]:
 
 def test_every_link_leads_somewhere():
     broken = []
-    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")):
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES):
         for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
             name, _, anchor = target.partition("#")
             path = page.parent / name if name else page
@@ -200,7 +202,7 @@ def test_every_link_leads_somewhere():
 
 
 def test_the_index_names_every_page():
-    linked = set(re.findall(r"\]\(([\w-]+)\.md\)", DOCS["README"]))
+    linked = set(re.findall(r"\]\(([\w/-]+)\.md\)", DOCS["README"]))
     assert linked == {*DOCS} - {"README"}
 
 
@@ -209,7 +211,7 @@ def test_the_glossary_is_sorted_and_other_pages_refer_to_it():
     assert len(terms) == DOCS["glossary"].count("\n### ") >= 40
     names = [re.sub(r"[^a-z ]", " ", name.lower()) for name, _ in terms]
     assert names == sorted(names)
-    linked = "".join(text for name, text in DOCS.items() if name != "glossary").count("(glossary.md#")
+    linked = "".join(text for name, text in DOCS.items() if name != "glossary").count("glossary.md#")
     assert linked >= 15
 
 
@@ -329,7 +331,7 @@ def test_the_page_on_the_command_line_shows_every_command():
 
 
 def test_no_command_writes_into_the_checkout_what_git_does_not_ignore():
-    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
     pages += [*(ROOT / "examples").glob("*.py"), *(ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")]
     written, writers = {}, ("generate", "two-speed", "vectors")
     for command in (command for page in pages for command in shown_commands(page.read_text())):

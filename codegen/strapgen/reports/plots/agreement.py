@@ -45,8 +45,8 @@ def agreement_image(agreements: Sequence[Agreement], title: str, path: str | Pat
 
 def _draw_over_time(axes: Any, rung: StepAgreement) -> None:
     """Draw predicted and simulated drift over time, at one step."""
-    for axis, (name, colour) in enumerate(zip("xyz", figures.COLOURS, strict=True)):
-        axes.plot(rung.times, [row[axis] for row in rung.predicted], color=colour, label=f"{name}, predicted")
+    for axis, colour in enumerate(figures.COLOURS):
+        axes.plot(rung.times, [row[axis] for row in rung.predicted], color=colour)
         axes.plot(
             rung.times,
             [row[axis] for row in rung.simulated],
@@ -55,13 +55,14 @@ def _draw_over_time(axes: Any, rung: StepAgreement) -> None:
             markersize=4.5,
             markerfacecolor="white",
             color=colour,
-            label=f"{name}, simulated",
         )
     figures.style_over_time(axes)
     axes.set_xlabel("time, s")
     axes.set_ylabel("drift, rad")
-    axes.set_title(f"step {figures.fraction(rung.step_s)} s", loc="left", fontsize=10)
-    axes.legend(frameon=False, fontsize=9, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    title = f"step {figures.fraction(rung.step_s)} s; lines predicted, circles simulated"
+    axes.set_title(title, loc="left", fontsize=10)
+    ends = zip(rung.simulated[-1], "xyz", figures.COLOURS, strict=True)
+    figures.labels_at_the_right(axes, [(float(end), name, colour) for end, name, colour in ends])
 
 
 def _draw_against_step(axes: Any, agreements: Sequence[Agreement]) -> None:
@@ -69,16 +70,19 @@ def _draw_against_step(axes: Any, agreements: Sequence[Agreement]) -> None:
     rungs = agreements[0].rungs
     steps = [rung.step_s for rung in rungs]
     drifts = [rung.drift or math.nan for rung in rungs]
-    axes.plot(steps, drifts, color="0.35", marker="o", markersize=4.5, label="simulated drift")
+    axes.plot(steps, drifts, color="0.35", marker="o", markersize=4.5)
+    labels = [(max(zip(steps, drifts, strict=True))[1], "simulated drift", "0.35")]
     for one, colour in zip(agreements, figures.COLOURS, strict=False):
         differences = [rung.difference or math.nan for rung in one.rungs]
         terms = "the leading term" if one.terms == 1 else f"{one.terms} powers of h"
         slope = f": slope {one.slopes[-1]:.2f}" if one.slopes else ""
-        axes.plot(steps, differences, color=colour, marker="s", markersize=4.5, label=f"less {terms}{slope}")
+        axes.plot(steps, differences, color=colour, marker="s", markersize=4.5)
+        end = max(zip(steps, differences, strict=True))[1]
+        labels.append((end, f"less {terms}{slope}", colour))
     if any(value > 0 for value in drifts):
         axes.set_yscale("log")
     figures.step_ticks(axes, steps)
     axes.set_ylabel("largest over the run, rad")
     figures.style(axes)
     axes.set_title("what the prediction leaves", loc="left", fontsize=10)
-    axes.legend(frameon=False, fontsize=9)
+    figures.labels_at_the_right(axes, [label for label in labels if not math.isnan(label[0])])

@@ -37,11 +37,11 @@ def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | P
     InputError
         If the kind of image is unknown.
     """
-    figure, grid = figures.grid_of_axes(1, 1, (8.0, 6.0))
+    figure, grid = figures.grid_of_axes(1, 1, (9.5, 5.6))
     axes = grid[0, 0]
-    colours = figures.colours(len(outcomes), 0.85)
-    for number, (outcome, name) in enumerate(zip(outcomes, labels(outcomes), strict=True)):
-        _draw_algorithm(axes, outcome, name, colours[number], "osD^v<>p"[number % 8])
+    colours = figures.colours(len(outcomes), figures.LIGHTEST)
+    for number, outcome in enumerate(outcomes):
+        _draw_algorithm(axes, outcome, colours[number], "osD^v<>p"[number % 8])
     rungs = [rung for outcome in outcomes for rung in outcome.rungs]
     if any(rung.error_rad for rung in rungs):  # else all are exact: nothing to draw
         axes.set_yscale("log")
@@ -49,26 +49,28 @@ def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | P
     figures.step_ticks(axes, sorted({rung.step_s for rung in rungs}))
     axes.set_ylabel("largest error, rad")
     figures.style(axes)
-    axes.legend(
-        alignment="left",
-        title="order: slope of filled points; theory is dashed",
-        title_fontsize=9,
-        frameon=True,
-        framealpha=0.85,
-        edgecolor="none",
-        fontsize=9,
-        loc="lower right",
+    figures.labels_at_the_right(
+        axes, [label for label in map(_label, outcomes, labels(outcomes), colours) if label is not None]
     )
-    axes.set_title(figures.printable(title), loc="left", fontsize=11)
+    axes.set_title("slope of the filled points; dashed: theory", loc="left", fontsize=9, color="0.35")
+    figures.title(figure, title)
     return figures.image(figure, path)
 
 
-def _draw_algorithm(axes: Any, outcome: Convergence, name: str, colour: Any, marker: str) -> None:
+def _label(outcome: Convergence, name: str, colour: Any) -> tuple[float, str, Any] | None:
+    """Return what stands at the right end of a line: the name, the observed order and that of theory."""
+    errors = [(rung.step_s, rung.error_rad) for rung in outcome.rungs if rung.error_rad]
+    if not errors:
+        return None
+    slope = "order hidden" if outcome.observed is None else f"{outcome.observed:.2f}"
+    theory = "" if outcome.predicted is None else f", theory {outcome.predicted}"
+    return max(errors)[1], f"{name}: {slope}{theory}", colour
+
+
+def _draw_algorithm(axes: Any, outcome: Convergence, colour: Any, marker: str) -> None:
     """Draw the errors of one algorithm, filled where the slope is fitted, and the predicted slope dashed."""
     rungs = [rung for rung in outcome.rungs if rung.error_rad]
     steps = [rung.step_s for rung in rungs]
-    slope = "order hidden" if outcome.observed is None else f"{outcome.observed:.2f}"
-    theory = "" if outcome.predicted is None else f", theory {outcome.predicted}"
     axes.plot(steps, [rung.error_rad for rung in rungs], color=colour, linewidth=1.2, alpha=0.6)
     for used in (True, False):
         points = [rung for rung in rungs if rung.used is used]
@@ -80,7 +82,6 @@ def _draw_algorithm(axes: Any, outcome: Convergence, name: str, colour: Any, mar
             markersize=5.5,
             color=colour,
             markerfacecolor=colour if used else "white",
-            label=f"{figures.printable(name)}: {slope}{theory}" if used else None,
         )
     fitted = [rung for rung in rungs if rung.used]
     if outcome.predicted is not None and fitted:

@@ -9,12 +9,16 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from strapgen.reports.plots.dark_mode import for_both_pages
 from strapgen.support.exceptions import InputError, MissingExtraError
 
 #: Resolution of images of pixels, in dots per inch.
 RESOLUTION_DPI = 150
-COLOURS = ("#1f5f8b", "#b5562b", "#3d7a4f")
-_SEVERAL = (*COLOURS, "#8a4f9e", "#c79a1b", "#2a9d9d", "#a83250", "#6b6b6b")
+#: Colours that the colour-blind tell apart too; the first three are those of M. Okabe and K. Ito, 2008.
+COLOURS = ("#0072b2", "#d55e00", "#009e73")
+_SEVERAL = (*COLOURS, "#332288", "#cc79a7", "#8c5a00", "#88001b", "#6b6b6b")
+#: How far colours from dark to light go, so that the last one still shows on white.
+LIGHTEST = 0.62
 
 
 def pyplot() -> Any:
@@ -63,12 +67,20 @@ def require_kind(path: str | Path) -> str:
 
 
 def image(figure: Any, path: str | Path) -> bytes:
-    """Return a figure as the content of an image file, of the kind that the file's ending says; it is closed."""
+    """Return a figure as the content of an image file, of the kind that the file's ending says; it is closed.
+
+    SVG has its text as text, and colours for light and for dark pages.
+    """
     pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
     kind = require_kind(path)
     content = io.BytesIO()
-    figure.savefig(content, format=kind, dpi=RESOLUTION_DPI)
-    return content.getvalue()
+    if kind != "svg":
+        figure.savefig(content, format=kind, dpi=RESOLUTION_DPI)
+        return content.getvalue()
+    # The same figure has the same text: without the date, the version and random names.
+    with pyplot().rc_context({"svg.hashsalt": "strapgen", "svg.fonttype": "none"}):
+        figure.savefig(content, format=kind, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    return for_both_pages(content.getvalue().decode()).encode()
 
 
 def grid_of_axes(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:

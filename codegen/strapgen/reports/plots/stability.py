@@ -43,7 +43,7 @@ def stability_image(stabilities: Sequence[Stability], title: str, path: str | Pa
     curves, bars = grid[:, 0]
     angles = np.linspace(0.0, reach, 600)
     for number, (one, colour) in enumerate(
-        zip(stabilities, figures.colours(len(stabilities), 0.88), strict=True)
+        zip(stabilities, figures.colours(len(stabilities), figures.LIGHTEST), strict=True)
     ):
         curves.plot(angles, one.stretch(angles), color=colour, linewidth=1.5, label=one.kernel)
         _draw_intervals(bars, one, len(stabilities) - 1 - number, reach, colour)

@@ -11,8 +11,8 @@ from strapgen.experiments.word_length import Outcome
 from strapgen.reports.plots import figures
 from strapgen.reports.word_length import by_method_step_and_pulse, settings_text
 
-#: What each carry keeps, in the words of the legend.
-_RESIDUALS = {"none": "no residuals", "state": "residuals of the state", "full": "all residuals"}
+#: Which rounding errors each carry feeds back, in the words of the legend.
+_FEEDBACK = {"none": "no error feedback", "state": "feedback of the state", "full": "full feedback"}
 
 
 def word_length_image(outcomes: Sequence[Outcome], path: str | Path) -> bytes:
@@ -71,7 +71,7 @@ def _draw_panel(axes: Any, group: Sequence[Outcome]) -> None:
     for outcome in group:
         lines.setdefault((outcome.case.rounding, outcome.case.carry), []).append(outcome)
     for number, ((rounding, carry), line) in enumerate(lines.items()):
-        label = _RESIDUALS[carry] if rounding == "nearest" else f"{_RESIDUALS[carry]}, {rounding}"
+        label = _FEEDBACK[carry] if rounding == "nearest" else f"{_FEEDBACK[carry]}, {rounding}"
         _draw_line(axes, number, line, label)
     first = group[0]
     floor = {"color": "0.35", "linewidth": 1.0}
@@ -104,8 +104,7 @@ def _draw_line(axes: Any, number: int, line: Sequence[Outcome], label: str) -> N
         words,
         certified,
         color=colour,
-        linewidth=1.0,
+        linewidth=1.4,
         linestyle=":",
-        alpha=0.9,
         label=f"{label}: certified",
     )
