@@ -60,7 +60,7 @@ def generate(
     check_format(format)
     if all_:
         _check_alone(algorithm, method, fixed, output)
-        _generate_all(_names(target) if target else None, output, format)
+        _generate_all(None if target is None else _names(target), output, format)
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
@@ -87,7 +87,10 @@ def _names(target: str | None) -> list[str]:
     """Return the targets of the option, each checked."""
     from strapgen.targets import TARGETS
 
-    return [checks.choice("target", name, TARGETS) for name in listed("--target", target or "numpy")]
+    return [
+        checks.choice("target", name, TARGETS)
+        for name in listed("--target", "numpy" if target is None else target)
+    ]
 
 
 def _files(task: Request, sources: Sources, output: SourceOptions) -> dict[str, str]:
