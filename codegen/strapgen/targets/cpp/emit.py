@@ -78,7 +78,8 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
     command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     outputs = [(f"std::array<{printer.real.name}, {r.signal.size}>", r.signal.name) for r in program.outputs]
-    values = interface_values(program, printer, name) | {
+    header, runs = runs_of(name)
+    values = interface_values(program, printer, name, header) | {
         "file": f"{name}.hpp",
         "guard": f"{name}_hpp".upper(),
         "command": command,
@@ -106,17 +107,18 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "functions": {node.kind for node in nodes},
         "turn": tuple(map(printer.constant, c.HALF_TURNS)),
     }
-    header, runs = runs_of(name)
     templates = {f"{name}.hpp": "function.hpp", header: "interface.h", runs: "runs.cpp"}
     return {file: render(f"cpp/{template}.j2", **values) for file, template in templates.items()}
 
 
-def interface_values(program: Program, printer: c.CPrinter, name: str) -> dict[str, object]:
+def interface_values(program: Program, printer: c.CPrinter, name: str, header: str) -> dict[str, object]:
     """Return what the templates of the C interface are filled with, whatever the language behind it is."""
     real = printer.real
     return {
         "program": program,
         "name": name,
+        "header": header,
+        "guard_of_runs": header.replace(".", "_").upper(),
         "real": real,
         "state": program.inputs[0],
         "samples": program.inputs[-1],

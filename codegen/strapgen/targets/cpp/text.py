@@ -59,6 +59,6 @@ def result_of(name: str, outputs: Sequence[tuple[str, str]]) -> str:
     return outputs[0][0] if len(outputs) == 1 else f"{name}_result"
 
 
-def runs_of(name: str, ending: str = "cpp") -> tuple[str, str]:
-    """Return the names of the files with the C interface of a function."""
-    return f"{name}_runs.h", f"{name}_runs.{ending}"
+def runs_of(name: str, language: str = "cpp", ending: str = "cpp") -> tuple[str, str]:
+    """Return the names of the files with the C interface of a function in a language."""
+    return f"{name}_{language}_runs.h", f"{name}_{language}_runs.{ending}"
