@@ -6,9 +6,11 @@ BIN := .venv/bin
 READY := .venv/.ready
 TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
+DOCS := .venv/.ready-for-docs
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
-  check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page evidence-tools faults fuzz release-check
+  check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page \
+  evidence-tools faults fuzz release-check docs docs-serve
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -27,6 +29,8 @@ help:
 	@echo "make faults    kill commands, fill disks and move clocks for four minutes; see that nothing wrong is left"
 	@echo "make fuzz      try drawn inputs on the C, the readers and the command line for five minutes"
 	@echo "make release-check  build the archives in dist/; have the wheel pass the tests away from the sources"
+	@echo "make docs      build the documentation as a site that needs no network: docs/_build/html/index.html"
+	@echo "make docs-serve  the same, at http://127.0.0.1:8000 for the page that runs strapgen in the browser"
 	@echo "make clean     remove .venv and what tools left behind"
 
 $(READY): pyproject.toml
@@ -161,6 +165,18 @@ faults: $(TOOLS)
 fuzz: $(TOOLS)
 	$(BIN)/python tests/fuzz.py --seconds 300
 
+$(DOCS): $(READY)
+	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e '.[docs]'
+	@touch $@
+
+# npm brings MathJax, which the pages then have beside them.
+docs: $(DOCS)
+	$(BIN)/python docs/site/build.py
+	@echo "docs/_build/html/index.html"
+
+docs-serve: docs
+	$(BIN)/python -m http.server --bind 127.0.0.1 --directory docs/_build/html 8000
+
 clean:
-	rm -rf .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist
+	rm -rf docs/_build .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

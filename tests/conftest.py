@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import browser_checks
 import hypothesis
 import numpy as np
 import pytest
@@ -26,6 +28,9 @@ from strapgen.support.exceptions import CompilerError
 from strapgen.targets import BUILT_IN
 from strapgen.toolchain import compiler, shared_libraries
 from strapgen.toolchain.shared_libraries import COMPILERS, LibraryCompiler
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 #: The back ends. Short words have the code of long ones, C in float that of double, and the integer model gives the
 #: bits of the C: they run with the long tests.
@@ -223,3 +228,10 @@ def make(backend_name: str):
 def rng() -> Iterator[np.random.Generator]:
     """A generator of random numbers that gives the same ones each time."""
     yield np.random.default_rng(SEED)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Headless Chromium, for the checks of pages in browser_checks.py."""
+    with browser_checks.chromium() as browser:
+        yield browser

@@ -52,7 +52,7 @@ def _filling(code: str) -> str:
 
 def main() -> int:
     """Check all pages; return the exit status."""
-    pages = sorted({page for pattern in PAGES for page in ROOT.glob(pattern)})
+    pages = sorted({page for pattern in PAGES for page in ROOT.glob(pattern) if "_build" not in page.parts})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / ".proselintrc.json").write_text(SETTINGS)

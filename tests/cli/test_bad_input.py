@@ -278,7 +278,7 @@ BAD = {
     f"simulate euler --initial-deg 1,2,x {CONSTANT}": "initial-deg is 'x'",
     f"simulate euler --rates --pulse-arcsec 1 {CONSTANT}": "kernel euler-rk4-rates takes rates; a pulse goes with",
     f"simulate euler --motion missing.py {TIMES}": "motion missing.py is no file; a Python file with functions",
-    "converge euler --motion missing.py": "motion missing.py is known in double alone; --backend numpy runs on it",
+    "converge euler --motion missing.py": "motion missing.py is no file",
     "converge euler --backend numpy --motion missing.py": "motion missing.py is no file",
     f"compare euler --motion missing.py {TIMES}": "motion missing.py is no file",
     "study word-length --motion missing.py": "motion missing.py is no file",
@@ -401,6 +401,8 @@ BAD = {
     # frontier
     "frontier --method rk9": "method 'rk9' is not known",
     "frontier --method rk4:2+x": "number of samples in rk4:2+x is 'x'; a whole number is needed",
+    "frontier --method rk4:2 --set a=1": "--set goes with --motion",
+    "frontier --method rk4:2 --motion conin --jobs 1": "motion 'conin' is not known",
     "frontier --method rk4:2 --sample-hz 0": "sample-hz is 0; a number above 0 is needed",
     "frontier --method rk4:2 --duration 0.001": "duration 0.001 s is shorter than a step of rk4:2 at 100 Hz",
     "frontier --method rk4:2 --jobs 0": "jobs is 0; a whole number from 1 to 1024 is needed",

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from strapgen.catalogue import METHODS
 from strapgen.experiments import frontier
 from strapgen.experiments.frontier import CANDIDATES, MOTIONS, Candidate, candidates, in_order, pareto
 from strapgen.reports import plots
@@ -117,6 +118,31 @@ def test_a_step_longer_than_the_run_is_refused():
 def test_a_run_that_leaves_its_numbers_has_no_drift():
     trial = frontier.Trial(Candidate("rk4", 1), "1", "600")
     assert frontier._drift(trial.candidate.choice, "cone 15/20", trial) is None
+
+
+def test_a_users_motion_stands_alone():
+    mine = {"coning": ("coning", {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"})}
+    several = candidates(["rk1:2", "rk4:2"])
+    standings = in_order(frontier.frontier(several, "100", "2", jobs=1, motions=mine), several)
+    assert all(list(one.drifts) == ["coning"] for one in standings)
+    assert standings[1].drifts["coning"] < 1e-5 * standings[0].drifts["coning"]  # orders 1 and 4 at 1/50 rad
+    report = frontier_report(standings, 100.0, 2.0, mine)
+    data = json.loads(report.written("json"))
+    assert data["motions"] == {"coning": {"motion": "coning", **mine["coning"][1]}}
+    assert report.written("csv").splitlines()[0].endswith(",multiply_per_s,coning deg/h")
+    text = report.written("text")
+    assert "drift on coning, a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6" in text and "drift on cones" not in text
+
+
+def test_a_motion_that_is_not_known_is_refused():
+    with pytest.raises(InputError, match="'conin' is not known"):
+        list(frontier.frontier(candidates(["rk4:2"]), jobs=1, motions={"conin": ("conin", {})}))
+
+
+def test_all_stands_for_every_method_with_its_samples():
+    every = candidates(["all"])
+    assert {one.method for one in every} == {*METHODS}
+    assert every[: len(CANDIDATES)] == list(CANDIDATES) and len({one.name for one in every}) == len(every)
 
 
 def test_the_frontier_is_what_nothing_undercuts():

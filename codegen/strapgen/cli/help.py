@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from typer.core import TyperCommand, TyperGroup
@@ -56,6 +57,52 @@ class PlainGroup(TyperGroup):
             rows = [(name, _summary(self.commands[name].help or "")) for name in names]
             lines += ["", f"{heading}:", *_definitions(rows, width)]
         return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class CommandHelp:
+    """What the help of a command says, before it is laid out.
+
+    Parameters
+    ----------
+    usage : str
+        The command with its arguments, as it is typed.
+    paragraphs : tuple of str
+        The text without its examples, each paragraph in one line.
+    examples : tuple of str
+        Whole commands, each in one line.
+    panels : mapping of str to list of tuple of str
+        Arguments and options with what they mean, by the titles of their groups.
+    """
+
+    usage: str
+    paragraphs: tuple[str, ...]
+    examples: tuple[str, ...]
+    panels: Mapping[str, Sequence[tuple[str, str]]]
+
+
+def help_parts(command: Any, context: Any) -> CommandHelp:
+    """Return what ``--help`` says of a command; terminal and reference lay it out.
+
+    Parameters
+    ----------
+    command : Command
+        A command of Typer, or a group of commands.
+    context : Context
+        Its context, whose path of names begins the usage.
+    """
+    pieces = [f"[{_label(p)}]" if not p.required else _label(p) for p in _arguments(command, context)]
+    if hasattr(command, "commands"):
+        pieces.append("COMMAND [ARGS]...")
+    parts = [" ".join(part.split()) for part in (command.help or "").strip().split("\n\n")]
+    examples = {part: part.removeprefix("Example: ") for part in parts}
+    commands = tuple(each for each in examples.values() if each.startswith("strapgen "))
+    return CommandHelp(
+        usage=f"{context.command_path} {' '.join(['[OPTIONS]', *pieces])}",
+        paragraphs=tuple(part for part in parts if examples[part] not in commands),
+        examples=commands,
+        panels=_panels(command, context),
+    )
 
 
 def explanation(error: Any) -> str:
@@ -148,27 +195,33 @@ def _in_options(command: Any, message: str) -> str:
 
 
 def _help(command: Any, context: Any) -> list[str]:
-    arguments = [p for p in command.get_params(context) if p.param_type_name == "argument"]
-    pieces = [f"[{_label(p)}]" if not p.required else _label(p) for p in arguments]
-    if hasattr(command, "commands"):
-        pieces.append("COMMAND [ARGS]...")
-    usage = f"Usage: {context.command_path} {' '.join(['[OPTIONS]', *pieces])}"
-    lines = [*_filled(usage, "", "       "), "", *_text(command.help or "")]
+    parts = help_parts(command, context)
+    lines = [*_filled(f"Usage: {parts.usage}", "", "       "), "", *_text(parts)]
+    labels = [label for rows in parts.panels.values() for label, _ in rows]
+    width = min(_MOST_OPTION, _width() // 3, max(map(len, labels)))
+    for title, rows in parts.panels.items():
+        lines += ["", f"{title}:", *_definitions(rows, width)]
+    return lines
+
+
+def _panels(command: Any, context: Any) -> dict[str, list[tuple[str, str]]]:
+    """Return the arguments and the options by the titles of their groups, general groups last."""
     panels: dict[str, list[tuple[str, str]]] = {}
-    for parameter in (*arguments, *_options(command, context)):
+    for parameter in (*_arguments(command, context), *_options(command, context)):
         title = (
             "Arguments"
-            if parameter in arguments
+            if parameter.param_type_name == "argument"
             else getattr(parameter, "rich_help_panel", None) or "Options"
         )
         panels.setdefault(title, []).append((_label(parameter), _help_text(parameter, context)))
     for last in ("Output", "Options"):
         if rows := panels.pop(last, []):
             panels["Other options" if last == "Options" and {*panels} - {"Arguments"} else last] = rows
-    width = min(_MOST_OPTION, _width() // 3, max(len(label) for rows in panels.values() for label, _ in rows))
-    for title, rows in panels.items():
-        lines += ["", f"{title}:", *_definitions(rows, width)]
-    return lines
+    return panels
+
+
+def _arguments(command: Any, context: Any) -> list[Any]:
+    return [p for p in command.get_params(context) if p.param_type_name == "argument"]
 
 
 def _label(parameter: Any) -> str:
@@ -207,18 +260,14 @@ def _definitions(rows: Sequence[tuple[str, str]], width: int) -> list[str]:
     return lines
 
 
-def _text(text: str) -> list[str]:
+def _text(parts: CommandHelp) -> list[str]:
     """Return the paragraphs of a help text, the examples under a heading of their own at its end."""
-    paragraphs = [" ".join(part.split()) for part in text.strip().split("\n\n")]
-    examples = [part.removeprefix("Example: ") for part in paragraphs]
-    commands = [part for part in examples if part.startswith("strapgen ")]
     lines: list[str] = []
-    for part in paragraphs:
-        if part.removeprefix("Example: ") not in commands:
-            lines += ["", *_filled(part, "  ", "  ")]
-    if commands:
-        lines += ["", "Examples:" if len(commands) > 1 else "Example:"]
-    for command in commands:
+    for part in parts.paragraphs:
+        lines += ["", *_filled(part, "  ", "  ")]
+    if parts.examples:
+        lines += ["", "Examples:" if len(parts.examples) > 1 else "Example:"]
+    for command in parts.examples:
         lines += ["", *_command_lines(command)]
     return lines[1:]
 

@@ -19,7 +19,7 @@ from strapgen.backends import backend as attitude_backend
 from strapgen.catalogue import Choice
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.fixed_settings import Settings
-from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments
+from strapgen.simulation.exact_attitudes import exact_attitudes, step_of_increments, uncertainty
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import largest_increment, simulate
 from strapgen.simulation.users_motions import any_motion, is_file
@@ -324,7 +324,8 @@ def _on_backend(
 def _in_many_digits(choice: Choice, motion: Motion, rounding: float) -> _Measure:
     """Return the function that measures a step length without visible rounding.
 
-    Where the published coefficients of a method are rounded, their rounding is the smallest error that means something.
+    Where the published coefficients of a method are rounded, their rounding is the smallest error that means something;
+    where the motion is known in double alone, the rounding of its increments is.
     """
     attitudes = exact_attitudes(choice, motion)
 
@@ -333,6 +334,6 @@ def _in_many_digits(choice: Choice, motion: Motion, rounding: float) -> _Measure
             worst = mpmath.mpf(0)
             for computed, true in attitudes(length, count):
                 worst = max(worst, sum((a - b) ** 2 for a, b in zip(computed, true, strict=True)))
-            return float(mpmath.sqrt(worst / 2)), 100 * rounding + 10.0 ** (10 - exact.DIGITS)
+            return float(mpmath.sqrt(worst / 2)), 100 * rounding + uncertainty(motion, length, count)
 
     return measure

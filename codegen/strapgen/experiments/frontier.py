@@ -7,7 +7,7 @@ its program, for each sample.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -20,8 +20,9 @@ from strapgen.backends import backend
 from strapgen.catalogue import Choice
 from strapgen.library import generated_sources
 from strapgen.simulation.drift import drift
-from strapgen.simulation.motions import Motion, motion
+from strapgen.simulation.motions import Motion
 from strapgen.simulation.runs import simulate
+from strapgen.simulation.users_motions import any_motion, is_file
 from strapgen.support import cache as disk_cache
 from strapgen.support import checks
 from strapgen.support.clusters import Bundle, Cluster, moved
@@ -29,10 +30,12 @@ from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import resume, side_by_side
 from strapgen.support.version import VERSION
 
+#: Motions by their labels: a name, or a user's file, and its settings.
+Motions = Mapping[str, tuple[str, Mapping[str, str]]]
 #: Half-angles in deg and frequencies in Hz of the cones.
 CONES = ("0.1", "1", "5", "15"), ("2", "5", "10", "20")
-#: The motions by their labels: a name and its settings. The spins are those of a body on a cone, in deg/s.
-MOTIONS: dict[str, tuple[str, dict[str, str]]] = {
+#: The motions that are compared by default. The spins are those of a body on a cone, in deg/s.
+MOTIONS: Motions = {
     **{
         f"cone {angle}/{frequency}": ("cone", {"half_angle_deg": angle, "frequency_hz": frequency})
         for angle in CONES[0]
@@ -51,6 +54,8 @@ MOTIONS: dict[str, tuple[str, dict[str, str]]] = {
 }
 #: The state that all algorithms integrate.
 STATE = "euler"
+#: What stands for the candidates of all methods.
+EVERY = "all"
 
 
 @dataclass(frozen=True)
@@ -156,18 +161,23 @@ class Trial:
     candidate : Candidate
     sample_hz, duration : str
         Sampling rate in Hz, and length of the runs in s.
+    motions : mapping of str to (str, mapping of str to str), optional
+        By their labels.
     """
 
     candidate: Candidate
     sample_hz: str
     duration: str
+    motions: Motions = field(default_factory=lambda: MOTIONS)
 
     def moved(self, begin: Path, end: Path) -> Trial:
-        """Return the trial with the file of a user's algorithm in another folder, see `clusters.Movable`."""
-        one = self.candidate
-        if not one.method.endswith(".py"):
-            return self
-        return replace(self, candidate=replace(one, method=moved(one.method, begin, end)))
+        """Return the trial with the files of the user in another folder, see `clusters.Movable`."""
+        one, motions = self.candidate, dict(self.motions)
+        if one.method.endswith(".py"):
+            one = replace(one, method=moved(one.method, begin, end))
+        for label, (name, settings) in motions.items():
+            motions[label] = (moved(name, begin, end) if is_file(name) else name, settings)
+        return replace(self, candidate=one, motions=motions)
 
 
 def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
@@ -177,7 +187,8 @@ def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
     ----------
     names : iterable of str, optional
         Methods, each of which stands for its candidates in `CANDIDATES`, and methods or Python files with their
-        samples, as in "coning-combined:8+3" or "window-7-7:1+7+7". By default all of `CANDIDATES`.
+        samples, as in "coning-combined:8+3" or "window-7-7:1+7+7"; "all" stands for all methods of the catalogue. By
+        default all of `CANDIDATES`.
 
     Returns
     -------
@@ -198,6 +209,10 @@ def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
     chosen: dict[Candidate, None] = {}
     for name in names:
         method, colon, samples = name.rpartition(":")
+        if name == EVERY:
+            every = (one for method in catalogue.METHODS for one in _of_method(method))
+            chosen |= dict.fromkeys([*CANDIDATES, *every])
+            continue
         if not colon:
             chosen |= dict.fromkeys(_of_method(name))
             continue
@@ -224,7 +239,7 @@ def _of_method(method: str) -> list[Candidate]:
     return [Candidate(method, choice.increments, choice.previous, choice.ahead)]
 
 
-def identity(sample_hz: str, duration: str) -> dict[str, Any]:
+def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS) -> dict[str, Any]:
     """Return what the results of a study belong to: the code, the sampling, and the motions."""
     return {
         "study": "frontier",
@@ -232,7 +247,7 @@ def identity(sample_hz: str, duration: str) -> dict[str, Any]:
         "code": disk_cache.generator_digest(),
         "sample_hz": str(Fraction(sample_hz)),
         "duration_s": str(Fraction(duration)),
-        "motions": {label: [name, settings] for label, (name, settings) in MOTIONS.items()},
+        "motions": {label: [name, dict(settings)] for label, (name, settings) in motions.items()},
     }
 
 
@@ -243,8 +258,9 @@ def frontier(
     results: str | Path | None = None,
     jobs: int | None = None,
     cluster: Cluster | None = None,
+    motions: Motions = MOTIONS,
 ) -> Iterator[Standing]:
-    """Run algorithms on all motions, and yield what each costs and how it drifts when its runs end.
+    """Run algorithms on motions, and yield what each costs and how it drifts when its runs end.
 
     Parameters
     ----------
@@ -257,6 +273,8 @@ def frontier(
         Number of processes; by default one for each processor.
     cluster : Cluster, optional
         Where they run, in place of processes of this one.
+    motions : mapping of str to (str, mapping of str to str), optional
+        Names of motions, or files of users, with their settings, by labels; by default all of `MOTIONS`.
 
     Yields
     ------
@@ -276,13 +294,17 @@ def frontier(
                 f"duration {float(length):g} s is shorter than a step of {candidate.name} at {float(rate):g} Hz"
             )
     checks.multiple("duration", length, "sampling interval", 1 / rate)
-    cases = {one.name: Trial(one, str(rate), str(length)) for one in several}
+    for name, settings in motions.values():
+        any_motion(name, str(length), settings)  # refuses what is not known
+    cases = {one.name: Trial(one, str(rate), str(length), motions) for one in several}
     users = [one.method for one in several if one.method.endswith(".py")]
+    users += [name for name, _ in motions.values() if is_file(name)]
     files = None if cluster is None else Bundle.of(users)
     if results is None:
         finished = side_by_side(run_trial, cases, jobs, cluster, files)
     else:
-        finished = resume(run_trial, cases, results, identity(str(rate), str(length)), jobs, cluster, files)
+        about = identity(str(rate), str(length), motions)
+        finished = resume(run_trial, cases, results, about, jobs, cluster, files)
     for _, data in finished:
         yield Standing(**data)
 
@@ -294,7 +316,7 @@ def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> lis
 
 
 def run_trial(trial: Trial) -> dict[str, Any]:
-    """Run a candidate on all motions; return its standing as plain JSON data."""
+    """Run a candidate on the motions of its trial; return its standing as plain JSON data."""
     choice = trial.candidate.choice
     program = generated_sources.program(choice)
     operations = program.operations
@@ -307,7 +329,7 @@ def run_trial(trial: Trial) -> dict[str, Any]:
             operations["multiply"],
             operations["add"],
             sum(number for kind, number in operations.items() if kind not in ("multiply", "add", "negate")),
-            {label: _drift(choice, label, trial) for label in MOTIONS},
+            {label: _drift(choice, label, trial) for label in trial.motions},
         )
     )
 
@@ -316,9 +338,11 @@ def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
     """Return the drift on a motion over as many whole steps as the duration holds, in deg/h."""
     rate, duration = Fraction(trial.sample_hz), Fraction(trial.duration)
     step = trial.candidate.increments / rate
+    name, settings = trial.motions[label]
     with np.errstate(all="ignore"):
         try:
-            run = simulate(backend(choice), _motion(label), step, duration // step * step)
+            profile = _motion(name, tuple(settings.items()), trial.duration)
+            run = simulate(backend(choice), profile, step, duration // step * step)
         except InputError:  # the attitude is not finite
             return None
         value = drift(run)
@@ -326,9 +350,9 @@ def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
 
 
 @cache
-def _motion(label: str) -> Motion:
-    name, settings = MOTIONS[label]
-    return motion(name, **settings)
+def _motion(name: str, settings: tuple[tuple[str, str], ...], duration: str) -> Motion:
+    """Return a motion, which has checked the settings of a user's file once for all candidates of a process."""
+    return any_motion(name, duration, dict(settings))
 
 
 def pareto(points: Mapping[str, tuple[float, float]], gain: float = 0.0) -> list[str]:

@@ -93,7 +93,7 @@ def quaternion_conjugate(q: sp.Matrix) -> sp.Matrix:
 
 
 def quaternion_matrix(q: sp.Matrix) -> sp.Matrix:
-    """Return the matrix of ``v -> q v q*``: |q|^2 times the direction cosine matrix of q.
+    """Return the matrix of ``v -> q v q*``: ``|q|^2`` times the direction cosine matrix of q.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def wave_series(square: Any, first: int, order: int) -> Any:
 def rotation(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = None) -> sp.Matrix:
     """Return exp(skew(v)), the rotation matrix of the rotation vector v, without a singularity at v = 0.
 
-    The matrix is I + (sin x)/x skew(v) + (1 - cos x)/x^2 skew(v)^2 with x = |v|. The last factor is written as half
+    The matrix is I + (sin x)/x skew(v) + (1 - cos x)/x^2 skew(v)^2 with x = ``|v|``. The last factor is written as half
     the square of sin(x/2)/(x/2).
 
     Parameters

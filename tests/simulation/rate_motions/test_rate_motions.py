@@ -143,6 +143,40 @@ def test_the_order_of_a_step_is_seen_on_it():
     assert math.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.2)
 
 
+def test_a_rate_shows_an_order_below_the_rounding_of_double():
+    # Sixth order at steps of 1/32 s is off by 1e-15 rad, which is hidden in double.
+    choice = strapgen.choose("euler", "butcher6", 6)
+    ladder = strapgen.converge(choice, read_motion(EXAMPLE, 1), ["1/8", "1/16", "1/32"], 1)
+    assert all(rung.used for rung in ladder.rungs)
+    assert ladder.rungs[-1].error_rad < 5e-13
+    assert ladder.observed == pytest.approx(6, abs=0.15)
+
+
+def test_functions_of_a_file_run_in_many_digits_down_to_their_own_rounding():
+    users = read_motion(EXAMPLE.with_name("own_motion.py"), 1)
+    steps = ["1/8", "1/16", "1/32", "1/64", "1/128"]
+    ladder = strapgen.converge(strapgen.choose("euler", "butcher6", 6), users, steps, 1)
+    assert [rung.used for rung in ladder.rungs] == [
+        False,
+        True,
+        True,
+        True,
+        False,
+    ]  # below rounding: 1e-17 rad
+    assert ladder.observed == pytest.approx(6, abs=0.2)
+
+
+def test_a_step_with_samples_ahead_runs_in_many_digits_as_in_double():
+    choice = strapgen.choose("euler", "window-7-7", 1)
+    for name in ("own_rate.py", "own_motion.py"):
+        users = read_motion(EXAMPLE.with_name(name), 1)
+        double, digits = (
+            strapgen.converge(choice, users, [1, "1/2"], 1, name) for name in ("numpy", "exact")
+        )
+        for one, other in zip(double.rungs, digits.rungs, strict=True):
+            assert one.error_rad == pytest.approx(other.error_rad, rel=1e-3)
+
+
 def test_series_of_a_rate_in_sympy_are_those_of_the_built_in_motion(tmp_path):
     path = written(tmp_path, "[sp.sin(2 * t) / 3, sp.Rational(1, 5), sp.cos(2 * t) / 3]")
     choice = strapgen.choose("euler", "rk2", 1)
@@ -158,6 +192,7 @@ COMMANDS = (
     "simulate euler --rates --step 0.25 --duration 1 --format json",
     "compare euler --step 0.25 --duration 1 --backend numpy,exact --format json",
     "converge euler --steps 0.5,0.25 --duration 1 --backend numpy --format json",
+    "converge euler --method window-7-7 --steps 0.5,0.25 --duration 1 --format json",
     "study word-length --words 16 --duration 1 --steps 0.25 --format json",
     "study velocity-position --method rk4:2 --duration 1 --format json",
     "series euler --method rk2 --terms 1 --format json",

@@ -22,9 +22,8 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, is_file, pairs
+from strapgen.cli.sample_source import MOTION_FILE, MOTION_NAMES, MotionSettings, check_motion, pairs
 from strapgen.cli.worker_options import WorkerOptions
-from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -53,14 +52,6 @@ class Ladder:
         ),
     ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
     duration: Duration = "2"
-
-    def check(self, names: list[str]) -> None:
-        """Check the name of the motion, which back ends of many digits must know in closed form."""
-        from strapgen.backends import BACKENDS
-
-        check_motion(self.motion)
-        if is_file(self.motion or "") and any(BACKENDS[name].many_digits for name in names):
-            raise InputError(f"motion {self.motion} is known in double alone; --backend numpy runs on it")
 
     @property
     def parameters(self) -> Mapping[str, str]:
@@ -120,7 +111,7 @@ def converge(
     output.check(algorithm, *methods.files)
     names = backends("--backend", backend, ())
     most = limit("--fail-beyond", fail_beyond)
-    ladder.check(names)
+    check_motion(ladder.motion)
     choices = methods.choices(algorithm)
     count, cluster = workers.count(), workers.workers()
     words, cases = ladder.words(), ladder.cases(choices, names)

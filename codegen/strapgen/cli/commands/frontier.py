@@ -4,14 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import listed, option
 from strapgen.cli.output import Output
+from strapgen.cli.sample_source import (
+    MOTION_FILE,
+    RUN_MOTION_NAMES,
+    MotionSettings,
+    check_motion,
+    is_file,
+    pairs,
+)
 from strapgen.cli.worker_options import WorkerOptions
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.experiments.frontier import Motions
 
 
 @dataclass(frozen=True)
@@ -49,10 +60,20 @@ def frontier(
             *("--method", "--methods"),
             metavar="NAME,...",
             help="Methods, each with all of its samples or one choice of them, as in magnus6:3 or "
-            "coning-combined:8+3.  [default: those of the catalogue and of the literature]",
+            "coning-combined:8+3; all: every method.  [default: those of the catalogue and of the literature]",
             panel="Algorithm",
         ),
     ] = None,
+    motion: Annotated[
+        str | None,
+        option(
+            "--motion",
+            metavar="NAME",
+            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: cones, random rates and slews]",
+            panel="Input",
+        ),
+    ] = None,
+    settings: MotionSettings = None,
     run: StudyRun,
     workers: WorkerOptions,
     output: Output,
@@ -63,6 +84,8 @@ def frontier(
     sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
     and additions for each sample. The plot shows which algorithms halve the drift of all that cost less.
 
+    With --motion they run on that motion alone.
+
     A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
     polynomial through its samples exactly, as iterations on it do in the limit.
 
@@ -71,14 +94,15 @@ def frontier(
     Example: strapgen frontier --method coning-least-squares,window-7-7 --duration 6 --results out/frontier.jsonl --plot
     out/frontier.png
     """
-    output.check(run.results)
+    output.check(run.results, motion if motion and is_file(motion) else None)
     run.check(output)
+    motions = _motions(motion, settings)
     jobs, cluster = workers.count(), workers.workers()
     from strapgen.cli.progress import track
     from strapgen.experiments import frontier as study
 
     several = study.candidates(None if methods is None else listed("--method", methods))
-    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs, cluster)
+    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs, cluster, motions)
     standings = study.in_order(track(runs, "running", len(several)), several)
     from strapgen.reports import plots
     from strapgen.reports.selection.frontier import frontier_report
@@ -91,6 +115,17 @@ def frontier(
         f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what halves the drift of all that costs less"
     )
     output.report(
-        frontier_report(standings, hertz, seconds),
+        frontier_report(standings, hertz, seconds, motions),
         lambda path: plots.frontier_image(standings, hertz, title, path),
     )
+
+
+def _motions(name: str | None, settings: list[str] | None) -> Motions:
+    """Return the motion of the options by its name; those of the study without one."""
+    from strapgen.catalogue import RUN_MOTIONS
+    from strapgen.experiments import frontier as study
+
+    check_motion(name, RUN_MOTIONS)
+    if name is None and settings:
+        raise InputError("--set goes with --motion")
+    return study.MOTIONS if name is None else {name: (name, pairs(settings or []))}

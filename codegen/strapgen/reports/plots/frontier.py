@@ -48,11 +48,13 @@ def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, 
     InputError
         If the kind of image is unknown.
     """
-    rows = -(-len(PANELS) // _COLUMNS)
-    figure, grid = figures.grid_of_axes(rows, _COLUMNS, (6.2 * _COLUMNS, 0.6 + 3.7 * rows))
+    panels = [label for label in PANELS if label in standings[0].drifts] or list(standings[0].drifts)
+    columns = min(_COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    figure, grid = figures.grid_of_axes(rows, columns, (6.2 * columns, 0.6 + 3.7 * rows))
     labels = [
         (axes, _draw_panel(axes, standings, label, sample_hz))
-        for axes, label in zip(grid.flat, PANELS, strict=True)
+        for axes, label in zip(grid.flat, panels, strict=True)
     ]
     for axes in grid[-1]:
         axes.set_xlabel("multiplications a second")
@@ -106,7 +108,9 @@ def _colour(name: str) -> str:
 
 
 def _title(label: str) -> str:
-    """Return the label of a motion in words."""
+    """Return the label of a motion in words; what a user names stays as it is."""
+    if label not in PANELS:
+        return figures.printable(label)
     kind, _, rest = label.partition(" ")
     if kind == "cone":
         angle, _, frequency = rest.partition("/")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from strapgen.experiments.frontier import CONES, MOTIONS, Standing
+from strapgen.experiments.frontier import CONES, MOTIONS, Motions, Standing
 from strapgen.reports.report import Report
 from strapgen.reports.table import ANGLE, Column, TextTable
 
@@ -13,7 +13,9 @@ from strapgen.reports.table import ANGLE, Column, TextTable
 _DRIFT, _COUNT = ANGLE, ".5g"
 
 
-def frontier_report(standings: Sequence[Standing], sample_hz: float, duration_s: float) -> Report:
+def frontier_report(
+    standings: Sequence[Standing], sample_hz: float, duration_s: float, motions: Motions = MOTIONS
+) -> Report:
     """Return standings as a report.
 
     Parameters
@@ -21,24 +23,26 @@ def frontier_report(standings: Sequence[Standing], sample_hz: float, duration_s:
     standings : sequence of Standing
     sample_hz, duration_s : float
         Sampling rate in Hz, and length of the runs in s.
+    motions : mapping of str to (str, mapping of str to str), optional
+        Those of the runs, by their labels.
     """
 
     def data() -> dict[str, Any]:
         return {
             "sample_hz": sample_hz,
             "duration_s": duration_s,
-            "motions": {label: {"motion": name, **settings} for label, (name, settings) in MOTIONS.items()},
+            "motions": {label: {"motion": name, **settings} for label, (name, settings) in motions.items()},
             "algorithms": [_as_dict(standing, sample_hz) for standing in standings],
         }
 
     return Report(
-        lambda: frontier_text(standings, sample_hz, duration_s),
+        lambda: frontier_text(standings, sample_hz, duration_s, motions),
         data,
         lambda: _flat(standings, sample_hz),
         lambda: TextTable(
-            [Column("algorithm", "<"), *_COST, *(Column(label, spec=_DRIFT) for label in MOTIONS)],
+            [Column("algorithm", "<"), *_COST, *(Column(label, spec=_DRIFT) for label in motions)],
             [
-                [one.name, *_cost(one, sample_hz), *(one.drifts[label] for label in MOTIONS)]
+                [one.name, *_cost(one, sample_hz), *(one.drifts[label] for label in motions)]
                 for one in standings
             ],
         ),
@@ -54,7 +58,9 @@ _COST = (
 )
 
 
-def frontier_text(standings: Sequence[Standing], sample_hz: float, duration_s: float) -> str:
+def frontier_text(
+    standings: Sequence[Standing], sample_hz: float, duration_s: float, motions: Motions = MOTIONS
+) -> str:
     """Return standings as tables for a reader: one of costs, and one for each kind of motion."""
     lines = [
         f"largest angle from the true attitude over {duration_s:g} s, divided by that time, in deg/h,",
@@ -68,7 +74,7 @@ def frontier_text(standings: Sequence[Standing], sample_hz: float, duration_s: f
             [[one.name, *_cost(one, sample_hz)] for one in standings],
         ).lines(),
     ]
-    for title, columns in _tables():
+    for title, columns in _tables() if motions == MOTIONS else _table_of(motions):
         rows = [[one.name, *(one.drifts[label] for label in columns)] for one in standings]
         table = TextTable([Column("", "<"), *columns.values()], rows)
         lines += ["", title, "", *table.lines()]
@@ -93,6 +99,15 @@ def _tables() -> list[tuple[str, dict[str, Column]]]:
     rest = [label for label in MOTIONS if not label.startswith("cone ")]
     title = "drift on cones of a body that spins, at deg/s on half-angle/Hz; random rates, at deg/s; slews"
     return [*tables, (title, {label: Column(label, spec=_DRIFT) for label in rest})]
+
+
+def _table_of(motions: Motions) -> list[tuple[str, dict[str, Column]]]:
+    """Return the table of drifts on motions that a user states."""
+    words = "; ".join(
+        ", ".join([name, *(f"{key}={value}" for key, value in settings.items())])
+        for name, settings in motions.values()
+    )
+    return [(f"drift on {words}", {label: Column(label, spec=_DRIFT) for label in motions})]
 
 
 def _cost(standing: Standing, sample_hz: float) -> list[float]:
@@ -120,7 +135,8 @@ def _flat(standings: Sequence[Standing], sample_hz: float) -> TextTable:
     """Return all figures, a row for each algorithm."""
     rows = [_as_dict(standing, sample_hz) for standing in standings]
     names = [name for name in rows[0] if name != "drift_deg_h"] if rows else []
-    columns = [*names, *(f"{label} deg/h" for label in MOTIONS)]
+    labels = standings[0].drifts if standings else ()
+    columns = [*names, *(f"{label} deg/h" for label in labels)]
     return TextTable(
         [Column(name) for name in columns],
         [[*(row[name] for name in names), *row["drift_deg_h"].values()] for row in rows],

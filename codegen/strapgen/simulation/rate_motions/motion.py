@@ -55,22 +55,25 @@ class RateMotion(Motion):
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
         """Return angle increments of some sampling intervals, integrated in 50 digits, see `Motion.samples`."""
-        with mp.workdps(DIGITS):
-            edges = [
-                mp.mpf((k * interval).numerator) / (k * interval).denominator for k in range(first, stop + 1)
-            ]
-            angles = [self._integrated.piece(edge).angle_at(edge) for edge in edges]
-            rows = [[float(b - a) for a, b in zip(*pair, strict=True)] for pair in pairwise(angles)]
+        rows = [[float(x) for x in row] for row in self.samples_in_digits(interval, first, stop)]
         return np.array(rows, float).reshape(stop - first, 3)
+
+    def samples_in_digits(self, interval: Fraction, first: int, stop: int) -> list[list[Any]]:
+        """Return what `samples` does before it is rounded, integrated in 50 digits: (stop - first) rows of three."""
+        with mp.workdps(DIGITS):
+            edges = [_time(k * interval) for k in range(first, stop + 1)]
+            angles = [self._integrated.piece(edge).angle_at(edge) for edge in edges]
+            return [[b - a for a, b in zip(*pair, strict=True)] for pair in pairwise(angles)]
 
     def attitude(self, time: Any) -> Array:
         """Return the true attitude, see `Motion.attitude`."""
+        return self._at(time, _attitude_elements, (3, 3))
 
-        def elements(piece: Piece, t: Any) -> list[Any]:
-            # What is below the bound of its error is zero.
-            return [x if abs(x) > piece.error else 0 for row in piece.attitude_at(t) for x in row]
-
-        return self._at(time, elements, (3, 3))
+    def attitude_in_digits(self, time: Fraction) -> list[Any]:
+        """Return the true attitude at a time in s before it is rounded, row by row, within `error_bound`."""
+        with mp.workdps(DIGITS):
+            moment = _time(time)
+            return _attitude_elements(self._integrated.piece(moment), moment)
 
     def rate(self, time: Any) -> Array:
         """Return the body rate, see `Motion.rate`."""
@@ -87,6 +90,15 @@ class RateMotion(Motion):
             exact = map(_number, times.ravel().tolist())
             rows = [[float(x) for x in function(self._integrated.piece(t), t)] for t in exact]
         return np.array(rows, float).reshape(*times.shape, *shape)
+
+
+def _attitude_elements(piece: Piece, time: Any) -> list[Any]:
+    """Return the attitude at a time in a piece, row by row; what is below the bound of its error is zero."""
+    return [x if abs(x) > piece.error else mp.mpf(0) for row in piece.attitude_at(time) for x in row]
+
+
+def _time(time: Fraction) -> Any:
+    return mp.mpf(time.numerator) / time.denominator
 
 
 def _number(time: float) -> Any:

@@ -1,0 +1,177 @@
+"""Builds the site: stages the pages, runs Sphinx on them, then adds the page that runs strapgen in the browser.
+
+    python docs/site/build.py [FOLDER]
+
+The site is in FOLDER/html; FOLDER is docs/_build unless another one is named.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))
+
+import mathjax  # noqa: E402
+import reference_commands  # noqa: E402
+import reference_python  # noqa: E402
+from navigation import GENERATED, SECTIONS, site_file  # noqa: E402
+from repository_pages import MOST_PAGES, file_page, folder_page, tracked  # noqa: E402
+from staging import IMAGES, Stage, home, landing, rewritten  # noqa: E402
+
+
+class Site:
+    """The pages of the site and the files of the repository to which they link.
+
+    Parameters
+    ----------
+    stage : Stage
+        Where the pages are written.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.files = tracked(ROOT)
+        self.folders = {
+            "/".join(name.split("/")[:n]) for name in self.files for n in range(1, name.count("/") + 1)
+        }
+        self.landings = {section.landing: section for section in SECTIONS}
+        self.in_navigation = {"README.md", *self.landings, *(page for s in SECTIONS for page in s.pages)}
+        self.waiting: list[str] = []
+        self.reached: set[str] = set()
+
+    def write_pages(self) -> None:
+        """Write the pages of the navigation, and then every file and folder that a page links to."""
+        pages = {page for page in self.in_navigation if page not in GENERATED}
+        pages |= {name for name in self.files if self._is_page(name)}
+        for page in sorted(pages):
+            self.target(page, page)
+        while self.waiting:
+            self._write(self.waiting.pop())
+
+    def target(self, path: str, page: str) -> str:
+        """Return where a link to a file or a folder of the repository leads on the site.
+
+        Parameters
+        ----------
+        path : str
+            Path in the repository.
+        page : str
+            Path of the page that has the link.
+        """
+        path = path.rstrip("/")
+        if path in GENERATED:
+            return f"/{site_file(path)}"
+        if path not in self.files and path not in self.folders and path not in self.landings:
+            return ""
+        if path not in self.reached:
+            self.reached.add(path)
+            self.waiting.append(path)
+        if path.endswith(IMAGES):
+            return f"/{_image(path)}"
+        if self._is_copy(path):
+            return f"/{_copy(path)}"
+        return f"/{site_file(path)}"
+
+    def _write(self, path: str) -> None:
+        if path.endswith(IMAGES):
+            self.stage.write(_image(path), (ROOT / path).read_bytes())
+        elif self._is_copy(path):
+            self.stage.write(_copy(path), (ROOT / path).read_bytes())
+        else:
+            self.stage.write(site_file(path), self._text(path))
+
+    def _text(self, path: str) -> str:
+        """Return the page that stands for a file or a folder."""
+        if path in self.folders:
+            text = folder_page(path, self.files, path not in self.in_navigation)
+            return rewritten(text, f"{path}/", self.target)
+        text = (ROOT / path).read_text() if path in self.files else ""
+        if path not in self.landings and not path.endswith(".md"):
+            return file_page(path, text)
+        if path == "README.md":
+            text = home(text)
+        if path in self.landings:
+            text = landing(ROOT, self.landings[path], text)
+        return ("" if path in self.in_navigation else "---\norphan: true\n---\n") + rewritten(
+            text, path, self.target
+        )
+
+    def _is_page(self, path: str) -> bool:
+        return path.startswith("docs/") and path.endswith(".md") and not path.startswith("docs/site/")
+
+    def _is_copy(self, path: str) -> bool:
+        """Tell whether a file is handed out as it is, because there are many like it."""
+        top = path.split("/")[0]
+        crowded = sum(name.startswith(f"{top}/") for name in self.files) > MOST_PAGES
+        return path in self.files and crowded and not path.endswith(".md")
+
+
+def _image(path: str) -> str:
+    return path.removeprefix("docs/") if path.startswith("docs/") else f"repository/{path}"
+
+
+def _copy(path: str) -> str:
+    return f"repository/{path}.txt"
+
+
+def stage_pages(folder: Path) -> None:
+    """Write what Sphinx reads: the pages, the references and the files to which they link.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder for the pages.
+    """
+    stage = Stage(folder)
+    Site(stage).write_pages()
+    reference = next(section for section in SECTIONS if section.title == "Reference")
+    site = Site(stage)
+    stage.write("reference/index.md", rewritten(landing(ROOT, reference, ""), reference.landing, site.target))
+    for name, text in reference_commands.pages().items():
+        stage.write(f"reference/commands/{name}.md", text)
+    for name, text in reference_python.pages().items():
+        stage.write(f"reference/python/{name}.rst", text)
+    stage.drop_others()
+
+
+def main(arguments: list[str]) -> int:
+    """Build the site and return the exit status: that of the first step that fails.
+
+    Parameters
+    ----------
+    arguments : list of str
+        The folder for the site, or nothing.
+    """
+    out = Path(arguments[0] if arguments else ROOT / "docs" / "_build").resolve()
+    try:
+        mathjax.vendor(out / "vendor" / "mathjax")
+    except RuntimeError as error:
+        print(f"docs: {error}", file=sys.stderr)
+        return 2
+    stage_pages(out / "source")
+    options = [
+        "-b",
+        "html",
+        "-c",
+        str(HERE),
+        "-d",
+        str(out / "doctrees"),
+        "-W",
+        "--keep-going",
+        "-q",
+        "-j",
+        "auto",
+    ]
+    command = [sys.executable, "-m", "sphinx", *options, str(out / "source"), str(out / "html")]
+    steps = [command]
+    if (HERE / "try" / "vendor.py").is_file():
+        steps.append([sys.executable, str(HERE / "try" / "vendor.py"), str(out / "html")])
+    return next((status for step in steps if (status := subprocess.run(step).returncode)), 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,166 @@
+"""The sections of the site, each for a reader with a purpose, and the pages in them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the site.
+
+    Parameters
+    ----------
+    title : str
+        What the navigation calls it.
+    landing : str
+        Its first page, a path in the repository.
+    invitation : str
+        One sentence that says to whom the section is useful; the home page shows it.
+    pages : tuple of str
+        Paths of its other pages in the repository, in reading order.
+    """
+
+    title: str
+    landing: str
+    invitation: str
+    pages: tuple[str, ...]
+
+
+def _docs(*names: str) -> tuple[str, ...]:
+    return tuple(f"docs/{name}.md" for name in names)
+
+
+SECTIONS = (
+    Section(
+        "Firmware",
+        "docs/paths/firmware.md",
+        "You need C for a processor, with bounds that you can sign and tests that come with it.",
+        (
+            *_docs("fixed-point", "design", "generated-code", "microcontrollers", "evidence", "misra"),
+            *_docs(
+                "check-foreign-code", "recorded-data", "sensor-errors", "redundancy", "calibration", "speed"
+            ),
+        ),
+    ),
+    Section(
+        "Paper",
+        "docs/paths/paper.md",
+        "You compare algorithms, and print their formulas, errors and orders.",
+        (
+            *_docs("series", "coning", "windows", "vibration", "velocity-position", "frontier"),
+            *_docs("jacobians", "unknowns", "comparison"),
+        ),
+    ),
+    Section(
+        "Extend",
+        "docs/paths/extend.md",
+        "You bring a method, an algorithm, a motion or a language of your own.",
+        (
+            "docs/own-algorithms.md",
+            "examples/toy_target/README.md",
+            "docs/architecture.md",
+            "CONTRIBUTING.md",
+        ),
+    ),
+    Section(
+        "Understand",
+        "docs/paths/understand.md",
+        "You want to know which frames and signs apply, and why the code is short and its bounds hold.",
+        _docs("conventions", "canonical-form", "attitude-form"),
+    ),
+    Section(
+        "The thesis",
+        "docs/paths/thesis.md",
+        "You want to see the tables and statements of the thesis beside runs of today.",
+        _docs("thesis-tables", "thesis-statements"),
+    ),
+    Section(
+        "1984",
+        "docs/paths/savage-1984.md",
+        "You follow the lecture of 1984 equation by equation, up to a whole navigator in C.",
+        (
+            *_docs("two-speed", "navigation", "compensation", "outputs"),
+            *_docs("ahrs", "pulse-torque", "systems"),
+        ),
+    ),
+    Section(
+        "Reference",
+        "docs/reference/index.md",
+        "You look up a command, a Python name or an option.",
+        (
+            *_docs(
+                "README", "command-line", "reference/commands/index", "python-api", "reference/python/index"
+            ),
+            *("generated/COST.md", "generated/EVIDENCE.md"),
+            *("benchmarks/RESULTS.md", "benchmarks/FIXED_POINT.md", "examples"),
+        ),
+    ),
+    Section("Glossary", "docs/glossary.md", "You met a word that you do not know.", ()),
+    Section("Changelog", "CHANGELOG.md", "You want to know what a release brings.", ()),
+)
+
+#: Pages that a step of the build writes; all others are files of the repository.
+GENERATED = ("docs/reference/index.md", "docs/reference/commands/index.md", "docs/reference/python/index.md")
+
+
+def document(path: str) -> str:
+    """Return the name that a page, a file or a folder of the repository has on the site, without its suffix.
+
+    Parameters
+    ----------
+    path : str
+        Path from the root of the repository, with forward slashes.
+    """
+    names = {"README.md": "index", "docs/README.md": "questions"}
+    if path in names:
+        return names[path]
+    if path in ("CHANGELOG.md", "CONTRIBUTING.md"):
+        return path.removesuffix(".md").lower()
+    if path.startswith("docs/") and path.endswith(".md"):
+        return path.removeprefix("docs/").removesuffix(".md")
+    return f"repository/{path.removesuffix('.md')}"
+
+
+def site_file(path: str) -> str:
+    """Return the file that Sphinx reads for a page, a file or a folder of the repository.
+
+    Parameters
+    ----------
+    path : str
+        Path from the root of the repository, with forward slashes.
+    """
+    return f"{document(path)}.{'rst' if path.startswith('docs/reference/python/') else 'md'}"
+
+
+def pages_present(root: Path, section: Section) -> tuple[str, ...]:
+    """Return the pages of a section that the repository has or the build writes.
+
+    Parameters
+    ----------
+    root : Path
+        The root of the repository.
+    section : Section
+        The section.
+    """
+    return tuple(page for page in section.pages if page in GENERATED or (root / page).exists())
+
+
+def questions(root: Path) -> dict[str, str]:
+    """Return the question that a page answers, by its path, as docs/README.md asks it.
+
+    Parameters
+    ----------
+    root : Path
+        The root of the repository.
+    """
+    rows = re.findall(
+        r"^\| (.*?) \| \[[^]]*\]\(([^)#]+)\)", (root / "docs/README.md").read_text(), re.MULTILINE
+    )
+    found: dict[str, str] = {}
+    for question, target in rows:
+        path = (root / "docs" / target).resolve().relative_to(root.resolve()).as_posix()
+        found.setdefault(path, question)
+    return found
