@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
@@ -24,7 +24,10 @@ from strapgen.catalogue import ALGORITHMS
 from strapgen.evidence.subjects import Subject
 from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.plots import figures
-from strapgen.toolchain import compiler
+from strapgen.support.exceptions import CompilerError
+from strapgen.targets import BUILT_IN
+from strapgen.toolchain import compiler, shared_libraries
+from strapgen.toolchain.shared_libraries import COMPILERS, LibraryCompiler
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -75,6 +78,24 @@ def pytest_pycollect_makeitem(collector: pytest.Collector, obj: object) -> list[
     return [] if is_quick and any(mark.name == "long" for mark in marks) else None
 
 
+def _compiler_of(values: Mapping[str, object]) -> LibraryCompiler | None:
+    """Return the compiler of shared libraries that a test needs, by the back end among its parameters."""
+    for name in (values.get(key) for key in ("backend_name", "backend", "name")):
+        target = BACKENDS[name].target if isinstance(name, str) and name in BACKENDS else ""
+        if target in BUILT_IN and BUILT_IN[target].language in COMPILERS:
+            return COMPILERS[BUILT_IN[target].language]
+    return None
+
+
+def _missing(compiler: LibraryCompiler) -> str:
+    """Return why a compiler cannot be used; "" if it is there."""
+    try:
+        compiler.path()
+    except CompilerError as error:
+        return str(error)
+    return ""
+
+
 def _is_of_cayley_klein(value: object) -> bool:
     if isinstance(value, Subject):  # whose name is derived
         value = value.choice
@@ -92,6 +113,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left = []
     for item in items:
         values = getattr(getattr(item, "callspec", None), "params", {})
+        compiler = _compiler_of(values)
+        if (
+            compiler is not None
+        ):  # the code of C in another language: tests of the targets hold the bits to those of C
+            item.add_marker(pytest.mark.long)
+            item.add_marker(pytest.mark.skipif(bool(missing := _missing(compiler)), reason=missing))
         if any(map(_is_of_cayley_klein, values.values())):
             item.add_marker(pytest.mark.long)
         if values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN:
@@ -134,6 +161,8 @@ def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         assert "-O3" in compiler.C_FLAGS
         patch.setattr(compiler, "_flags", tuple(less if f == "-O3" else f for f in compiler.C_FLAGS))
+        if less == "-O0":
+            patch.setattr(shared_libraries, "OPTIMIZATION", {"C++": "-O0", "Rust": "-Copt-level=1"})
         yield
 
 

@@ -277,7 +277,7 @@ def test_what_does_not_fit_is_told(given, said):
 
 
 def test_no_samples_make_no_cycles():
-    for name in BACKENDS:
+    for name in (name for name, entry in BACKENDS.items() if entry.by_default):
         run = made("dcm", 2, name).run(np.zeros((0, 3)), np.zeros((0, 3)), fast_cycles=2)
         assert run.attitudes.shape == (0, 3, 3) and run.velocity_changes.shape == (0, 3)
 

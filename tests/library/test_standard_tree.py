@@ -46,7 +46,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     made = few()
     monkeypatch.setattr(standard_tree, "programs", lambda: map(lowered, FEW))
     # The texts of the same programs are made once; that they are those of the checked-in tree has a test of its own.
-    monkeypatch.setattr(standard_tree, "tree", lambda programs: made if list(programs) else {})
+    tree = standard_tree.tree
+    monkeypatch.setattr(
+        standard_tree, "tree", lambda programs, targets: tree(programs, targets) if targets else made
+    )
     standard_tree.write(tmp_path / "tree", made)
     return tmp_path / "tree"
 
@@ -358,3 +361,20 @@ def test_a_killed_writer_leaves_one_folder_that_the_next_one_removes(folder, ren
     )
     standard_tree.write(folder, few())
     assert contents(folder) == few() and not staging.exists()
+
+
+def test_files_for_other_targets_stand_beside_the_tree(folder, capsys):
+    generate = ("generate", "--all", "--target", "cpp", "--out", str(folder))
+    assert command(capsys, *generate)[0] == 0
+    headers = {name for name in contents(folder) if name.startswith("cpp/")}
+    assert contents(folder).keys() == few().keys() | headers
+    assert {Path(name).suffix for name in headers} == {".hpp"} and len(headers) == len(FEW)
+    assert command(capsys, *CHECK, str(folder))[0] == 0, "the tree is what it was"
+    assert command(capsys, *generate, "--check")[0] == 0
+    (folder / "cpp" / "left.hpp").write_text((folder / min(headers)).read_text())
+    (folder / "c" / "mine.c").write_text("mine")
+    status, said, error = command(capsys, *generate, "--check")
+    assert (status, "left.hpp" in said, "mine.c" in said) == (1, True, False)
+    assert "strapgen generate --all --target cpp rebuilds it" in error
+    assert command(capsys, *generate)[0] == 0
+    assert contents(folder).keys() == few().keys() | headers | {"c/mine.c"}

@@ -30,7 +30,8 @@ from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.targets import c_library, names
+from strapgen.targets import names
+from strapgen.targets.c import c_library
 from strapgen.toolchain import compiler
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
@@ -184,7 +185,7 @@ def module(sources: Sources) -> ModuleType:
 
 def declarations(header: str) -> str:
     """Return a header as cffi reads it."""
-    return compiler._declarations(header)
+    return compiler.declarations(header)
 
 
 def library(folder: Path, several: list[Sources]) -> tuple[cffi.FFI, object]:

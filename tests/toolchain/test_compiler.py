@@ -18,7 +18,7 @@ from strapgen.backends.systems import system_runner
 from strapgen.cli import main
 from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import CompilerError
-from strapgen.toolchain import compiler
+from strapgen.toolchain import compiler, service
 
 SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]
 SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]
@@ -299,16 +299,16 @@ def other(sources: Sources, number: int) -> Sources:
 
 
 def test_one_process_compiles_one_source_after_the_other(sources):
-    service = compiler._service()
+    process = service.compiling_process()
     compiler.load(sources)
-    assert compiler._service() is service
+    assert service.compiling_process() is process
 
 
 def test_a_compiling_process_that_has_ended_is_replaced(sources, root):
-    service = compiler._service()
-    service.stop()
+    process = service.compiling_process()
+    process.stop()
     assert compiler.load(sources).lib.euler_normalize
-    assert compiler._service() is not service
+    assert service.compiling_process() is not process
 
 
 def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, monkeypatch):
@@ -324,12 +324,12 @@ def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, 
 
 
 def _compile_in_a_fork(text_number: int, sources: Sources, made) -> None:
-    made.put((compiler.load(other(sources, text_number)) is not None, compiler._service()._owner))
+    made.put((compiler.load(other(sources, text_number)) is not None, service.compiling_process()._owner))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_fork_compiles_in_a_process_of_its_own(sources):
-    assert compiler._service().serves
+    assert service.compiling_process().serves
     context = multiprocessing.get_context("fork")
     made = context.SimpleQueue()
     child = context.Process(target=_compile_in_a_fork, args=(2, sources, made))

@@ -110,8 +110,10 @@ class CommitLate:
             whole = commit_late_sources.sources(window, algorithm, target, sample_hz, settings=settings)
             self._note(whole)
             return LateUnitInC(whole) if settings is None else LateUnitInFixedC(whole)
-        if target not in ("numpy", "fixed-model"):
-            names = [name for name, entry in BACKENDS.items() if not entry.many_digits]
+        interpreted = ("numpy", "fixed-model")
+        if target not in interpreted:
+            able = (*interpreted, *commit_late_sources.TARGETS)
+            names = [name for name, entry in BACKENDS.items() if entry.target in able]
             raise InputError(f"backend is {backend!r}; these commit late: {', '.join(names)}")
         filters = commit_late_sources.family(window, sample_hz)
         parts = commit_late_sources.parts(filters, algorithm, target, settings)

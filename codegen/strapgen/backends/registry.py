@@ -37,6 +37,8 @@ class Entry(NamedTuple):
         Whether Python executes every single operation. A run on all back ends leaves such a one out by default.
     many_digits : bool
         Whether it computes in so many digits that rounding cannot be seen; the class then has methods that return them.
+    by_default : bool
+        Whether a run on all back ends takes it by default; not those that compute the bits of another back end.
     """
 
     title: str
@@ -47,6 +49,7 @@ class Entry(NamedTuple):
     word: int | None = None
     slow: bool = False
     many_digits: bool = False
+    by_default: bool = True
 
     @property
     def fixed(self) -> bool:
@@ -95,6 +98,8 @@ BACKENDS: Mapping[str, Entry] = _Backends(
         "c-float": Entry("generated C in float, compiled", "c-float", *_C),
         "c-fixed32": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=32),
         "c-fixed16": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=16),
+        "cpp": Entry("generated C++ in double, compiled", "cpp", *_C[:2], by_default=False),
+        "cpp-float": Entry("generated C++ in float, compiled", "cpp-float", *_C[:2], by_default=False),
         "fixed-model": Entry(
             "integer model of the fixed-point C in Python, any word",
             "fixed-model",
@@ -115,7 +120,7 @@ BACKENDS: Mapping[str, Entry] = _Backends(
 )
 
 #: Back ends on which an experiment runs by default.
-DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.items() if not entry.slow)
+DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.items() if entry.by_default and not entry.slow)
 
 
 def _of_target(target: str) -> Entry:

@@ -33,11 +33,13 @@ class SourceOptions:
     ] = None
     name: Annotated[
         str | None,
-        option("--name", metavar="NAME", help="In C: name of the function and of its files."),
+        option("--name", metavar="NAME", help="In C, C++ and Rust: name of the function and of its files."),
     ] = None
     prefix: Annotated[
         str | None,
-        option("--prefix", metavar="TEXT", help="In C: what the name of the function begins with."),
+        option(
+            "--prefix", metavar="TEXT", help="In C, C++ and Rust: what the name of the function begins with."
+        ),
     ] = None
     with_runs: WithRuns = False
     project: Project = False
@@ -61,15 +63,29 @@ class SourceOptions:
         return Naming(self.name, self.prefix)
 
     @property
-    def for_c(self) -> str | None:
-        """The first option that is stated and goes with C alone; None if there is none."""
+    def for_libraries(self) -> str | None:
+        """The first option that is stated and goes with C, C++ and Rust; None if there is none."""
         stated = {
             "--name": self.name is not None,
             "--prefix": self.prefix is not None,
             "--with-runs": self.with_runs,
-            "--project": self.project,
         }
         return next((option for option, is_stated in stated.items() if is_stated), None)
+
+    def require_language(self, target: str) -> None:
+        """Check that the options go with the language of a target.
+
+        Raises
+        ------
+        InputError
+            If one does not.
+        """
+        from strapgen.targets import TARGETS
+
+        if self.for_libraries and not TARGETS[target].linked:
+            raise InputError(f"{self.for_libraries} goes with targets in C, C++ and Rust, not with {target}")
+        if self.project and not TARGETS[target].compiled:
+            raise InputError(f"--project goes with targets in C, not with {target}")
 
     def write(self, files: Mapping[str, str]) -> list[Path]:
         """Write files into the folder, but over none that has another contract, unless that is forced."""

@@ -12,7 +12,7 @@ from strapgen.ir.program import Program
 from strapgen.library import generated_files
 from strapgen.support.exceptions import InputError
 from strapgen.support.files import is_staged, write_files
-from strapgen.targets import BUILT_IN
+from strapgen.targets import BUILT_IN, TARGETS
 
 #: The folder of each target in the tree.
 _FOLDERS = {name: target.folder for name, target in BUILT_IN.items() if target.folder}
@@ -33,13 +33,20 @@ def programs() -> Iterator[Program]:
         yield pipeline.lowered(choice)
 
 
-def tree(lowered: Iterable[Program]) -> dict[str, str]:
-    """Return the text of every file of the tree.
+def folder_of(target: str) -> str:
+    """Return the folder of a target's files, which other targets than those of the tree have too."""
+    return target.replace("-", "_")
+
+
+def tree(lowered: Iterable[Program], targets: Iterable[str] | None = None) -> dict[str, str]:
+    """Return the text of every file of the tree, or of the files for some targets alone.
 
     Parameters
     ----------
     lowered : iterable of Program
         The programs of the catalogue, from `programs`.
+    targets : iterable of str, optional
+        Keys of `strapgen.targets.TARGETS`; by default those of the tree, with the list of all kernels.
 
     Returns
     -------
@@ -48,16 +55,19 @@ def tree(lowered: Iterable[Program]) -> dict[str, str]:
     """
     files: dict[str, str] = {}
     rows: list[str] = []
+    names = list(_FOLDERS if targets is None else targets)
     for program in lowered:
-        for target in _FOLDERS:
-            if BUILT_IN[target].fixed and not fixedpoint.can_lower(program):
+        for target in names:
+            if TARGETS[target].fixed and not fixedpoint.can_lower(program):
                 continue
             sources = pipeline.generate(program, target)
             for name, text in sources.step_files.items():
-                files[f"{_FOLDERS[target]}/{name}"] = text
+                files[f"{folder_of(target)}/{name}"] = text
         counts = program.operations
         shown = [counts[kind] for kind in ("add", "multiply", "divide", "sqrt")] + [program.temporaries]
         rows.append(f"| `{program.name}` | {program.title} | {' | '.join(map(str, shown))} |")
+    if targets is not None:
+        return files
     # The list of all is written last: where it is in step, so is what was written before it.
     return files | {"README.md": _README.format(command=_COMMAND, mark=_MARK, rows="\n".join(rows))}
 
@@ -139,7 +149,7 @@ def _is_leftover(path: Path, folder: Path, files: dict[str, str]) -> bool:
     if (draft := _DRAFT.fullmatch(path.name)) and place.with_name(draft[1]).as_posix() in files:
         return not content or bool(_HEAD.match(content))
     # Files outside the folders of the tree are the user's.
-    return place.parts[0] in _FOLDERS.values() and bool(_HEAD.match(content))
+    return place.parts[0] in _folders(files) and bool(_HEAD.match(content))
 
 
 def difference(folder: Path, files: dict[str, str]) -> str:
@@ -163,12 +173,21 @@ def difference(folder: Path, files: dict[str, str]) -> str:
     return "".join(lines)
 
 
+def _folders(files: dict[str, str]) -> set[str]:
+    """Return the folders of some files of the tree."""
+    return {name.partition("/")[0] for name in files if "/" in name}
+
+
 def _unexpected(folder: Path, files: dict[str, str]) -> list[Path]:
-    """Return the files in a folder that are no part of the tree."""
+    """Return the files in a folder that are no part of the tree; the folders of other targets are not looked at."""
+    folders = _folders(files)
+    others = {folder_of(name) for name in BUILT_IN} - folders
     present = [
         path
         for path in folder.rglob("*")
         if path.is_file() and "__pycache__" not in path.parts and not is_staged(path.relative_to(folder))
+        if (top := path.relative_to(folder).parts[0]) in folders
+        or ("README.md" in files and top not in others)
     ]
     expected = {*files, *_MEASURED}
     return sorted(path for path in present if path.relative_to(folder).as_posix() not in expected)

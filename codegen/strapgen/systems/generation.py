@@ -9,7 +9,7 @@ from strapgen.ir.sources import Sources
 from strapgen.support import checks
 from strapgen.systems.fitting import Fitted, fitted
 from strapgen.systems.wiring import Description
-from strapgen.targets import BUILT_IN, TARGETS
+from strapgen.targets import TARGETS, system_targets
 from strapgen.targets.system_c import emit
 from strapgen.targets.system_python import emit as python
 
@@ -52,5 +52,5 @@ def sources(
     InputError
         If the target is another, or a stage cannot be generated.
     """
-    checks.choice("target", target, BUILT_IN)
+    checks.choice("target", target, system_targets())
     return unit(fitted(description, target, settings), command)

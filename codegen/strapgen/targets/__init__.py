@@ -25,6 +25,7 @@ __all__ = [
     "emit",
     "fixed_targets",
     "require",
+    "system_targets",
     "titles",
 ]
 
@@ -32,6 +33,11 @@ __all__ = [
 def fixed_targets() -> tuple[str, ...]:
     """Return the names of strapgen's targets of fixed point, which take a quantized program, and settings."""
     return tuple(name for name, target in BUILT_IN.items() if target.fixed)
+
+
+def system_targets() -> tuple[str, ...]:
+    """Return the names of strapgen's targets that print a described system as a whole: those in C and in Python."""
+    return tuple(name for name, target in BUILT_IN.items() if target.language in ("C", "Python"))
 
 
 def require(target: str, settings: Settings | None = None) -> None:

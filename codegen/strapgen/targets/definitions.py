@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -13,18 +13,26 @@ from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.targets.printer import Printer
 
+_IDENTITY = "the state of zero rotation"
+
 
 @dataclass(frozen=True)
 class Macro:
-    """A name that a header defines, its value as C text, and what it is."""
+    """A name that a header defines, its value as C text, and what it is.
+
+    The type is that of C, "" for the floating-point type of the file; the size is 0 for a single number.
+    """
 
     name: str
     value: str
     meaning: str
+    type: str = ""
+    size: int = 0
 
 
-def of_fixed(fixed: FixedProgram, function: str) -> list[Macro]:
-    """Return the definitions of fixed-point code."""
+def of_fixed(fixed: FixedProgram, function: str, literal: Callable[..., str] | None = None) -> list[Macro]:
+    """Return the definitions of fixed-point code, whose integers `literal` prints, by default `word_literal`."""
+    literal = literal or word_literal
     interface, bits, head = fixed.interface, fixed.word, function.upper()
     arguments = (*interface.inputs, *interface.outputs)
     names = _upper(argument.signal for argument in arguments)
@@ -32,17 +40,20 @@ def of_fixed(fixed: FixedProgram, function: str) -> list[Macro]:
     for argument in arguments:
         name = f"{head}_{names[argument.signal.name]}"
         if argument.sensor is None:
-            result.append(Macro(f"{name}_FRACTION_BITS", str(argument.format.fraction), f"{argument.format}"))
-        result.append(Macro(f"{name}_UNIT", _double(argument.unit), _unit(argument)))
-        result += _limits(name, argument, argument.format.word)
+            fraction = str(argument.format.fraction)
+            result.append(Macro(f"{name}_FRACTION_BITS", fraction, f"{argument.format}", "int"))
+        result.append(Macro(f"{name}_UNIT", _double(argument.unit), _unit(argument), "double"))
+        result += _limits(name, argument, literal)
     step = fixed.program.companions
     if step is not None:
         state = interface.inputs[0].format
-        words = ", ".join(word_literal(state.nearest(x), bits) for x in step.identity)
-        result.append(Macro(f"{head}_IDENTITY", f"{{{words}}}", "the state of zero rotation"))
+        words = ", ".join(literal(state.nearest(x), bits) for x in step.identity)
+        size, kind = len(step.identity), f"int{bits}_t"
+        result.append(Macro(f"{head}_IDENTITY", f"{{{words}}}", _IDENTITY, kind, size))
     if interface.residuals:
-        first = ", ".join(f"UINT{bits}_C({feedback.fresh})" for feedback in interface.residuals)
-        result.append(Macro(f"{head}_FIRST_RESIDUALS", f"{{{first}}}", "the residuals before the first call"))
+        first = ", ".join(literal(feedback.fresh, bits, signed=False) for feedback in interface.residuals)
+        meaning, size = "the residuals before the first call", len(interface.residuals)
+        result.append(Macro(f"{head}_FIRST_RESIDUALS", f"{{{first}}}", meaning, f"uint{bits}_t", size))
     return result
 
 
@@ -52,10 +63,10 @@ def of_program(program: Program, function: str, printer: Printer) -> list[Macro]
     if step is None:
         return []
     numbers = ", ".join(printer.constant(x) for x in step.identity)
-    return [Macro(f"{head}_IDENTITY", f"{{{numbers}}}", "the state of zero rotation")]
+    return [Macro(f"{head}_IDENTITY", f"{{{numbers}}}", _IDENTITY, size=len(step.identity))]
 
 
-def word_literal(value: int, bits: int) -> str:
+def word_literal(value: int, bits: int, signed: bool = True) -> str:
     """Return an integer as a constant of C that has at least so many bits on every machine.
 
     Examples
@@ -63,6 +74,8 @@ def word_literal(value: int, bits: int) -> str:
     >>> word_literal(-5, 16), word_literal(-(2**31), 32)
     ('-INT16_C(5)', '(-INT32_C(2147483647) - 1)')
     """
+    if not signed:
+        return f"UINT{bits}_C({value})"
     if not value:
         return "0"
     if value == -(1 << (bits - 1)):
@@ -70,14 +83,13 @@ def word_literal(value: int, bits: int) -> str:
     return f"{'-' if value < 0 else ''}INT{bits}_C({abs(value)})"
 
 
-def _limits(name: str, argument: Argument, bits: int) -> list[Macro]:
+def _limits(name: str, argument: Argument, literal: Callable[..., str]) -> list[Macro]:
     """Return the range of the integers of an argument: one limit where it is symmetric."""
+    limits = [("LOW", argument.low, "smallest integer"), ("HIGH", argument.high, "largest integer")]
     if argument.low == -argument.high:
-        return [Macro(f"{name}_LIMIT", word_literal(argument.high, bits), "largest magnitude")]
-    return [
-        Macro(f"{name}_LOW", word_literal(argument.low, bits), "smallest integer"),
-        Macro(f"{name}_HIGH", word_literal(argument.high, bits), "largest integer"),
-    ]
+        limits = [("LIMIT", argument.high, "largest magnitude")]
+    bits = argument.format.word
+    return [Macro(f"{name}_{end}", literal(n, bits), what, f"int{bits}_t") for end, n, what in limits]
 
 
 def _upper(signals: Iterable[Signal]) -> dict[str, str]:

@@ -47,7 +47,7 @@ class Target:
     words : tuple of int, optional
         The lengths of word that it supports in fixed point, in bits; None stands for any.
     language : str, optional
-        Language of the files: those in "C" are compiled, those in "Python" imported.
+        Language of the files: those in "C", "C++" and "Rust" are compiled, those in "Python" imported.
     number : str, optional
         Type of the numbers in floating point: "double" or "float".
     folder : str, optional
@@ -90,6 +90,11 @@ class Target:
         """Whether a C compiler makes a module of its files."""
         return self.language == "C"
 
+    @property
+    def linked(self) -> bool:
+        """Whether a compiler makes a library of its files, whose functions have names that a user can choose."""
+        return self.language in ("C", "C++", "Rust")
+
     def function(self) -> Callable[[Any, str], Sources]:
         """Return the function that prints a program, imported if it is a text."""
         if callable(self.emit):
@@ -121,6 +126,8 @@ BUILT_IN = {
         language="C",
         folder="c_fixed",
     ),
+    "cpp": Target("C++17 in double: one header", _EMIT.format("cpp"), language="C++", number="double"),
+    "cpp-float": Target("C++17 in float: one header", _EMIT.format("cpp"), language="C++", number="float"),
     "fixed-model": Target(  # a reference that tests generate: it is not in the tree
         "Python on integers, bit for bit what the fixed-point C computes",
         _EMIT.format("integer_model"),

@@ -1,25 +1,21 @@
 """Building turns source text into a module that can be called.
 
-Python code is executed as it is. C is compiled through cffi in API mode and cached by content, so that a second call
-compiles nothing. Many sources can be compiled into one module, which costs little more than one of them: starting the
-compiler, reading Python's headers and linking take longer than a kernel.
+Python code is executed as it is. C is compiled through cffi in API mode, C++ and Rust into shared libraries; all are
+cached by content, so that a second call compiles nothing. Many sources can be compiled into one module, which costs
+little more than one of them: starting the compiler, reading Python's headers and linking take longer than a kernel.
 """
 
 from __future__ import annotations
 
-import atexit
 import importlib.machinery
 import importlib.util
 import json
 import os
 import platform
-import re
 import shlex
 import shutil
-import subprocess
 import sys
 import sysconfig
-import threading
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -31,6 +27,9 @@ from strapgen.support import cache
 from strapgen.support.exceptions import CompilerError, InputError
 from strapgen.support.timing import timed
 from strapgen.targets import TARGETS
+from strapgen.toolchain import shared_libraries
+from strapgen.toolchain.service import compiling_process, one_at_a_time
+from strapgen.toolchain.shared_libraries import COMPILERS, declarations
 
 #: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.
 #: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
@@ -59,7 +58,8 @@ def load(sources: Sources) -> Any:
     Returns
     -------
     module
-        For Python the generated module; for C a cffi module with ``ffi`` and ``lib``, which may hold others too.
+        For Python the generated module; for compiled languages a cffi module with ``ffi`` and ``lib``, which may hold
+        other functions too.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def compile_together(many: Iterable[Sources]) -> None:
     """
     missing: dict[str, Sources] = {}
     for sources in many:
-        if _language(sources) == "C":
+        if _is_compiled(sources):
             key = build_key([sources])
             if _shared(key) is None and cache.lookup("builds", key) is None:
                 missing[key] = sources
@@ -110,11 +110,14 @@ def _point(pointer: str, draft: Path) -> None:
 
 
 def _groups(missing: dict[str, Sources]) -> list[dict[str, Sources]]:
-    """Return sources by their keys, in groups in each of which no file and no function has its name twice."""
+    """Return sources by their keys, in groups of one language in which no file and no function has its name twice."""
     groups: list[dict[str, Sources]] = []
     for key, sources in missing.items():
         for group in groups:
-            if not any(sources.files.keys() & other.files.keys() for other in group.values()):
+            if all(
+                _language(sources) == _language(other) and not sources.files.keys() & other.files.keys()
+                for other in group.values()
+            ):
                 group[key] = sources
                 break
         else:
@@ -137,16 +140,20 @@ def _language(sources: Sources) -> str:
     return TARGETS[sources.target].language if sources.target in TARGETS else ""
 
 
+def _is_compiled(sources: Sources) -> bool:
+    return _language(sources) in ("C", *COMPILERS)
+
+
 def _module(sources: Sources) -> Any:
     """Compile or import sources by their language."""
     language = _language(sources)
-    if language == "C":
+    if _is_compiled(sources):
         return _compiled(sources)
     if language == "Python":
         return _import_text(sources)
     raise InputError(
         f"sources of {sources.kernel} for {sources.target} are {language or 'of no stated language'}; "
-        "C can be compiled, and Python imported"
+        "C, C++ and Rust can be compiled, and Python imported"
     )
 
 
@@ -210,8 +217,10 @@ def _alone(sources: Sources, key: str) -> Path:
     return _build([sources], name, key) / _library(name)
 
 
-def _import_file(file: Path) -> ModuleType:
+def _import_file(file: Path) -> Any:
     """Import a compiled module of the cache: the very file of which it was checked that it is the user's alone."""
+    if shared_libraries.is_library(file):
+        return shared_libraries.opened(file)
     name = file.name.partition(".")[0]
     with cache.loadable(file) as (path, _):
         loader = importlib.machinery.ExtensionFileLoader(name, path)
@@ -226,11 +235,15 @@ def _import_file(file: Path) -> ModuleType:
 
 def build_key(many: Iterable[Sources], flags: Sequence[str] | None = None) -> str:
     """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
+    many = list(many)
+    text = [part for sources in many for part in (*sources.files, *sources.files.values())]
+    if many and _language(many[0]) in COMPILERS:
+        return cache.digest([*text, *COMPILERS[_language(many[0])].identity()])
     executable = Path(compiler()).resolve()
     stat = executable.stat()
     return cache.digest(
         [
-            *(part for sources in many for part in (*sources.files, *sources.files.values())),
+            *text,
             *(_flags if flags is None else flags),
             _VISIBILITY,
             _UNOPTIMIZED,
@@ -248,7 +261,10 @@ def _build(many: Sequence[Sources], name: str, key: str) -> Path:
 
     def fill(draft: Path) -> None:
         with timed("compile", kernels):
-            _compile(many, name, compiler(), draft)
+            if _language(many[0]) in COMPILERS:
+                COMPILERS[_language(many[0])].build(many, draft / _library(name))
+            else:
+                _compile(many, name, compiler(), draft)
 
     return cache.entry("builds", key, fill, f"compiled {kernels}")
 
@@ -270,7 +286,7 @@ def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None
         code = [f"{name}_kernels.c"]
     request = {
         "name": name,
-        "cdef": "\n".join(_declarations(files[header]) for header in headers),
+        "cdef": "\n".join(declarations(files[header]) for header in headers),
         "header": "".join(f'#include "{header}"\n' for header in headers) + _UNOPTIMIZED,
         "sources": [str(draft / file) for file in code],
         "flags": [*_flags, _VISIBILITY],
@@ -327,8 +343,10 @@ def run_request(request: dict[str, Any]) -> tuple[Path | None, list[str]]:
     environment = {
         k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
     }
-    with _one_at_a_time:
-        answer = _service().ask(request | {"environment": environment | {"CC": chosen_compiler() or path}})
+    with one_at_a_time:
+        answer = compiling_process().ask(
+            request | {"environment": environment | {"CC": chosen_compiler() or path}}
+        )
     built = Path(answer["path"] or request["folder"])
     if built.is_file():
         return built, []
@@ -337,64 +355,6 @@ def run_request(request: dict[str, Any]) -> tuple[Path | None, list[str]]:
     return None, reasons
 
 
-class _Service:
-    """A process that compiles one request after another until this process ends."""
-
-    def __init__(self) -> None:
-        self._owner = os.getpid()
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", str(Path(__file__).with_name("worker.py"))],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        atexit.register(self.stop)
-
-    @property
-    def serves(self) -> bool:
-        """Whether it runs and this process started it; a fork must not share its pipes."""
-        return self._owner == os.getpid() and self._process.poll() is None
-
-    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Send a request and return the answer; after an interruption or a failure the process is stopped."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        try:
-            print(json.dumps(request), file=self._process.stdin, flush=True)
-            answer: dict[str, Any] = json.loads(self._process.stdout.readline())
-        except BaseException as error:
-            self.stop()
-            if isinstance(error, (OSError, ValueError)):
-                raise CompilerError("the process that compiles has ended before it was done") from None
-            raise
-        return answer
-
-    def stop(self) -> None:
-        """End the process."""
-        atexit.unregister(self.stop)
-        if self._owner == os.getpid():
-            self._process.kill()
-            self._process.communicate()
-
-
-_running: list[_Service] = []
-_one_at_a_time = threading.Lock()
-
-
-def _service() -> _Service:
-    """Return the process that compiles; start one if none runs."""
-    if not _running or not _running[0].serves:
-        _running[:] = [_Service()]
-    return _running[0]
-
-
 def _library(name: str) -> str:
     """Return the file name of a compiled module."""
     return name + importlib.machinery.EXTENSION_SUFFIXES[0]
-
-
-def _declarations(header: str) -> str:
-    """Return the declarations of a generated header, without its preprocessor lines."""
-    text = re.sub(r"^#(?:.*\\\n)*.*$", "", header, flags=re.MULTILINE).replace('extern "C" {', "")
-    head, _, tail = text.rpartition("}")
-    return head + tail

@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import KernelOptions, OptionalAlgorithm, one, option
+from strapgen.cli.options import KernelOptions, OptionalAlgorithm, listed, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
@@ -32,8 +32,8 @@ def generate(
         str | None,
         option(
             "--target",
-            metavar="NAME",
-            help="Kind of code: numpy, c, c-float, c-fixed or fixed-model (Python on integers).  [default: numpy]",
+            metavar="NAME,...",
+            help="Kinds of code, with commas between; strapgen list targets shows all.  [default: numpy]",
             panel="Algorithm",
         ),
     ] = None,
@@ -51,31 +51,62 @@ def generate(
 
     Example: strapgen generate euler --method rk4 --increments 2 --target c --out firmware
 
+    Example: strapgen generate euler --method rk4 --increments 2 --target cpp,rust --out firmware
+
     Example: strapgen generate euler --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01 --out firmware
 
     Example: strapgen generate euler --target c-fixed --sample-hz 100 --lsb 0.0175dps --out firmware/gyro
     """
     check_format(format)
     if all_:
-        _check_alone(algorithm, method, target, fixed, output)
-        _generate_all(output, format)
+        _check_alone(algorithm, method, fixed, output)
+        _generate_all(None if target is None else _names(target), output, format)
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
-    task = request(algorithm, method, target, fixed, output)
-    sources = task.sources()
-    fixed.check_feedback(sources)
-    files = sources.files if output.with_runs else sources.step_files
-    if output.project:
-        files = files | _project_files(task, output)
+    tasks = [request(algorithm, method, name, fixed, output) for name in _names(target)]
+    results = [(task, task.sources()) for task in tasks]
+    for _, sources in results:
+        fixed.check_feedback(sources)
+    groups = [_files(task, sources, output) for task, sources in results]
+    files = _together(groups)
     if output.check:
         _check_files(files, output, format)
         return
-    written = output.write(files)
+    paths = {path.name: path for path in output.write(files)}
+    written = [[paths[name] for name in group] for group in groups]
+    rows = zip(results, written, strict=True)
     if format == "json":
-        print_json(_data(task.choice, sources, task.target, written))
+        data = [_data(task.choice, sources, task.target, place) for (task, sources), place in rows]
+        print_json(data if len(data) > 1 else data[0])
     else:
-        typer.echo(_text(sources, task.target, written))
+        typer.echo("\n".join(_text(sources, task.target, place) for (task, sources), place in rows))
+
+
+def _names(target: str | None) -> list[str]:
+    """Return the targets of the option, each checked."""
+    from strapgen.targets import TARGETS
+
+    return [
+        checks.choice("target", name, TARGETS)
+        for name in listed("--target", "numpy" if target is None else target)
+    ]
+
+
+def _files(task: Request, sources: Sources, output: SourceOptions) -> dict[str, str]:
+    """Return the files of a target that the options ask for."""
+    files = sources.files if output.with_runs else sources.step_files
+    return files | _project_files(task, output) if output.project else files
+
+
+def _together(groups: list[dict[str, str]]) -> dict[str, str]:
+    """Return the files of all targets, which go into one folder."""
+    files: dict[str, str] = {}
+    for group in groups:
+        for name in files.keys() & group.keys():
+            raise InputError(f"two of the targets write {name}; generate them into two folders")
+        files |= group
+    return files
 
 
 def request(
@@ -93,14 +124,12 @@ def request(
 
     choice = method.choose(algorithm, step=False)
     settings = fixed.settings(choice.increments_per_step)
-    one("--target", target)
     target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and not TARGETS[target].fixed:
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
         )
-    if output.for_c and not TARGETS[target].compiled:
-        raise InputError(f"{output.for_c} goes with targets in C, not with {target}")
+    output.require_language(target)
     fixed.check_increments(choice)
     return Request(choice, target, settings, output.naming)
 
@@ -132,7 +161,6 @@ def _check_files(files: dict[str, str], output: SourceOptions, format: str) -> N
 def _check_alone(
     algorithm: str | None,
     method: KernelOptions,
-    target: str | None,
     fixed: FixedOptions,
     output: SourceOptions,
 ) -> None:
@@ -149,9 +177,9 @@ def _check_alone(
         ("--rates", method.rates or None),
         ("--constant", method.constant or None),
         ("--layout", method.layout),
-        ("--target", target),
         ("a fixed-point option", fixed.stated or None),
-        (output.for_c, output.for_c),
+        (output.for_libraries, output.for_libraries),
+        ("--project", output.project or None),
         ("--force", output.force or None),
     ):
         if value is not None:
@@ -206,7 +234,7 @@ def _rounding_lines(rounding: RoundingBounds) -> list[str]:
     ]
 
 
-def _generate_all(output: SourceOptions, format: str) -> None:
+def _generate_all(targets: list[str] | None, output: SourceOptions, format: str) -> None:
     from strapgen import catalogue
     from strapgen.library import standard_tree
     from strapgen.support import resources
@@ -221,7 +249,7 @@ def _generate_all(output: SourceOptions, format: str) -> None:
     if not output.check:
         check_folder(out)  # known before the derivation of all kernels
     total = len(catalogue.standard())
-    files = standard_tree.tree(track(standard_tree.programs(), "deriving", total))
+    files = standard_tree.tree(track(standard_tree.programs(), "deriving", total), targets)
     if output.check:
         difference = standard_tree.difference(out, files)
         if format == "json":
@@ -231,7 +259,8 @@ def _generate_all(output: SourceOptions, format: str) -> None:
         if difference:
             left = standard_tree.strangers(out, files)
             remove = f"; {left[0]} is no part of it, and yours to remove" if left else ""
-            refuse_out_of_step(out, f"strapgen generate --all rebuilds it{remove}")
+            kinds = f" --target {','.join(targets)}" if targets else ""
+            refuse_out_of_step(out, f"strapgen generate --all{kinds} rebuilds it{remove}")
         if format == "text":
             typer.echo(f"{out}: {len(files)} files, in step")
         return

@@ -151,9 +151,9 @@ def _fitted(
     from strapgen.systems.budget import budget
     from strapgen.systems.fitting import fitted
     from strapgen.systems.wiring import read_system
-    from strapgen.targets import BUILT_IN, fixed_targets
+    from strapgen.targets import BUILT_IN, fixed_targets, system_targets
 
-    checks.choice("target", target, BUILT_IN)
+    checks.choice("target", target, system_targets())
     settings = fixed.settings(1)
     if BUILT_IN[target].fixed:
         settings = settings or Settings()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -55,7 +56,7 @@ def real_of(target: str) -> Real:
     return _REALS[TARGETS[target].number]
 
 
-_FUNCTIONS = {
+FUNCTIONS = {
     "sqrt": "sqrt{s}({})",
     "sin": "sin{s}({})",
     "cos": "cos{s}({})",
@@ -70,7 +71,7 @@ _FUNCTIONS = {
 
 
 #: Half a turn and a turn, to more digits than a double has.
-_HALF_TURNS = tuple(Fraction(k * 314159265358979323846264338327950288, 10**35) for k in (1, 2))
+HALF_TURNS = tuple(Fraction(k * 314159265358979323846264338327950288, 10**35) for k in (1, 2))
 
 
 class CPrinter(Printer):
@@ -88,7 +89,7 @@ class CPrinter(Printer):
 
     def function(self, kind: str, arguments: list[str]) -> str:
         """Return a call."""
-        return _FUNCTIONS[kind].format(*arguments, s=self.real.suffix, n=self.name)
+        return FUNCTIONS[kind].format(*arguments, s=self.real.suffix, n=self.name)
 
 
 def _nearest_single(value: Fraction) -> np.float32:
@@ -159,32 +160,27 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "state": program.inputs[0],
         "samples": program.inputs[-1],
         "result": program.outputs[0].signal,
-        "parameters": ", ".join(_parameters(program, real)),
-        "own": own_call(_parameters(program, real), name),
-        "propagate_parameters": ", ".join(
-            [
-                *PROPAGATE,
-                f"{name}_orthonormalizer orthonormalize",
-                f"const {real.name} *initial",
-                f"const {real.name} *{program.inputs[-1].name}",
-                f"{real.name} *history",
-            ]
-        ),
-        "arrays": _arrays(program, real),
-        "calls": _calls(program),
+        "parameters": ", ".join(parameters_of(program, real)),
+        "own": own_call(parameters_of(program, real), name),
+        "propagate_parameters": propagate_parameters(program, real, name),
+        "arrays": arrays_of(program, real),
+        "calls": calls_of(program),
         "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
-        "code": _code(program, printer),
+        "code": code_of(program, printer),
         "propagation": _loop(program, CPrinter(real, f"{name}_runs"), name) if program.companions else None,
-        "uses_math": any(
-            node.kind in _FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes
-        ),
+        "uses_math": uses_math(nodes),
         "functions": {node.kind for node in nodes},
-        "turn": tuple(map(printer.constant, _HALF_TURNS)) if any(n.kind == "wrap" for n in nodes) else None,
+        "turn": tuple(map(printer.constant, HALF_TURNS)) if any(n.kind == "wrap" for n in nodes) else None,
     }
     return render_c("c", name, **values)
 
 
-def _code(
+def uses_math(nodes: Iterable[Operation]) -> bool:
+    """Return whether one of some operations is a function of math.h."""
+    return any(node.kind in FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes)
+
+
+def code_of(
     program: Program,
     printer: CPrinter,
     places: dict[str, str] | None = None,
@@ -254,7 +250,7 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
     def in_lanes(wide: str) -> dict[str, object]:
         load = f"{name}{wide}_LANES_OF_".upper() + f"({increments.name}, {{}})"
         places = {increments.name: load, "prepared": "prepared[{}].all"}
-        return _code(ahead, printer, places, number_type=f"{name}{wide}_lanes_")
+        return code_of(ahead, printer, places, number_type=f"{name}{wide}_lanes_")
 
     states = {state.name: "own[{}][k]", result.name: "own[{}][k]"}
     return {
@@ -266,13 +262,15 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
         "stack": max(4 * _VECTOR * prepared.signal.size, _ABREAST * state.size),
         "ahead": in_lanes(""),
         "wide_ahead": in_lanes("_wide"),
-        "behind": _code(behind, printer, {"prepared": "prepared[{}].one[k]"}),
-        "abreast_step": _code(
+        "behind": code_of(behind, printer, {"prepared": "prepared[{}].one[k]"}),
+        "abreast_step": code_of(
             program, printer, states | {increments.name: f"{increments.name}[apart * k + {{}}]"}, 2
         ),
         "rows": ", ".join(f"{constant}{real.name} *restrict {s.name}_{k}" for s, constant, k in rows),
         "row_arguments": ", ".join(f"{s.name} + {k} * runs" for s, _, k in rows),
-        "batch": _code(program, printer, {signal.name: f"{signal.name}_{{}}[k]" for signal, _ in signals}, 2),
+        "batch": code_of(
+            program, printer, {signal.name: f"{signal.name}_{{}}[k]" for signal, _ in signals}, 2
+        ),
     }
 
 
@@ -284,7 +282,8 @@ def _in_vectors(program: Program) -> bool:
     )
 
 
-def _parameters(program: Program, real: Real) -> list[str]:
+def parameters_of(program: Program, real: Real) -> list[str]:
+    """Return the parameters of a function on one sample."""
     inputs = [
         f"const {real.name} {s.name}[{s.size}]" if s.shape else f"{real.name} {s.name}"
         for s in program.inputs
@@ -293,11 +292,25 @@ def _parameters(program: Program, real: Real) -> list[str]:
     return inputs + outputs
 
 
-def _arrays(program: Program, real: Real) -> str:
+def propagate_parameters(program: Program, real: Real, name: str) -> str:
+    """Return the parameters of the loop over runs and steps."""
+    pieces = [
+        *PROPAGATE,
+        f"{name}_orthonormalizer orthonormalize",
+        f"const {real.name} *initial",
+        f"const {real.name} *{program.inputs[-1].name}",
+        f"{real.name} *history",
+    ]
+    return ", ".join(pieces)
+
+
+def arrays_of(program: Program, real: Real) -> str:
+    """Return the parameters of a function on arrays of samples."""
     inputs = [f"const {real.name} *{s.name}" for s in program.inputs]
     return ", ".join(inputs + [f"{real.name} *{r.signal.name}" for r in program.outputs])
 
 
-def _calls(program: Program) -> str:
+def calls_of(program: Program) -> str:
+    """Return the arguments of sample `k` for a function on one sample."""
     inputs = [f"{s.name} + {s.size} * k" if s.shape else f"{s.name}[k]" for s in program.inputs]
     return ", ".join(inputs + [f"{r.signal.name} + {r.signal.size} * k" for r in program.outputs])

@@ -1,0 +1,134 @@
+"""The C++ target: one header with a function and its contract, in double or in float, and a C interface beside it."""
+
+from __future__ import annotations
+
+from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.sources import Function, Sources
+from strapgen.rounding import rounding_bounds
+from strapgen.targets import contract, contract_lines, definitions
+from strapgen.targets.c import emit as c
+from strapgen.targets.c.rounding_text import rounding_text, with_names
+from strapgen.targets.cpp.text import CHECK, CPP, constants, result_of, runs_of
+from strapgen.targets.names import function_name, printed
+from strapgen.targets.rendering import own_call, render
+
+_FUNCTIONS = {kind: f"std::{kind}({{}})" for kind in ("sqrt", "sin", "cos")} | {
+    "sinc": "{n}_sc_({})",
+    "atan2": "std::atan2({}, {})",
+    "direction": "std::atan2({}, {})",
+    "wrap": "{n}_wr_({})",
+    "maximum": "std::fmax({}, {})",
+}
+
+
+class CppPrinter(c.CPrinter):
+    """Prints nodes as C++ expressions: those of C, with the functions of the namespace ``std``."""
+
+    def function(self, kind: str, arguments: list[str]) -> str:
+        """Return a call."""
+        if kind not in _FUNCTIONS:
+            return super().function(kind, arguments)
+        return _FUNCTIONS[kind].format(*arguments, n=self.name)
+
+
+def emit(program: Program, target: str) -> Sources:
+    """Generate a C++ header for a program, with the C interface through which other languages call it.
+
+    Parameters
+    ----------
+    program : Program
+    target : str
+        A target whose numbers are those of a type of C.
+
+    Returns
+    -------
+    Sources
+        One header with the function ``strapgen::<name>``; and two files with ``<name>``, ``<name>_array`` and, for a
+        step, ``<name>_propagate`` for C, the functions of the same names that the target ``c`` has.
+    """
+    real = c.real_of(target)
+    name = function_name(program, real.infix)
+    scalars = [signal.name for signal in program.inputs if not signal.shape]
+    rounding = rounding_bounds(program, real.name)
+    _, files = printed(
+        program,
+        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
+        CPP,
+        scalars,
+    )
+    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
+    return Sources(
+        program.kernel,
+        target,
+        files,
+        function,
+        program.operations,
+        program.temporaries,
+        program.companions,
+        recursion=program.recursion,
+        runs=runs_of(name),
+        rounding=rounding,
+    )
+
+
+def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
+    """Return the header and the C interface of a program with its printed names."""
+    printer = CppPrinter(c.real_of(target), name)
+    command = f"{contract.generating(program)} --target {target}"
+    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
+    outputs = [(f"std::array<{printer.real.name}, {r.signal.size}>", r.signal.name) for r in program.outputs]
+    header, runs = runs_of(name)
+    values = interface_values(program, printer, name, header) | {
+        "file": f"{name}.hpp",
+        "guard": f"{name}_hpp".upper(),
+        "command": command,
+        "check": CHECK,
+        "contract": contract_lines.of_program(program, name, command, rounding),
+        "constants": constants(definitions.of_program(program, name, printer), printer.real.name),
+        "normalizing": contract.upkeep_text(program, target=target),
+        "rounding": rounding_text(rounding, program),
+        "digits": 53 if printer.real.bytes == 8 else 24,
+        "result": result_of(name, outputs),
+        "outputs": outputs,
+        "arguments_text": ", ".join(
+            f"const std::array<{printer.real.name}, {s.size}> &{s.name}"
+            if s.shape
+            else f"{printer.real.name} {s.name}"
+            for s in program.inputs
+        ),
+        "returned": ", ".join(
+            f"{{{{{', '.join(map(printer.text, result.nodes))}}}}}" for result in program.outputs
+        ),
+        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
+        "code": c.code_of(program, printer) | {"stores": []},
+        "specifier": "inline" if c.uses_math(nodes) else "constexpr",
+        "uses_math": c.uses_math(nodes),
+        "functions": {node.kind for node in nodes},
+        "turn": tuple(map(printer.constant, c.HALF_TURNS)),
+    }
+    templates = {f"{name}.hpp": "function.hpp", header: "interface.h", runs: "runs.cpp"}
+    return {file: render(f"cpp/{template}.j2", **values) for file, template in templates.items()}
+
+
+def interface_values(program: Program, printer: c.CPrinter, name: str, header: str) -> dict[str, object]:
+    """Return what the templates of the C interface are filled with, whatever the language behind it is."""
+    real = printer.real
+    return {
+        "program": program,
+        "name": name,
+        "header": header,
+        "guard_of_runs": header.replace(".", "_").upper(),
+        "real": real,
+        "state": program.inputs[0],
+        "samples": program.inputs[-1],
+        "parameters": ", ".join(c.parameters_of(program, real)),
+        "own": own_call(c.parameters_of(program, real), name),
+        "propagate_parameters": c.propagate_parameters(program, real, name),
+        "arrays": c.arrays_of(program, real),
+        "calls": c.calls_of(program),
+        "unpacked": ", ".join(
+            f"{name}_in_<{s.size}>(a{k}_)" if s.shape else f"a{k}_" for k, s in enumerate(program.inputs)
+        ),
+        "names": ", ".join([*(s.name for s in program.inputs), *(r.signal.name for r in program.outputs)]),
+    }

@@ -1,0 +1,139 @@
+"""The C++ of kernels: bits of the C, constant expressions, strict compilers, and what is told without a compiler."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from languages import DOUBLE, check_bits_of_c, check_lines
+
+import strapgen
+from strapgen import catalogue
+from strapgen.cli import main
+from strapgen.library import generated_sources
+from strapgen.support.exceptions import CompilerError
+from strapgen.targets.contract_lines import Contract
+from strapgen.toolchain.shared_libraries import COMPILERS
+
+STRICT = (
+    "-std=c++17",
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wshadow",
+    "-Wconversion",
+    "-Wold-style-cast",
+    "-Werror",
+)
+SIMULATE = [
+    "simulate",
+    "euler",
+    "--motion",
+    "constant",
+    "--set",
+    "x_deg_s=1",
+    "--step",
+    "1",
+    "--duration",
+    "2",
+]
+
+
+@pytest.fixture
+def cxx() -> str:
+    """The path of the C++ compiler."""
+    try:
+        return COMPILERS["C++"].path()
+    except CompilerError as error:
+        pytest.skip(str(error))
+
+
+def checked(cxx: str, folder: Path, text: str, *flags: str) -> subprocess.CompletedProcess[str]:
+    """Let the compiler check a program in a folder."""
+    (folder / "main.cpp").write_text(text)
+    command = [cxx, *STRICT, "-ffp-contract=off", *flags, "-fsyntax-only", "main.cpp"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_some_kernels_have_the_bits_of_c(cxx, rng):
+    check_bits_of_c([catalogue.choose(*words) for words in DOUBLE], "cpp", "c", rng)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("other", "c"), [("cpp", "c"), ("cpp-float", "c-float")])
+def test_every_kernel_has_the_bits_of_c(cxx, other, c, rng):
+    check_bits_of_c(catalogue.standard(), other, c, rng)
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_a_step_is_a_constant_expression(cxx, tmp_path, right):
+    sources = generated_sources.sources(catalogue.choose("euler"), "cpp")
+    (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
+    state = strapgen.backend("euler").step([0.0, 0.0, 0.0, 1.0], [[0.25, 0.0, 0.0], [0.125, 0.0, 0.0]])
+    expected = float(state[0]) if right else float(np.nextafter(state[0], 1))
+    said = checked(
+        cxx,
+        tmp_path,
+        '#include "euler_rk4_2.hpp"\n'
+        "constexpr auto next = strapgen::euler_rk4_2(strapgen::euler_rk4_2_identity, {{0.25, 0, 0, 0.125, 0, 0}});\n"
+        f"static_assert(next[0] == {expected!r});\n",
+    )
+    assert (said.returncode == 0) == right, said.stderr
+    assert right or "static assertion failed" in said.stderr
+
+
+def test_what_calls_the_library_is_no_constant_expression():
+    header = generated_sources.sources(catalogue.choose("euler-normalize"), "cpp").files[
+        "euler_normalize.hpp"
+    ]
+    assert "constexpr std::array<double, 4> euler_normalize" not in header
+    assert "inline std::array<double, 4> euler_normalize" in header
+
+
+def test_all_headers_stand_in_one_program_of_strict_compilers(cxx, tmp_path):
+    names = []
+    for choice in catalogue.standard()[::3]:
+        for target in ("cpp", "cpp-float"):
+            sources = generated_sources.sources(choice, target)
+            check_lines(sources)
+            names += sources.step_files
+            for name, text in sources.step_files.items():
+                (tmp_path / name).write_text(text)
+    said = checked(cxx, tmp_path, "".join(f'#include "{name}"\n' for name in names) + "int main() {}\n")
+    assert said.returncode == 0, said.stderr
+
+
+def test_the_contract_of_a_header_is_that_of_the_c_but_for_the_command():
+    choice = catalogue.choose("euler")
+    header = generated_sources.sources(choice, "cpp").files["euler_rk4_2.hpp"]
+    other = generated_sources.sources(choice, "c").files["euler_rk4_2.h"]
+    assert Contract.read(header).items == Contract.read(other).items
+    assert Contract.read(header).digest != Contract.read(other).digest
+
+
+def test_fused_operations_and_fast_mathematics_are_refused(cxx, tmp_path):
+    sources = generated_sources.sources(catalogue.choose("euler"), "cpp")
+    (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
+    said = checked(cxx, tmp_path, '#include "euler_rk4_2.hpp"\n', "-ffast-math")
+    assert "operations must round to double" in said.stderr
+
+
+def test_without_a_compiler_one_line_says_which_is_missing(monkeypatch, capsys):
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    with pytest.raises(SystemExit) as caught:
+        main([*SIMULATE, "--backend", "cpp"])
+    assert caught.value.code == 2
+    assert capsys.readouterr().err == (
+        "strapgen: no C++ compiler: 'no-such-compiler' is not on the PATH; install g++ (or set CXX), or use the numpy "
+        "back end\n"
+    )
+
+
+def test_what_does_not_compile_is_told_in_one_line(cxx):
+    sources = generated_sources.sources(catalogue.choose("euler-normalize"), "cpp")
+    broken = {name: text.replace("std::sqrt(", "std::sqroot(") for name, text in sources.files.items()}
+    with pytest.raises(CompilerError, match=r"failed on euler-normalize: .*sqroot") as caught:
+        strapgen.backends.of_sources(type(sources).restore(sources.interface(), broken))
+    assert "\n" not in str(caught.value)
