@@ -12,7 +12,7 @@ from strapgen.analysis.error_rate import error_rate
 from strapgen.analysis.motion_rates import TIME
 from strapgen.analysis.series import STEP
 from strapgen.catalogue import MOTIONS, choose, choose_step
-from strapgen.reports.agreement import agreement_text
+from strapgen.reports.error_analysis.agreement import agreement_text
 from strapgen.simulation.motions import motion
 from strapgen.support.exceptions import InputError
 

@@ -55,9 +55,9 @@ def broken(text: str, room: float) -> str:
     """
     lines: list[str] = []
     line = ""
-    if any(width(part) > room for part in _parts(text)):
+    if any(width(part) > room for part in parts(text)):
         text = _with_slashes(text, room)
-    for part in _parts(text):
+    for part in parts(text):
         if line and width(line) + width(part) > room - (_INDENT if lines else 0.0):
             lines.append(line.strip())
             line = ""
@@ -82,7 +82,7 @@ def width(text: str) -> float:
 
 def unbroken(text: str) -> float:
     """Return the width of the widest part of a formula that no line break divides."""
-    return max(map(width, _parts(text)))
+    return max(map(width, parts(text)))
 
 
 def sum_text(terms: Sequence[tuple[Fraction, str]]) -> str:
@@ -107,7 +107,7 @@ def sum_text(terms: Sequence[tuple[Fraction, str]]) -> str:
     return text or "0"
 
 
-def _parts(text: str) -> Iterator[str]:
+def parts(text: str) -> Iterator[str]:
     """Yield the parts of a formula between which a line may end: before signs and factors outside all braces."""
     depth, start, place = 0, 0, 0
     while place < len(text):

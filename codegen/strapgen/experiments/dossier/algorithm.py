@@ -1,0 +1,180 @@
+"""Gathers what is known of one algorithm: formulas, code, bounds, and what runs of it say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from strapgen import pipeline
+from strapgen.backends import DEFAULT_BACKENDS, backend
+from strapgen.catalogue import Choice
+from strapgen.experiments.comparison import Comparisons, compare
+from strapgen.experiments.convergence import Convergence, LadderCase, measured
+from strapgen.experiments.dossier.conditions import Conditions, Schedule
+from strapgen.fixedpoint import can_lower
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.program import Program
+from strapgen.ir.sources import Sources
+from strapgen.library import generated_sources
+from strapgen.simulation.motions import GENERAL
+from strapgen.simulation.runs import Run, simulate
+from strapgen.support.exceptions import InputError
+from strapgen.symbolic.kernel import Kernel
+
+#: The back end that the others are compared with: it shows all rounding.
+REFERENCE = "exact"
+#: The steps in s of the ladder on which the order is measured, and the length of its runs in s: those of the command.
+LADDER, LADDER_DURATION = ("1/2", "1/4", "1/8", "1/16", "1/32", "1/64", "1/128"), "2"
+#: The targets whose code is shown.
+TARGETS = ("numpy", "c", "c-float", "c-fixed", "fixed-model")
+
+
+@dataclass(frozen=True)
+class StepRuns:
+    """What runs of an attitude step say.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    run : Run
+        Scale, skew and drift along the motion, in double.
+    comparison : Comparisons
+        Back ends beside exact arithmetic on the same increments.
+    refused : dict of str to str
+        What back ends say whose numbers do not hold the run, by their names.
+    ladder : Convergence
+        Its errors on a ladder of steps, with the order that they show.
+    """
+
+    schedule: Schedule
+    run: Run
+    comparison: Comparisons
+    refused: dict[str, str]
+    ladder: Convergence
+
+
+@dataclass(frozen=True)
+class AlgorithmDossier:
+    """What is known of one kernel.
+
+    Parameters
+    ----------
+    choice : Choice
+    kernel : Kernel
+        Its exact formulas.
+    program : Program
+        Its straight-line code.
+    sources : dict of str to Sources
+        Its code by target; without those in fixed point where these need ranges that a user must state.
+    fixed : FixedProgram or None
+        Its formats and bounds in fixed point.
+    no_fixed : str
+        Why there is none; "" where there is.
+    runs : StepRuns or None
+        None for a kernel that is no attitude step.
+    """
+
+    choice: Choice
+    kernel: Kernel
+    program: Program
+    sources: dict[str, Sources]
+    fixed: FixedProgram | None
+    no_fixed: str
+    runs: StepRuns | None
+
+
+def dossier(
+    choice: Choice,
+    conditions: Conditions | None = None,
+    settings: Settings | None = None,
+    backends: Sequence[str] = DEFAULT_BACKENDS,
+) -> AlgorithmDossier:
+    """Gather what is known of an algorithm, and run it if it is an attitude step.
+
+    Parameters
+    ----------
+    choice : Choice
+    conditions : Conditions, optional
+        The motion, the sampling rate and the duration.
+    settings : Settings, optional
+        Word, largest increment and rounding of fixed point; by default 32 bits and 1/8 rad. Runs choose their formats
+        for their own increments, with the same rounding.
+    backends : sequence of str, optional
+        Keys of `strapgen.BACKENDS` that are compared.
+
+    Returns
+    -------
+    AlgorithmDossier
+
+    Raises
+    ------
+    InputError
+        If the kernel holds unknowns, a name or a number is not allowed, or the attitude in double is not finite.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue import choose
+    >>> known = dossier(choose("euler-product"))
+    >>> known.program.operations["multiply"], known.runs is None
+    (16, True)
+    """
+    kernel = pipeline.derive(choice)
+    kernel.require_known()
+    program = generated_sources.program(choice)
+    fixed, reason = None, ""
+    try:
+        fixed = generated_sources.fixed_program(choice, settings)
+    except InputError as error:
+        if can_lower(program):
+            raise  # the settings do not go with the kernel
+        reason = str(error)
+    sources = {
+        target: generated_sources.sources(choice, target, settings if "fixed" in target else None)
+        for target in TARGETS
+        if fixed is not None or "fixed" not in target
+    }
+    runs = None
+    if choice.increments is not None and kernel.companions is not None:
+        runs = _runs(choice, conditions or Conditions(), settings, backends)
+    return AlgorithmDossier(choice, kernel, program, sources, fixed, reason, runs)
+
+
+def run_settings(settings: Settings | None) -> Settings:
+    """Return settings of a run in fixed point: the rounding that a user states, and formats for its own increments."""
+    return (
+        Settings()
+        if settings is None
+        else replace(Settings(), rounding=settings.rounding, carry=settings.carry)
+    )
+
+
+def _runs(
+    choice: Choice, conditions: Conditions, settings: Settings | None, backends: Sequence[str]
+) -> StepRuns:
+    profile, schedule = conditions.profile(), conditions.schedule(choice)
+    step, steps = schedule.step, schedule.steps
+    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+        run = simulate(backend(choice), profile, step, schedule.duration, record=schedule.record)
+        increments = profile.increments(
+            step, steps, choice.increments_per_step, choice.previous, choice.ahead
+        )
+        truth = profile.attitude(np.arange(1 + steps) * float(step))
+        refused: dict[str, str] = {}
+        rows = Comparisons()
+        for name in backends:
+            try:
+                rows += compare(
+                    choice,
+                    backends=[name],
+                    increments=increments,
+                    reference=REFERENCE,
+                    truth=truth,
+                    settings=run_settings(settings),
+                )
+            except InputError as error:
+                refused[name] = str(error)
+    ladder = measured(LadderCase(choice, "exact", "coning", GENERAL, LADDER, LADDER_DURATION))
+    return StepRuns(schedule, run, rows, refused, ladder)
