@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from strapgen.cli.options import option
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -342,11 +343,6 @@ def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
     for name, value in options.items():
         if value is not None:
             raise InputError(f"{name} goes with {owner}, not with {chosen}")
-
-
-def is_file(motion: str) -> bool:
-    """Tell whether the name of a motion is that of a user's file."""
-    return motion.endswith(".py")
 
 
 def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> None:

@@ -21,8 +21,9 @@ from strapgen.catalogue import Choice
 from strapgen.library import generated_sources
 from strapgen.simulation.drift import drift
 from strapgen.simulation.motions import Motion
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.simulation.runs import simulate
-from strapgen.simulation.users_motions import any_motion, is_file
+from strapgen.simulation.users_motions import any_motion
 from strapgen.support import cache as disk_cache
 from strapgen.support import checks
 from strapgen.support.clusters import Bundle, Cluster, moved

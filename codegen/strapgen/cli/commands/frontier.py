@@ -14,10 +14,10 @@ from strapgen.cli.sample_source import (
     RUN_MOTION_NAMES,
     MotionSettings,
     check_motion,
-    is_file,
     pairs,
 )
 from strapgen.cli.worker_options import WorkerOptions
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

@@ -12,8 +12,9 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import Duration, Increments, listed, option, whole
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, is_file, pairs
+from strapgen.cli.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, pairs
 from strapgen.cli.worker_options import WorkerOptions
+from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
