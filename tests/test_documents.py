@@ -269,6 +269,7 @@ LONG_COMMANDS = (
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",
     "strapgen redundancy ",
+    "strapgen report euler ",
     "strapgen series euler ",
     "strapgen simulate ",
     "strapgen stability ",
