@@ -11,7 +11,7 @@ import typer
 from strapgen.cli.commands.tables import runnable
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, command_line, grouped
-from strapgen.cli.options import FastBackends, SeveralMethods, backends, listed, option
+from strapgen.cli.options import FastBackends, KernelOptions, SeveralMethods, backends, listed, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.sample_source import (
@@ -36,8 +36,18 @@ _FIXED = (
     *("rounding", "carry", "state", "drift_allowance"),
 )
 
+#: The options that choose kernels.
+_CHOOSING = (
+    *("method", "tableau", "window", "coning"),
+    *("increments", "previous", "ahead", "constant", "layout"),
+)
 #: Most names in the heading of a page.
 _MOST_NAMES = 3
+
+
+@dataclass(frozen=True)
+class SeveralKernels(SeveralMethods, KernelOptions):
+    """Options that choose kernels: the methods and the numbers of increments of steps, and the layout of others."""
 
 
 @dataclass(frozen=True)
@@ -112,15 +122,7 @@ def report(
         ),
     ] = None,
     *,
-    methods: Annotated[
-        SeveralMethods,
-        Shown(
-            only=(
-                *("method", "tableau", "window", "coning"),
-                *("increments", "previous", "ahead", "constant"),
-            )
-        ),
-    ],
+    methods: Annotated[SeveralKernels, Shown(only=_CHOOSING)],
     backend: FastBackends = None,
     beside: Annotated[
         str,

@@ -23,6 +23,8 @@ from strapgen.reports.thesis.tables import NAMES, repair_notes
 _FIGURE = ".3g"
 #: Names of commands whose results compare algorithms, which stand beside those of single algorithms.
 _TABLES, _FRONTIER = "tables", "frontier"
+#: What stands between the sources of an algorithm.
+_SOURCES = "; "
 
 
 @dataclass(frozen=True)
@@ -204,10 +206,20 @@ class Content:
                     PageCell("●" if front else "", 0 if front else 1),
                     *(_figure(one[f"{kind}_per_sample"], ".4g") for kind in ("multiply", "add", "other")),
                     _figure(one["drift_deg_h"][self.conditions.motion]),
-                    PageCell(one["title"], one["title"], small=one["source"]),
+                    PageCell(one["title"], one["title"], small=self._rest(one["source"])),
                 ]
             )
         return rows
+
+    def _rest(self, source: str) -> str:
+        """Return a source without what all algorithms share."""
+        return _SOURCES.join(part for part in source.split(_SOURCES) if part not in self.shared_sources)
+
+    @cached_property
+    def shared_sources(self) -> list[str]:
+        """What all algorithms that are compared come from, besides what each states."""
+        first, *others = [one.source.split(_SOURCES) for one in self.standings] or [[]]
+        return [part for part in first if all(part in parts for parts in others)] if others else []
 
     def thesis_tables(self) -> list[ThesisTable]:
         """Return the tables of the thesis."""
