@@ -323,7 +323,7 @@ BAD = {
     "derive broken.py": "broken.py, line 1: SyntaxError: ",
     "derive nonsense.py": "nonsense.py: algorithm() returned int; a Kernel is needed",
     "derive nonsense.py --method rk4": "nonsense.py: its algorithm() takes no method; it takes no options",
-    "derive nonsense.py --rates": "nonsense.py: an algorithm of a user takes increments, not rates",
+    "derive nonsense.py --rates": "nonsense.py: rates at nodes go with methods of the catalogue",
     "derive nonsense.py --previous 33": "previous is 33; a whole number from 0 to 32 is needed",
     f"simulate nonsense.py {CONSTANT}": "nonsense.py: algorithm() returned int; a Kernel is needed",
     f"compare none.py {CONSTANT}": "algorithm none.py is no file",
