@@ -14,6 +14,7 @@ from strapgen.analysis import one_step, velocity_conditions
 from strapgen.analysis.conditions import conditions
 from strapgen.analysis.demands import Demand
 from strapgen.catalogue import Choice
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic import elimination, families
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution
@@ -51,6 +52,12 @@ class LeadingError:
     square: sp.Expr
     least: dict[sp.Symbol, sp.Expr]
 
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"h^{self.power} on {self.motion} motion: {len(self.terms)} terms"
+
 
 @dataclass(frozen=True)
 class SolvedStep:
@@ -74,6 +81,13 @@ class SolvedStep:
     conditions: tuple[Equation, ...]
     solution: PolynomialSolution
     leading: tuple[tuple[LeadingError, ...], ...]
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        demands = ", ".join(f"order {demand.order} on {demand.motion} motion" for demand in self.demands)
+        return f"of {self.kernel.name}: {demands}\n{len(self.conditions)} conditions; {self.solution!r}"
 
     @property
     def families(self) -> tuple[Family, ...]:

@@ -17,6 +17,7 @@ from strapgen.analysis import invariants, one_step, sampled_motion
 from strapgen.analysis.notation import TEXT, covariant_text, with_forces
 from strapgen.catalogue import Choice
 from strapgen.support import checks
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.covariants import Coefficients, Frame
 from strapgen.symbolic.kernel import Kernel
@@ -55,6 +56,13 @@ class VelocitySeries:
     known: int
     parts: tuple[str, ...] = PARTS
     unknowns: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        order = "no error" if self.order is None else f"order {self.order}"
+        return f"of {self.kernel}: {order}, known to h^{self.known}"
 
     @property
     def order(self) -> int | None:

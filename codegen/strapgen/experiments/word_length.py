@@ -23,6 +23,7 @@ from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.simulation.users_motions import any_motion
 from strapgen.support import cache, checks
+from strapgen.support.brief import short_repr
 from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
@@ -69,6 +70,8 @@ class Case:
     motion: str
     settings: tuple[tuple[str, str], ...]
 
+    __repr__ = short_repr
+
     def moved(self, begin: Path, end: Path) -> Case:
         """Return the case with the file of a user's motion in another folder, see `clusters.Movable`."""
         return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
@@ -109,6 +112,8 @@ class Outcome:
     truncation_deg: float
     bound_deg: float | None
     expected_deg: float | None = None
+
+    __repr__ = short_repr
 
     @property
     def dominates(self) -> str:
@@ -158,6 +163,8 @@ class Study:
     duration: str = "180"
     motion_name: str = "coning"
     settings: dict[str, str] | None = None
+
+    __repr__ = short_repr
 
     def cases(self) -> list[Case]:
         """Return every combination, unchecked."""

@@ -22,8 +22,8 @@ _Text = str | None
 class SolutionOutput(Output):
     """Where the families go, and in which format."""
 
-    format: Annotated[_Text, format_option(("text", "json"))] = "text"
-    formats: ClassVar[tuple[str, ...]] = ("text", "json")
+    format: Annotated[_Text, format_option(("text", "json", "latex"))] = "text"
+    formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
 
 
 @grouped

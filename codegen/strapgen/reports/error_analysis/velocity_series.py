@@ -24,7 +24,7 @@ def velocity_series_report(several: Sequence[VelocitySeries]) -> Report:
     return Report(
         lambda: "\n\n".join(map(_text, several)),
         data,
-        latex=lambda: "\n\n".join(map(_latex, several)),
+        latex=lambda: "\n\n".join(map(velocity_series_latex, several)),
     )
 
 
@@ -44,7 +44,8 @@ def _text(series: VelocitySeries) -> str:
     return "\n".join(lines)
 
 
-def _latex(series: VelocitySeries) -> str:
+def velocity_series_latex(series: VelocitySeries) -> str:
+    """Return the errors of a step as one align environment."""
     notation = with_forces(LATEX, series.known, r"\mathbf{{f}}_{{{}}}".format)
     rows = [
         (rf"h^{{{power}}}\!:\ {_SYMBOLS[part]}", covariant_text(one, notation=notation))
