@@ -16,6 +16,7 @@ import numpy as np
 from strapgen import catalogue
 from strapgen.backends import backend
 from strapgen.backends.increments import pulses
+from strapgen.catalogue import Choice
 from strapgen.experiments.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.motions import Motion
@@ -29,6 +30,8 @@ from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from strapgen.analysis.quantization_noise import QuantizationNoise
 
 #: Most cases of one study.
@@ -277,9 +280,10 @@ def run_case(case: Case) -> Outcome:
 def _run(case: Case) -> Outcome:
     h = checks.number("step", case.step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
-    exact = case.profile.increments(h, steps, case.increments)
+    choice = catalogue.choose_step(case.algorithm, case.method, case.increments)
+    exact = case.profile.increments(h, steps, case.increments, choice.previous, choice.ahead)
     pulse = float(checks.number("pulse_arcsec", case.pulse_arcsec)) / 3600
-    measured = pulses(exact, math.radians(pulse)) if pulse else exact
+    measured = pulses(exact, math.radians(pulse), choice.previous + choice.ahead) if pulse else exact
     settings = Settings(case.word, rounding=case.rounding, carry=case.carry)
     settings = settings.fitted(float(np.abs(measured).max()))
     double = backend(case.algorithm, case.method, case.increments, "numpy")
@@ -307,8 +311,13 @@ def _run(case: Case) -> Outcome:
         largest(same_attitude, plain_attitude),
         largest(plain_attitude, truth),
         None if bound is None else math.degrees(bound),
-        expected_noise(case, math.radians(pulse), exact) if pulse else None,
+        expected_noise(case, math.radians(pulse), _within(choice, exact)) if pulse else None,
     )
+
+
+def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the increments of the steps themselves, without those from beside them."""
+    return increments[:, choice.previous : choice.previous + choice.increments_per_step]
 
 
 def expected_noise(case: Case, pulse: float, increments: Any) -> float:
