@@ -145,7 +145,9 @@ MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
     "spectrum": lambda: strapgen.vibration.Spectrum(np.ones_like, {"angle_x": np.ones_like}, (1.0, 2.0)),
     "shape": lambda: SHAPES["coning-shaped-8"],
     "design": lambda: coning_coefficients.design(3, 0, "combined"),
-    "velocity series": lambda: velocity_series.series(strapgen.choose("velocity-position", "magnus2", 1)),
+    "unknowns.VelocitySeries": lambda: velocity_series.series(
+        strapgen.choose("velocity-position", "magnus2", 1)
+    ),
     "growth": lambda: growth.growth(strapgen.choose("dcm", "rk1")),
     "stability": lambda: growth.stability(strapgen.choose("dcm", "rk1")),
     "vibration.Assessment": lambda: strapgen.vibration.of(strapgen.choose("euler", "rk1", 1)),
@@ -154,7 +156,7 @@ MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
 #: Formulas in a notebook: kernels, series, tableaux, order conditions, coefficients, windows.
 FORMULAS = (
     *(name for name in MODULE_OBJECTS if name.startswith("unknowns.")),
-    *("shape", "design", "velocity series", "stability"),
+    *("shape", "design", "stability"),
 )
 
 

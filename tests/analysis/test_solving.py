@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 import strapgen
-from strapgen.analysis import velocity_conditions
+from strapgen.analysis import velocity_conditions, velocity_series
 from strapgen.analysis.conditions import conditions
 from strapgen.analysis.demands import Demand
 from strapgen.analysis.one_step import step
@@ -236,6 +236,15 @@ def test_the_velocity_and_position_of_two_samples():
     (leading,) = sculling.leading[0]
     coning = solved_pairs(2, 0, coning=4)
     assert (leading.power, leading.terms[0].value) == (5, -2 * coning.leading[0][0].terms[0].value)
+
+
+def test_the_series_of_a_velocity_comes_back_from_json_with_its_unknowns():
+    one = velocity_series.series(strapgen.choose(VELOCITY), terms=2)
+    data = json.loads(json.dumps(one.as_dict()))
+    assert data["unknowns"] == ["a", "b", "c1", "c2", "k11", "k12", "k21", "k22"]
+    again = velocity_series.VelocitySeries.from_dict(data)
+    assert again == one
+    assert sp.Symbol("a", real=True) in sp.sympify(again.velocity[2][0, again.known][()]).free_symbols
 
 
 def test_a_condition_on_a_change_that_the_step_does_not_return_is_refused(tmp_path):

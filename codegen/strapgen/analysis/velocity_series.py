@@ -6,8 +6,9 @@ axes. Their increments are exact, and so are the true changes: the integral of R
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -19,7 +20,9 @@ from strapgen.catalogue import Choice
 from strapgen.support import checks
 from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic import reading
 from strapgen.symbolic.covariants import Coefficients, Frame
+from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import Kernel
 from strapgen.symbolic.power_series import Powers, field, outputs
 
@@ -85,7 +88,52 @@ class VelocitySeries:
                 for power, one in self.coefficients(part).items()
             }
         data["known_to_power"] = self.known
+        data["terms"] = {
+            part: {str(power): _as_terms(one) for power, one in self.coefficients(part).items()}
+            for part in self.parts
+        }
         return data | ({"unknowns": list(self.unknowns)} if self.unknowns else {})
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> VelocitySeries:
+        """Rebuild a series from `as_dict`, with its unknowns as symbols.
+
+        Raises
+        ------
+        InputError
+            If a text is no expression.
+        """
+        unknowns = tuple(data.get("unknowns", ()))
+        parts = {
+            part: {int(power): _of_terms(one, unknowns) for power, one in rows.items()}
+            for part, rows in data["terms"].items()
+        }
+        velocity, position = (parts.get(part, {}) for part in PARTS)
+        return cls(data["kernel"], velocity, position, data["known_to_power"], tuple(parts), unknowns)
+
+
+def _as_terms(coefficients: Coefficients) -> list[dict[str, Any]]:
+    """Return the terms of an error: numbers of vectors, the scalar products that stand before them, and a number."""
+    return [
+        {
+            "vectors": [*covariant],
+            "products": [[*product] for product in monomial],
+            "number": sp.sstr(exact(number)),
+        }
+        for covariant, polynomial in coefficients.items()
+        for monomial, number in polynomial.items()
+    ]
+
+
+def _of_terms(terms: Sequence[Mapping[str, Any]], unknowns: Sequence[str]) -> Coefficients:
+    symbols = {name: sp.Symbol(name, real=True) for name in unknowns}
+    coefficients: Coefficients = {}
+    for term in terms:
+        value = reading.expression("number", term["number"], symbols)
+        number = Fraction(int(value.p), int(value.q)) if value.is_Rational else value
+        monomial = tuple(tuple(product) for product in term["products"])
+        coefficients.setdefault(tuple(term["vectors"]), {})[monomial] = number
+    return coefficients
 
 
 def series(choice: Choice, terms: int = 1) -> VelocitySeries:
