@@ -198,6 +198,11 @@ def test_objects_of_public_modules_show_themselves_too():
     assert [name for name, value in objects.items() if " object at 0x" in repr(value)] == []
     shown = {name: objects[name]._repr_latex_() for name in FORMULAS}
     shown |= {name: OBJECTS[name]()._repr_latex_() for name in ("AttitudeAlgorithm", "Kernel", "Window")}
+    shown["unknowns"] = strapgen.derive(strapgen.choose(f"{ROOT}/examples/three_samples.py"))._repr_latex_()
+    assert (
+        r"+ a \mathbf{d}_{1} \times \mathbf{d}_{2} + b \mathbf{d}_{1} \times \mathbf{d}_{3}"
+        in shown["unknowns"]
+    )
     shown["Tableau"] = strapgen.TABLEAUX["rk4"]._repr_latex_()
     begins = ("\\begin{align*}", "\\[")
     assert [

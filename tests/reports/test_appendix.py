@@ -52,6 +52,8 @@ LONG = (
     "series euler --all --method rk1,rk4 --format latex",
     "vibration dcm --method rk4 --step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
     " --format latex",
+    "derive examples/three_samples.py --format latex",
+    "derive examples/two_velocity_samples.py --format latex",
     "series examples/two_velocity_samples.py --format latex",
     "solve examples/three_samples.py --order 4 --format latex",
     "solve examples/rates_at_nodes.py --order 4 --format latex",

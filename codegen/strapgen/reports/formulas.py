@@ -121,7 +121,7 @@ def unknown_formulas_report(kernel: Kernel, show: str) -> Report:
         shown = {"latex": as_latex(kernel)} if show == "latex" else {}
         return kernel_as_data(kernel) | {"unknowns": list(kernel.unknowns)} | shown
 
-    return Report(texts[show], data)
+    return Report(texts[show], data, latex=texts["latex"])
 
 
 def program_as_data(program: Program) -> dict[str, str]:
@@ -155,7 +155,7 @@ def short_latex(kernel: Kernel) -> str | None:
 
 def _in_vectors(kernel: Kernel) -> str | None:
     """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
-    form = vector_form(kernel)
+    form = None if kernel.unknowns else vector_form(kernel)
     return stages_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
 
 
