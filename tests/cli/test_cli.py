@@ -499,7 +499,7 @@ def test_generate_json(target, strapgen_says, tmp_path):
     if TARGETS[target].fixed:
         assert set(data) >= {"formats", "ranges", "error_bound"}
     else:
-        assert list(data)[5:] == ["error_bounds"] * TARGETS[target].linked
+        assert list(data)[5:] == ["error_bounds"] * TARGETS[target].nameable
     sources = pipeline.generate(program, target)
     files = sources.files if with_runs else sources.step_files
     own = 2 if TARGETS[target].compiled else 1  # a header and a source, or one file
