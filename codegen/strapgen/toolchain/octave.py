@@ -77,6 +77,15 @@ def command() -> list[str]:
     return [path, *rest]
 
 
+def missing() -> str:
+    """Return why Octave cannot run; "" if it can."""
+    try:
+        command()
+    except CompilerError as error:
+        return str(error)
+    return ""
+
+
 class OctaveProcess:
     """A process of Octave that serves one request after another until this process ends."""
 

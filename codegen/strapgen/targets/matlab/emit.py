@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from strapgen.ir.float_interface import RoundingBounds
@@ -12,7 +12,7 @@ from strapgen.rounding import rounding_bounds
 from strapgen.targets import contract, contract_lines
 from strapgen.targets.c.emit import HALF_TURNS
 from strapgen.targets.c.rounding_text import rounding_text, with_names
-from strapgen.targets.lines import fill_expression
+from strapgen.targets.lines import fill_arguments, fill_expression
 from strapgen.targets.matlab.names import MATLAB, file_name
 from strapgen.targets.names import printed
 from strapgen.targets.printer import Printer
@@ -30,6 +30,8 @@ _FUNCTIONS = {
     "at_least": "{} >= {}",
     "select": "chosen({}, {}, {})",
 }
+#: The arguments of the loop over steps.
+_PROPAGATE = ("initial", "samples", "record_every", "restore_every", "restore")
 
 
 class MatlabPrinter(Printer):
@@ -95,6 +97,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
     command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     state = program.inputs[0]
+    outputs = [result.signal.name for result in program.outputs]
     values = {
         "program": program,
         "name": name,
@@ -102,7 +105,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "contract": contract_lines.of_program(program, name, command, rounding),
         "normalizing": contract.upkeep_text(program, target=target),
         "rounding": rounding_text(rounding, program, "MATLAB or Octave", ""),
-        "signature": _signature(program, name),
+        "signature": _signature(name, outputs, [signal.name for signal in program.inputs]),
         "loads": list(_loads(program)),
         "body": [
             {"text": _statement(a.name, printer.text(a.value)), "meaning": a.meaning}
@@ -118,18 +121,17 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         numbers = list(map(printer.constant, program.companions.identity))
         values |= {
             "state": state,
+            "loop_signature": _signature(f"{name}_propagate", ["history"], _PROPAGATE),
             "samples": program.inputs[-1],
-            "identity": _array(_by_columns(numbers, state.shape), state.shape),
+            "identity": _statement("initial", _array(_by_columns(numbers, state.shape), state.shape), 12),
         }
         files[f"{name}_propagate.m"] = render("matlab/propagate.m.j2", **values)
     return files
 
 
-def _signature(program: Program, name: str) -> str:
-    outputs = [result.signal.name for result in program.outputs]
+def _signature(name: str, outputs: Sequence[str], inputs: Sequence[str]) -> str:
     returned = outputs[0] if len(outputs) == 1 else f"[{', '.join(outputs)}]"
-    text = f"{returned} = {name}({', '.join(signal.name for signal in program.inputs)})"
-    return _continued(fill_expression(text, " " * 4, 86))
+    return _continued(fill_arguments(f"{returned} = {name}({', '.join(inputs)})", " " * 4, 86))
 
 
 def _loads(program: Program) -> Iterable[str]:
@@ -168,9 +170,8 @@ def _array(elements: list[str], shape: tuple[int, ...]) -> str:
     return f"reshape({column}, {', '.join(map(str, shape))}, [])" if len(shape) == 2 else column
 
 
-def _statement(name: str, value: str) -> str:
-    indent = " " * 8
-    return _continued(fill_expression(f"{name} = {value};", indent, 92))
+def _statement(name: str, value: str, indent: int = 8) -> str:
+    return _continued(fill_expression(f"{name} = {value};", " " * indent, 92))
 
 
 def _continued(text: str) -> str:
