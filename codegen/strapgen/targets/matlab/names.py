@@ -11,7 +11,7 @@ from strapgen.targets.names import Language, function_name
 
 #: Keywords of MATLAB and of Octave, and what either takes for a number or a value.
 _WORDS_TEXT = """
-ans arguments break case catch classdef continue do else elseif end end_try_catch end_unwind_protect
+arguments break case catch classdef continue do else elseif end end_try_catch end_unwind_protect
 endclassdef endenumeration endevents endfor endfunction endif endmethods endparfor endproperties endswitch
 endwhile enumeration events for function global if methods otherwise parfor persistent properties return
 spmd switch try until unwind_protect unwind_protect_cleanup while
