@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from fractions import Fraction
 
 from strapgen.ir.float_interface import RoundingBounds
@@ -96,7 +96,6 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
     printer = MatlabPrinter()
     command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
-    state = program.inputs[0]
     outputs = [result.signal.name for result in program.outputs]
     values = {
         "program": program,
@@ -106,27 +105,46 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "normalizing": contract.upkeep_text(program, target=target),
         "rounding": rounding_text(rounding, program, "MATLAB or Octave", ""),
         "signature": _signature(name, outputs, [signal.name for signal in program.inputs]),
-        "loads": list(_loads(program)),
-        "body": [
-            {"text": _statement(a.name, printer.text(a.value)), "meaning": a.meaning}
-            for a in program.body
-            if a.name in program.used(program.outputs)
-        ],
-        "stores": [_statement(r.signal.name, _output(r, program, printer)) for r in program.outputs],
+        "code": _code(program, printer),
         "functions": {node.kind for node in nodes},
         "turn": tuple(map(printer.constant, HALF_TURNS)),
     }
     files = {f"{name}.m": render("matlab/function.m.j2", **values)}
     if program.companions is not None:
-        numbers = list(map(printer.constant, program.companions.identity))
-        values |= {
-            "state": state,
-            "loop_signature": _signature(f"{name}_propagate", ["history"], _PROPAGATE),
-            "samples": program.inputs[-1],
-            "identity": _statement("initial", _array(_by_columns(numbers, state.shape), state.shape), 12),
-        }
+        values |= _loop(program, program.companions.identity, printer)
+        values["loop_signature"] = _signature(f"{name}_propagate", ["history"], _PROPAGATE)
         files[f"{name}_propagate.m"] = render("matlab/propagate.m.j2", **values)
     return files
+
+
+def _loop(program: Program, identity: Iterable[Fraction], printer: MatlabPrinter) -> dict[str, object]:
+    """Return what the loop over steps holds: a step in two parts, without the state and with it."""
+    ahead, behind = program.split()
+    state = program.inputs[0]
+    first = _array(_by_columns(map(printer.constant, identity), state.shape), state.shape)
+    return {
+        "state": state,
+        "samples": program.inputs[-1],
+        "identity": _statement("initial", first, 12),
+        "prepared": behind.inputs[1],
+        "ahead": _code(ahead, printer),
+        "behind": _code(behind, printer),
+        "result": program.outputs[0].signal,
+    }
+
+
+def _code(program: Program, printer: MatlabPrinter) -> dict[str, object]:
+    """Return the statements of a function: loads, assignments, stores."""
+    used = program.used(program.outputs)
+    return {
+        "loads": list(_loads(program, used)),
+        "body": [
+            {"text": _statement(a.name, printer.text(a.value)), "meaning": a.meaning}
+            for a in program.body
+            if a.name in used
+        ],
+        "stores": [_statement(r.signal.name, _output(r, program, printer)) for r in program.outputs],
+    }
 
 
 def _signature(name: str, outputs: Sequence[str], inputs: Sequence[str]) -> str:
@@ -134,9 +152,8 @@ def _signature(name: str, outputs: Sequence[str], inputs: Sequence[str]) -> str:
     return _continued(fill_arguments(f"{returned} = {name}({', '.join(inputs)})", " " * 4, 86))
 
 
-def _loads(program: Program) -> Iterable[str]:
+def _loads(program: Program, used: Container[str]) -> Iterable[str]:
     """Yield the statements that take the elements of the inputs, each a row with an element of every sample."""
-    used = program.used(program.outputs)
     for signal in program.inputs:
         yield f"{signal.name} = reshape({signal.name}, {signal.size}, []);"
         if signal.shape:

@@ -52,9 +52,10 @@ def file_name(program: Program) -> str:
         If a user chose a keyword.
     """
     name = function_name(program)
+    if not program.function:
+        return name if "_" in name else f"{name}_Kernel"
     if not _allows(name):
         raise InputError(
             f"{name} is a word of MATLAB and Octave itself; another name of the function is needed"
         )
-    is_word = "_" not in name and not program.function
-    return f"{name}_Kernel" if is_word else name
+    return name
