@@ -26,9 +26,13 @@ from strapgen.support.exceptions import CompilerError
 #: What Octave does for a request: it calls a function of some folders with arrays from one file, and writes the results
 #: to another.
 _CALL = """
-function strapgen_call(folders, name, shapes, outputs, varargin)
-    addpath(folders{:});
-    restored = onCleanup(@() rmpath(folders{:}));
+function strapgen_call(left, added, name, shapes, outputs, varargin)
+    if ~isempty(left)
+        rmpath(left{:});
+    end
+    if ~isempty(added)
+        addpath(added{:});
+    end
     inputs = cell(size(shapes));
     file = fopen('arguments', 'r');
     for k = 1:numel(shapes)
@@ -94,6 +98,7 @@ class OctaveProcess:
         self._pid = os.getpid()
         self._folder = Path(tempfile.mkdtemp(prefix="strapgen-octave-"))
         (self._folder / "strapgen_call.m").write_text(_CALL)
+        self._places: dict[str, str] = {}  # the folder on the path by the files in it
         self._process = subprocess.Popen(
             [*self.command, "--norc", "--no-history", "--quiet", "--no-line-editing"],
             stdin=subprocess.PIPE,
@@ -137,10 +142,10 @@ class OctaveProcess:
         CompilerError
             If Octave refuses the function, or ends.
         """
-        folders = ", ".join(f"'{self._written(one)}'" for one in sources)
         (self._folder / "arguments").write_bytes(b"".join(array.tobytes(order="F") for array in arguments))
         sizes = ", ".join(f"[{' '.join(map(str, (*array.shape, 1, 1)))}]" for array in arguments)
-        words = [f"{{{folders}}}", f"'{name}'", f"{{{sizes}}}", str(len(shapes)), *rest]
+        left, added = (f"{{{', '.join(map(repr, folders))}}}" for folders in self._path(sources))
+        words = [left, added, f"'{name}'", f"{{{sizes}}}", str(len(shapes)), *rest]
         answer = self._answer(_REQUEST % ", ".join(words))
         if answer != _DONE:
             raise CompilerError(f"Octave failed on {sources[0].kernel}: {answer}")
@@ -152,6 +157,19 @@ class OctaveProcess:
             )
         parts = np.split(numbers, ends[:-1])
         return [part.reshape(shape, order="F") for part, shape in zip(parts, shapes, strict=True)]
+
+    def _path(self, sources: Sequence[Sources]) -> tuple[list[str], list[str]]:
+        """Return the folders that leave the path of Octave, and those that come, so that it has these very sources.
+
+        A change costs Octave many times what a call does: a folder stays until another has a function of the same name.
+        """
+        folders = list(map(self._written, sources))
+        places = {file: folder for one, folder in zip(sources, folders, strict=True) for file in one.files}
+        left = {self._places[file] for file in places.keys() & self._places.keys()} - {*folders}
+        self._places = {file: place for file, place in self._places.items() if place not in left}
+        added = [folder for folder in dict.fromkeys(folders) if folder not in self._places.values()]
+        self._places |= places
+        return sorted(left), added
 
     def _written(self, sources: Sources) -> str:
         """Return the folder of some sources, written if it is not there."""
