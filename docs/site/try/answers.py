@@ -80,7 +80,7 @@ def code(algorithm: str, method: str, increments: int) -> dict[str, Any]:
     """
     _load_bounds()
     _, _, program = _derived(algorithm, method, increments)
-    files = {target: strapgen.generate(program, target).files for target in TARGETS}
+    files = {target: strapgen.generate(program, target).step_files for target in TARGETS}
     options = f"{algorithm} --method {method} --increments {increments}"
     return {
         "files": files,

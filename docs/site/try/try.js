@@ -94,8 +94,9 @@ function receive(message) {
   if (message.type === "done") finish();
   if (message.type === "part") {
     shown[message.part] = message.result;
-    if (message.result.error) showError(message.result.error);
-    else SHOW[message.part](message.result);
+    if (!message.result.error) SHOW[message.part](message.result);
+    else if (message.part === "formula") showError(message.result.error);
+    else $(BOXES[message.part]).textContent = message.result.error;
     if (message.part === "formula") $("results").hidden = Boolean(message.result.error);
   }
 }
@@ -131,9 +132,10 @@ function showError(line) {
 // The parts
 
 const SHOW = { formula: showFormula, code: showCode, coning: showConing, series: showSeries };
+const BOXES = { code: "code", coning: "chart", series: "series" };
 const COUNTS = {
   multiply: "multiplications", add: "additions", divide: "divisions", sqrt: "square roots",
-  negate: "changes of sign", select: "choices", function: "functions",
+  negate: "sign changes", select: "choices", function: "function calls",
 };
 
 function showFormula(result) {
@@ -145,8 +147,9 @@ function showFormula(result) {
   $("cost").firstChild.title = result.order_text;
   $("notes").replaceChildren(...result.notes.map((note) => make("li", { textContent: note })));
   showRows($("formula"), result.rows);
-  for (const name of ["code", "series", "chart", "legend"]) $(name).replaceChildren();
-  $("tabs").replaceChildren();
+  for (const name of Object.values(BOXES)) $(name).textContent = "Working …";
+  for (const name of ["tabs", "legend", "reading"]) $(name).replaceChildren();
+  $("results").classList.remove("stale");
 }
 
 /** Shows rows of MathML, between whose pieces a line may end. */
@@ -159,6 +162,15 @@ function showRows(box, rows) {
       return make("div", { className: "try-row" }, left, right);
     }),
   );
+  // Browsers set no space behind a sign that begins a piece, and space within the bars of a length.
+  for (const sign of box.querySelectorAll("mo")) {
+    const space = { "|": "0", "+": "0.22em", "−": "0.22em" }[sign.textContent];
+    const begins = sign.getAttribute("form") === "infix";
+    if (sign.textContent === "|" || (begins && space)) {
+      sign.setAttribute("lspace", "0");
+      sign.setAttribute("rspace", space);
+    }
+  }
 }
 
 function showCode(result) {
@@ -178,10 +190,9 @@ function showCode(result) {
     });
   }
   $("tabs").replaceChildren(...tabs);
-  // The kind of file that was shown before, or else the C source of the step.
-  const ending = (name) => name.replace(/^.*?((_cpp)?(_runs)?\.\w+)$/, "$1");
-  const same = [...files.keys()].find((name) => file && ending(name) === ending(file));
-  showFile(same ?? [...files.keys()].find((name) => name.endsWith(".c") && !name.includes("_runs")));
+  // The kind of file that was shown before, or else the C.
+  const ending = /\.\w+$/.exec(file || "a.c")[0];
+  showFile([...files.keys()].find((name) => name.endsWith(ending)));
 }
 
 function showFile(name) {
@@ -308,7 +319,8 @@ function save() {
 }
 
 function stop() {
-  fail("Stopped. Choose an algorithm to go on; Python then starts again.");
+  fail("");
+  $("status").textContent = "You stopped it. Choose an algorithm to go on; Python then starts again.";
 }
 
 function wire() {
