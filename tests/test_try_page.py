@@ -108,8 +108,9 @@ def test_the_archive_holds_strapgen_and_is_the_same_twice(tmp_path, monkeypatch)
 
 
 def test_where_nothing_can_be_brought_the_page_says_so_and_the_rest_is_built(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert build._brought(tmp_path / "downloads") is False
+    with monkeypatch.context() as without_npm:
+        without_npm.setenv("PATH", str(tmp_path))
+        assert build._brought(tmp_path / "downloads") is False
     line = "docs: strapgen does not run on its page, which is left out: npm is needed to bring Python for the browser"
     assert capsys.readouterr().err == f"{line}: on Debian, apt-get install npm\n"
     assert not (tmp_path / "downloads").exists()
@@ -143,7 +144,11 @@ def test_the_page_derives_what_the_command_line_does(runnable, browser, tmp_path
         [sys.executable, "-m", "strapgen", *command.split(), str(tmp_path)], check=True, capture_output=True
     )
     written = {path.name: path.read_text() for path in tmp_path.iterdir()}
-    with served(runnable) as address, opened(browser, f"{address}/try.html#euler-rk4-2", WIDTHS[0]) as window:
+    # In a folder of the server, as on hosts of many projects.
+    with (
+        served(runnable.parent) as address,
+        opened(browser, f"{address}/{runnable.name}/try.html#euler-rk4-2", WIDTHS[0]) as window,
+    ):
         page = window.page
         page.wait_for_function(SHOWN, arg="euler-rk4-2", timeout=PATIENCE)
         assert {*written} == {f"euler_rk4_2.{ending}" for ending in ("c", "h", "hpp", "py")}
@@ -190,3 +195,13 @@ def test_a_page_from_disk_says_how_to_open_it(runnable, browser):
             assert "make docs-serve" in window.page.get_by_role("alert").inner_text()
             assert not window.page.locator("#try-form").is_visible()
             assert window.view().faults() == []
+
+
+@pytest.mark.long
+def test_a_file_that_is_missing_is_named_in_one_line(runnable, browser):
+    with served(runnable) as address, opened(browser, f"{address}/genindex.html", WIDTHS[0]) as window:
+        window.page.route("**/pyodide.asm.wasm", lambda route: route.fulfill(status=404, body=""))
+        window.page.goto(f"{address}/try.html")
+        line = window.page.get_by_role("alert").filter(has_text="could not be loaded")
+        line.wait_for(timeout=PATIENCE)
+        assert line.inner_text() == "try/pyodide/pyodide.asm.wasm could not be loaded: 404 Not Found"

@@ -52,10 +52,15 @@ function drawChart(box, curves) {
     picture.append(svg("line", { class: "grid", x1: edge.left, x2: width - edge.right, y1: place, y2: place }));
     picture.append(svg("text", { x: edge.left - 8, y: place + 4, "text-anchor": "end" }, power(k)));
   }
-  for (let k = Math.ceil(left); k <= right; k += 1) {
-    const place = x(10 ** k);
-    picture.append(svg("line", { class: "grid", x1: place, x2: place, y1: edge.top, y2: bottom }));
-    picture.append(svg("text", { x: place, y: bottom + 18, "text-anchor": "middle" }, power(k)));
+  const steps = width > 560 ? [1, 2, 5] : [1];
+  for (let k = Math.floor(left); k <= right; k += 1) {
+    for (const step of steps) {
+      const value = step * 10 ** k;
+      if (value < 10 ** left || value > 10 ** right) continue;
+      const place = x(value);
+      picture.append(svg("line", { class: "grid", x1: place, x2: place, y1: edge.top, y2: bottom }));
+      picture.append(svg("text", { x: place, y: bottom + 18, "text-anchor": "middle" }, step === 1 ? power(k) : number(value)));
+    }
   }
   picture.append(svg("text", { x: (edge.left + width - edge.right) / 2, y: height - 8, "text-anchor": "middle" }, "coning frequency in Hz"));
   const middle = (edge.top + bottom) / 2;

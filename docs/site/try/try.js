@@ -10,12 +10,16 @@ const make = (tag, attributes = {}, ...children) => {
 
 const DEFAULT = ["euler", "rk4", 2];
 const STYLES = ["kept-1", "kept-2", "kept-3"]; // of the curves that the reader keeps
+const PATIENCE = 3000; // ms
 const FROM_DISK =
   "Your browser does not start Python in a page from disk: serve the site with make docs-serve, and open " +
   "http://127.0.0.1:8000/try.html.";
 
 let manifest = null;
 let worker = null;
+let isStarted = false; // whether strapgen answers already in the worker
+let isBusy = false;
+let patience = 0; // timer after which a worker that is busy with an older question is replaced
 let id = 0; // number of the newest question
 let shown = {}; // what has come back for it, by part
 let files = new Map(); // texts of the generated files by name, and their targets
@@ -72,8 +76,23 @@ function ask(question) {
       fail(`The page could not start Python: ${event.message ?? "a file is missing"}`);
     };
   }
+  clearTimeout(patience);
+  if (isBusy && isStarted) {
+    patience = setTimeout(() => {
+      dismiss();
+      ask(question);
+    }, PATIENCE);
+  }
   worker.postMessage({ ...question, id, manifest });
+  isBusy = true;
   $("stop").hidden = false;
+}
+
+/** Ends the worker, in the middle of whatever it does. */
+function dismiss() {
+  worker?.terminate();
+  worker = null;
+  isStarted = isBusy = false;
 }
 
 function derive(choice) {
@@ -82,14 +101,16 @@ function derive(choice) {
   shown = {};
   $("results").classList.add("stale");
   $("results").setAttribute("aria-busy", "true");
-  progress("Waiting for the worker");
+  progress("Waiting for Python");
   document.title = `${nameOf(choice)} - strapgen`;
   ask({ choice });
 }
 
 function receive(message) {
-  if (message.type === "progress") progress(message.text, message.share);
-  if (message.id !== undefined && message.id !== id) return;
+  if (message.type === "started") isStarted = true;
+  if (message.type === "progress" && (!message.id || message.id === id)) progress(message.text, message.share);
+  if (message.id !== id) return;
+  clearTimeout(patience);
   if (message.type === "failed") fail(message.message);
   if (message.type === "done") finish();
   if (message.type === "part") {
@@ -109,6 +130,8 @@ function progress(text, share) {
 }
 
 function finish() {
+  isBusy = false;
+  clearTimeout(patience);
   $("status").textContent = shown.formula?.error ? "" : `${nameOf(chosen())} is shown below.`;
   $("bar").hidden = true;
   $("stop").hidden = true;
@@ -117,8 +140,7 @@ function finish() {
 }
 
 function fail(line) {
-  worker?.terminate();
-  worker = null;
+  dismiss();
   finish();
   $("status").textContent = "";
   showError(line);
@@ -144,8 +166,8 @@ function showFormula(result) {
   const tiles = [["order", result.order], ...Object.entries(result.operations).sort((a, b) => b[1] - a[1]).map(([name, count]) => [COUNTS[name], count])];
   tiles.push(["temporaries", result.temporaries]);
   $("cost").replaceChildren(...tiles.map(([name, value]) => make("div", {}, make("dt", { textContent: name }), make("dd", { textContent: value }))));
-  $("cost").firstChild.title = result.order_text;
-  $("notes").replaceChildren(...result.notes.map((note) => make("li", { textContent: note })));
+  const order = result.order_text.replace(/^./, (letter) => letter.toUpperCase());
+  $("notes").replaceChildren(...[`${order}.`, ...result.notes].map((note) => make("li", { textContent: note })));
   showRows($("formula"), result.rows);
   for (const name of Object.values(BOXES)) $(name).textContent = "Working …";
   for (const name of ["tabs", "legend", "reading"]) $(name).replaceChildren();

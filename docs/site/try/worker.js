@@ -12,17 +12,23 @@ const WORKING = {
   series: "Deriving the truncation error",
 };
 
-const say = (text, share) => postMessage({ type: "progress", text, share });
+const say = (text, share, id) => postMessage({ type: "progress", text, share, id });
 /** Lets messages in that came meanwhile. */
 const pause = () => new Promise((resolve) => setTimeout(resolve, 0));
 
-/** Counts the bytes of all that is fetched, and tells the page. */
+/** Counts the bytes of all that is fetched, and tells the page, also of what is missing. */
 function countBytes(total) {
   const plainFetch = self.fetch;
   let bytes = 0;
   self.fetch = async (...request) => {
-    const response = await plainFetch(...request);
-    if (!response.ok || !response.body) return response;
+    const response = await plainFetch(...request).catch((error) => ({ statusText: error.message }));
+    if (!response.ok) {
+      // Python would wait for ever for some of its files.
+      const name = String(request[0].url ?? request[0]).replace(/^.*\/try\//, "");
+      const message = `try/${name} could not be loaded: ${response.status ?? ""} ${response.statusText}`.replace(/ +/g, " ");
+      postMessage({ type: "failed", id: latest, message });
+      throw new Error(message);
+    }
     const counter = new TransformStream({
       transform(chunk, controller) {
         bytes += chunk.byteLength;
@@ -38,11 +44,8 @@ function countBytes(total) {
 async function start(manifest) {
   countBytes(manifest.bytes);
   importScripts("pyodide/pyodide.js");
-  const archive = fetch(manifest.archive).then((response) => {
-    if (!response.ok) throw new Error(`${manifest.archive}: ${response.status} ${response.statusText}`);
-    return response.arrayBuffer();
-  });
-  archive.catch(() => {}); // it is awaited below, where its failure is told
+  const archive = fetch(manifest.archive).then((response) => response.arrayBuffer());
+  archive.catch(() => {}); // it is awaited below
   const python = await loadPyodide({ indexURL: new URL("pyodide/", self.location).href });
   python.unpackArchive(await archive, "zip", { extractDir: "/strapgen" });
   python.runPython("import sys; sys.path.insert(0, '/strapgen')");
@@ -50,13 +53,14 @@ async function start(manifest) {
   python.runPython("import sympy");
   say("Starting strapgen", 1);
   answer = python.pyimport("answers").answer;
+  postMessage({ type: "started" });
 }
 
 async function derive({ id, choice, parts = PARTS, terms = 1 }) {
   for (const part of parts) {
     await pause();
     if (id !== latest) return;
-    say(WORKING[part]);
+    say(WORKING[part], undefined, id);
     const result = JSON.parse(answer(part, ...choice, ...(part === "series" ? [terms] : [])));
     postMessage({ type: "part", id, part, result });
     if (result.error && part === "formula") break;
