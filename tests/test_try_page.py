@@ -15,6 +15,7 @@ from browser_checks import HEIGHT, WIDTHS, opened, served
 
 from strapgen import choose_step, derive, generate, lower, rounding_bounds, vibration
 from strapgen.catalogue.method_names import METHODS
+from strapgen.catalogue.methods import tableaux
 from strapgen.rounding import proved
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -61,6 +62,18 @@ def test_the_drift_on_a_cone_scales_with_angle_and_time():
         )
         # Sines and sums of a few terms in double precision on both sides.
         assert coning["drift"][k] * alpha**2 / sampling == pytest.approx(abs(rates.error), rel=1e-9)
+
+
+def test_a_tableau_of_the_reader_is_a_method(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "site" / "try" / "page.html").read_text()
+    text = page.split("<textarea")[1].split(">", 1)[1].split("</textarea>")[0]
+    code = answered("code", "euler", "own", 1, text)
+    program = lower(derive("euler", tableaux.read("own.toml"), 1))
+    assert code["files"]["c"] == generate(program, "c").step_files
+    assert code["command"].startswith("strapgen generate euler --tableau own.toml --increments 1")
+    line = answered("formula", "euler", "own", 1, text.replace('"3/4"', '"1/2"'))["error"]
+    assert line.startswith("own.toml: ") and "\n" not in line
 
 
 def test_what_strapgen_refuses_is_one_line():
@@ -160,6 +173,7 @@ def test_the_page_derives_what_the_command_line_does(runnable, browser, tmp_path
             assert window.view().faults() == [], width
         assert page.locator("#try-cost").inner_text().split()[:4] == ["order", "4", "multiplications", "38"]
         _compare(window)
+        _own(window)
         _refuse(window)
         assert window.view().faults() == []
 
@@ -177,6 +191,19 @@ def _compare(window):
     before = page.locator("#try-reading").inner_text()
     page.get_by_label("Read the curve at").press("ArrowRight")
     assert page.locator("#try-reading").inner_text() != before
+
+
+def _own(window):
+    """Choose the tableau of the page, and then spoil it."""
+    page = window.page
+    page.get_by_label("Method", exact=True).select_option("own")
+    page.wait_for_function(SHOWN, arg="euler-own-2", timeout=PATIENCE)
+    assert "Heun's third-order method" in page.locator("#try-title").inner_text()
+    assert page.get_by_role("tab", name="euler_heun_s_third_order_method_2.c").count() == 1
+    assert window.view().faults() == []
+    page.get_by_label("Butcher tableau").fill("order = 3")
+    page.get_by_role("button", name="Derive").click()
+    page.get_by_role("alert").filter(has_text="own.toml").wait_for(timeout=PATIENCE)
 
 
 def _refuse(window):

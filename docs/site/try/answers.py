@@ -11,6 +11,7 @@ from typing import Any
 
 import strapgen
 from strapgen.analysis.error_analysis import analyse
+from strapgen.catalogue.methods import tableaux
 from strapgen.ir.program import Program
 from strapgen.reports.error_analysis.series import series_latex, series_text
 from strapgen.reports.formulas import as_latex
@@ -18,6 +19,9 @@ from strapgen.reports.html_report.mathml import equations
 from strapgen.rounding import proved, rounding_bounds
 from strapgen.symbolic.kernel import Kernel
 
+#: The method that stands for the reader's own tableau, and the file that the tableau goes into.
+OWN = "own"
+FILE = Path(f"{OWN}.toml")
 #: Bounds of rounding that were proved when the site was built, beside this file.
 BOUNDS = Path(__file__).with_name("bounds.json")
 #: Targets whose code needs neither numpy to print nor a word length to choose.
@@ -34,8 +38,14 @@ def _load_bounds() -> None:
 
 
 @lru_cache(maxsize=4)
-def _derived(algorithm: str, method: str, increments: int) -> tuple[strapgen.Choice, Kernel, Program]:
-    choice = strapgen.choose_step(algorithm, method, increments)
+def _derived(
+    algorithm: str, method: str, increments: int, tableau: str
+) -> tuple[strapgen.Choice, Kernel, Program]:
+    if method == OWN:
+        FILE.write_text(tableau)
+        choice = strapgen.choose_step(algorithm, tableaux.read(FILE), increments)
+    else:
+        choice = strapgen.choose_step(algorithm, method, increments)
     kernel = strapgen.derive(choice)
     return choice, kernel, strapgen.lower(kernel)
 
@@ -46,15 +56,17 @@ def _rows(latex: str) -> list[dict[str, Any]]:
     return [{"left": row.left, "parts": list(row.parts)} for row in equations(body)]
 
 
-def formula(algorithm: str, method: str, increments: int) -> dict[str, Any]:
+def formula(algorithm: str, method: str, increments: int, tableau: str = "") -> dict[str, Any]:
     """Return the formulas of a step, its order and the operations of its program.
 
     Parameters
     ----------
     algorithm, method : str
     increments : int
+    tableau : str, optional
+        The reader's own, in TOML, for the method `OWN`.
     """
-    _, kernel, program = _derived(algorithm, method, increments)
+    _, kernel, program = _derived(algorithm, method, increments, tableau)
     assert kernel.order is not None
     return {
         "kernel": kernel.name,
@@ -70,18 +82,21 @@ def formula(algorithm: str, method: str, increments: int) -> dict[str, Any]:
     }
 
 
-def code(algorithm: str, method: str, increments: int) -> dict[str, Any]:
+def code(algorithm: str, method: str, increments: int, tableau: str = "") -> dict[str, Any]:
     """Return the generated files of a step, by target, and why its header states no bound of rounding, if so.
 
     Parameters
     ----------
     algorithm, method : str
     increments : int
+    tableau : str, optional
+        The reader's own, in TOML, for the method `OWN`.
     """
     _load_bounds()
-    _, _, program = _derived(algorithm, method, increments)
+    _, _, program = _derived(algorithm, method, increments, tableau)
     files = {target: strapgen.generate(program, target).step_files for target in TARGETS}
-    options = f"{algorithm} --method {method} --increments {increments}"
+    of_method = f"--tableau {FILE}" if method == OWN else f"--method {method}"
+    options = f"{algorithm} {of_method} --increments {increments}"
     return {
         "files": files,
         "command": f"strapgen generate {options} --target {{target}} --out firmware",
@@ -89,7 +104,7 @@ def code(algorithm: str, method: str, increments: int) -> dict[str, Any]:
     }
 
 
-def coning(algorithm: str, method: str, increments: int) -> dict[str, Any]:
+def coning(algorithm: str, method: str, increments: int, tableau: str = "") -> dict[str, Any]:
     """Return the drift on a cone whose half-angle is 1 rad, for samples that are 1 s apart, by frequency.
 
     It is of second order in the half-angle, and inversely proportional to the time between samples.
@@ -98,8 +113,10 @@ def coning(algorithm: str, method: str, increments: int) -> dict[str, Any]:
     ----------
     algorithm, method : str
     increments : int
+    tableau : str, optional
+        The reader's own, in TOML, for the method `OWN`.
     """
-    choice, _, _ = _derived(algorithm, method, increments)
+    choice, _, _ = _derived(algorithm, method, increments, tableau)
     response = strapgen.vibration.of(choice)
     rates = [response.rates(ratio, increments, theta_x=1, theta_y=1, phase=math.pi / 2) for ratio in RATIOS]
     return {
@@ -110,17 +127,19 @@ def coning(algorithm: str, method: str, increments: int) -> dict[str, Any]:
     }
 
 
-def series(algorithm: str, method: str, increments: int, terms: int = 1) -> dict[str, Any]:
+def series(algorithm: str, method: str, increments: int, tableau: str = "", terms: int = 1) -> dict[str, Any]:
     """Return what one step loses on any smooth motion, as a series in the length of the step.
 
     Parameters
     ----------
     algorithm, method : str
     increments : int
+    tableau : str, optional
+        The reader's own, in TOML, for the method `OWN`.
     terms : int, optional
         Number of terms that are not zero.
     """
-    choice, _, _ = _derived(algorithm, method, increments)
+    choice, _, _ = _derived(algorithm, method, increments, tableau)
     analysis = analyse(choice, terms=terms)
     return {"rows": _rows(series_latex(analysis)), "text": series_text(analysis), "terms": terms}
 

@@ -9,6 +9,7 @@ const make = (tag, attributes = {}, ...children) => {
 };
 
 const DEFAULT = ["euler", "rk4", 2];
+const OWN = "own"; // the method that stands for the reader's tableau
 const STYLES = ["kept-1", "kept-2", "kept-3"]; // of the curves that the reader keeps
 const PATIENCE = 3000; // ms
 const FROM_DISK =
@@ -46,6 +47,7 @@ function select(choice) {
     if (![...list.options].some((option) => option.value === value)) list.append(new Option(value, value));
     list.value = value;
   }
+  $("own").hidden = choice[1] !== OWN;
 }
 
 function fillForm() {
@@ -55,6 +57,7 @@ function fillForm() {
     for (const [name, text] of Object.entries(methods)) group.append(new Option(`${name}: ${text}`, name));
     $("method").append(group);
   }
+  $("method").append(make("optgroup", { label: "Yours" }, new Option("your Butcher tableau", OWN)));
   for (let k = 1; k <= manifest.most_increments; k += 1) $("increments").append(new Option(String(k), String(k)));
   for (const list of $("form").querySelectorAll("select")) {
     list.disabled = false;
@@ -83,7 +86,7 @@ function ask(question) {
       ask(question);
     }, PATIENCE);
   }
-  worker.postMessage({ ...question, id, manifest });
+  worker.postMessage({ tableau: $("tableau").value, ...question, id, manifest });
   isBusy = true;
   $("stop").hidden = false;
 }
@@ -356,7 +359,10 @@ function wire() {
   });
   for (const name of ["angle", "sampling"]) $(name).addEventListener("input", draw);
   new ResizeObserver(() => requestAnimationFrame(draw)).observe($("chart"));
-  $("form").addEventListener("submit", (event) => event.preventDefault());
+  $("form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    derive(chosen());
+  });
   window.addEventListener("hashchange", () => {
     const choice = choiceOf(location.hash);
     if (choice) derive(choice);
@@ -365,7 +371,7 @@ function wire() {
 
 async function begin() {
   if (location.protocol === "file:") {
-    $("form").hidden = true;
+    $("form").hidden = $("progress").hidden = true;
     showError(FROM_DISK);
     return;
   }

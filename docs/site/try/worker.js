@@ -56,12 +56,12 @@ async function start(manifest) {
   postMessage({ type: "started" });
 }
 
-async function derive({ id, choice, parts = PARTS, terms = 1 }) {
+async function derive({ id, choice, tableau, parts = PARTS, terms = 1 }) {
   for (const part of parts) {
     await pause();
     if (id !== latest) return;
     say(WORKING[part], undefined, id);
-    const result = JSON.parse(answer(part, ...choice, ...(part === "series" ? [terms] : [])));
+    const result = JSON.parse(answer(part, ...choice, tableau, ...(part === "series" ? [terms] : [])));
     postMessage({ type: "part", id, part, result });
     if (result.error && part === "formula") break;
   }
