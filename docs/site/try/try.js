@@ -126,7 +126,9 @@ function receive(message) {
 }
 
 function progress(text, share) {
-  $("status").textContent = `${text} …`;
+  const line = `${text} …`;
+  // Written only when it changes: a screen reader says it each time.
+  if ($("status").textContent !== line) $("status").textContent = line;
   $("bar").hidden = false;
   if (share === undefined) $("bar").removeAttribute("value");
   else $("bar").value = share;

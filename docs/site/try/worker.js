@@ -33,7 +33,7 @@ function countBytes(total) {
       transform(chunk, controller) {
         bytes += chunk.byteLength;
         const share = Math.min(bytes / total, 1);
-        say(`Loading Python and SymPy, ${(bytes / 1e6).toFixed(1)} of ${(total / 1e6).toFixed(1)} MB`, share);
+        say(`Loading Python and SymPy, ${(total / 1e6).toFixed(0)} MB`, share);
         controller.enqueue(chunk);
       },
     });
