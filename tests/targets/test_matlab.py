@@ -139,6 +139,13 @@ def test_a_run_has_the_bits_of_c(has_octave, rng):
         assert one.propagate(increments[:, :0]).shape == other.propagate(increments[:, :0]).shape
 
 
+def test_no_samples_give_no_results(has_octave):
+    for words in DOUBLE:
+        kernel = of_sources(sources_of(catalogue.choose(*words)))
+        results = kernel.evaluate([np.empty((0, *s.shape)) for s in kernel.function.inputs], (0,))
+        assert [result.shape for result in results] == [(0, *s.shape) for s in kernel.function.outputs]
+
+
 def test_the_root_of_a_negative_number_is_no_number_as_in_c(has_octave):
     kernel = of_sources(sources_of(catalogue.choose("euler-angles-from-dcm")))
     text = kernel.sources.files["euler_angles_from_dcm.m"]
