@@ -20,7 +20,7 @@ from strapgen.backends.evaluators import Array
 #: would lie in the same lines of the cache.
 _WIDTH = 8000
 #: Steps in one elementwise pass, whose temporaries stay in the nearest caches.
-_PASS = 1 << 13
+_PASS = 12_000
 
 
 class BlockedScan:
