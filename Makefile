@@ -10,7 +10,7 @@ DOCS := .venv/.ready-for-docs
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
   check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page \
-  evidence-tools faults fuzz release-check docs docs-serve
+  evidence-tools language-tools site-tools faults fuzz release-check docs docs-serve
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -24,6 +24,8 @@ help:
 	@echo "make cost      measure generated/COST.md anew, with the tools of make firmware-tools"
 	@echo "make firmware-tools  on Debian: cross compilers, QEMU and CMake, for strapgen cost and tests"
 	@echo "make evidence-tools  on Debian: the tools above, Frama-C, Gappa, Coq, fuzzers and more processors, for make evidence"
+	@echo "make language-tools  on Debian: compilers of C++ and Rust, and Octave, for the tests of those languages"
+	@echo "make site-tools  on Debian: Chromium and npm, for make docs and the tests of its pages"
 	@echo "make evidence  have independent tools examine the standard catalogue; hold generated/EVIDENCE.md to what they say"
 	@echo "make evidence-page  the same, and write generated/EVIDENCE.md anew"
 	@echo "make faults    kill commands, fill disks and move clocks for four minutes; see that nothing wrong is left"
@@ -78,6 +80,16 @@ firmware-tools:
 evidence-tools: firmware-tools $(READY)
 	apt-get install -y -qq --no-install-recommends $(EXAMINERS)
 	$(BIN)/python -m pip install --disable-pip-version-check -e '.[evidence]'
+
+language-tools:
+	apt-get update -qq
+	apt-get install -y -qq --no-install-recommends g++ rustc octave
+
+# Node's own packages bring npm too.
+site-tools:
+	apt-get update -qq
+	apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core
+	command -v npm > /dev/null || apt-get install -y -qq --no-install-recommends npm
 
 # Python and pytest keep what they have compiled of the tests: a tenth of the next run.
 test test-long: export PYTHONDONTWRITEBYTECODE =

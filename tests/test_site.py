@@ -61,7 +61,7 @@ def test_pages_of_the_site_have_names_of_their_own():
 def test_the_table_of_a_section_repeats_the_questions_of_the_index():
     asked = navigation.questions(ROOT)
     assert asked["docs/fixed-point.md"].startswith("How do I get C for a processor without floating point")
-    assert asked["examples/toy_target/README.md"] == "How do I generate another language?"
+    assert asked["examples/toy_target/README.md"] == "How do I bring a language that strapgen does not have?"
     firmware = navigation.SECTIONS[0]
     text = staging.landing(ROOT, firmware, "# Firmware\n")
     assert f"| [](/fixed-point.md) | {asked['docs/fixed-point.md']} |" in text

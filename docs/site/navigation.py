@@ -60,6 +60,7 @@ SECTIONS = (
         "You bring a method, an algorithm, a motion or a language of your own.",
         (
             "docs/own-algorithms.md",
+            "docs/languages.md",
             "examples/toy_target/README.md",
             "docs/architecture.md",
             "CONTRIBUTING.md",

@@ -125,7 +125,7 @@ SAID = {
         "name",
     ): "simulate takes a Motion, not 'euler'; strapgen.motion('euler', ...) makes one",
     ("settings", "number"): "settings is 3; strapgen.Settings is needed",
-    ("target", "settings"): "target is Settings; a name is needed: numpy, c, c-float, c-fixed, fixed-model",
+    ("target", "settings"): f"target is Settings; a name is needed: {', '.join(strapgen.TARGETS)}",
 }
 
 

@@ -21,8 +21,8 @@ def through_gyro(
 ) -> Assessment:
     """Return the assessment of an algorithm that sees angles through a gyro of second order.
 
-    The gyro's transfer function is G = 1/(1 + 2 zeta s/w + s^2/w^2). A product of two angles has the factor |G|^2, one
-    of an angle and a velocity the factor G; the true rate stays what it is.
+    The gyro's transfer function is G = 1/(1 + 2 zeta s/w + s^2/w^2). A product of two angles has the factor
+    ``|G|^2``, one of an angle and a velocity the factor G; the true rate stays what it is.
 
     Parameters
     ----------

@@ -23,13 +23,14 @@ from strapgen.simulation.motions import GENERAL
 from strapgen.simulation.runs import Run, simulate
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.kernel import Kernel
+from strapgen.targets.registry import TARGETS
 
 #: The back end that the others are compared with: it shows all rounding.
 REFERENCE = "exact"
 #: The steps in s of the ladder on which the order is measured, and the length of its runs in s: those of the command.
 LADDER, LADDER_DURATION = ("1/2", "1/4", "1/8", "1/16", "1/32", "1/64", "1/128"), "2"
 #: The targets whose code is shown.
-TARGETS = ("numpy", "c", "c-float", "c-fixed", "fixed-model")
+SHOWN = ("numpy", "c", "c-float", "c-fixed", "fixed-model")
 
 
 @dataclass(frozen=True)
@@ -132,9 +133,9 @@ def dossier(
             raise  # the settings do not go with the kernel
         reason = str(error)
     sources = {
-        target: generated_sources.sources(choice, target, settings if "fixed" in target else None)
-        for target in TARGETS
-        if fixed is not None or "fixed" not in target
+        name: generated_sources.sources(choice, name, settings if TARGETS[name].fixed else None)
+        for name in SHOWN
+        if fixed is not None or not TARGETS[name].fixed
     }
     runs = None
     if choice.increments is not None and kernel.companions is not None:
