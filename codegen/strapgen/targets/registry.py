@@ -129,6 +129,8 @@ BUILT_IN = {
     ),
     "cpp": Target("C++17 in double: one header", _EMIT.format("cpp"), language="C++", number="double"),
     "cpp-float": Target("C++17 in float: one header", _EMIT.format("cpp"), language="C++", number="float"),
+    "rust": Target("Rust in double: one module", _EMIT.format("rust"), language="Rust", number="double"),
+    "rust-float": Target("Rust in float: one module", _EMIT.format("rust"), language="Rust", number="float"),
     "matlab": Target(
         "MATLAB and GNU Octave in double: one function file",
         _EMIT.format("matlab"),

@@ -103,7 +103,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "command": command,
         "contract": contract_lines.of_program(program, name, command, rounding),
         "normalizing": contract.upkeep_text(program, target=target),
-        "rounding": rounding_text(rounding, program, "MATLAB or Octave", ""),
+        "rounding": rounding_text(rounding, program, "", "MATLAB or Octave"),
         "signature": _signature(name, outputs, [signal.name for signal in program.inputs]),
         "code": _code(program, printer),
         "functions": {node.kind for node in nodes},
