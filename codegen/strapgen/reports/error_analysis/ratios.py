@@ -51,7 +51,7 @@ def ratio_latex(comparison: Ratio) -> str:
             rows.append((r"\text{ratio}", text))
         else:
             rows.append((r"\text{ratio}", "N / D"))
-            rows += zip("ND", map(expression_latex, sp.fraction(comparison.expression)), strict=True)
+            rows += zip(("N", "D"), map(expression_latex, sp.fraction(comparison.expression)), strict=True)
     return f"% {comparison.quantity}, {comparison.motion} motion\n{equations(rows)}"
 
 
