@@ -19,6 +19,7 @@ import pytest
 import typer.main
 
 import strapgen
+from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.methods import tableaux
 from strapgen.cli import app, main
 
@@ -255,6 +256,7 @@ LONG_COMMANDS = (
     "strapgen coning --samples 1 --previous ",
     "strapgen coning --samples 3 --previous ",
     "strapgen cost ",
+    "strapgen derive examples/three_samples.py --constant ",
     "strapgen derive separate ",
     "strapgen derive torques ",
     "strapgen design ",
@@ -270,6 +272,7 @@ LONG_COMMANDS = (
     "strapgen rate-table ",
     "strapgen redundancy ",
     "strapgen series euler ",
+    "strapgen series examples/three_samples.py --constant ",
     "strapgen simulate ",
     "strapgen stability ",
     "strapgen statements",
@@ -408,6 +411,48 @@ def test_the_commands_on_own_algorithms(shown_files, capsys):
     assert {shlex.split(command)[1] for command in commands} == shown
     for command in commands:
         run(command, capsys)
+
+
+# The page on the lecture of 1984
+
+
+def lecture_rows() -> list[tuple[set[int], str]]:
+    """Return the equations and the rest of each row of the page on the lecture of 1984."""
+    rows = []
+    for first, rest in re.findall(r"^\| (\([\d() ,to]+\)) \|(.*)$", DOCS["paths/savage-1984"], re.MULTILINE):
+        rows.append((equations(first), rest))
+    return rows
+
+
+def equations(text: str) -> set[int]:
+    """Return the numbers that stand in parentheses, with those between the ends of a range."""
+    numbers = set()
+    for low, high in re.findall(r"\((\d+)\)(?: to \((\d+)\))?", text):
+        numbers |= set(range(int(low), int(high or low) + 1))
+    return numbers
+
+
+def test_the_lecture_is_followed_from_its_first_equation_to_its_last():
+    shown = [number for numbers, _ in lecture_rows() for number in numbers]
+    assert sorted(shown) == [*range(1, 84)]
+
+
+def test_kernels_have_the_equations_of_the_lecture_that_the_page_says():
+    kernels = [
+        (numbers, name) for numbers, rest in lecture_rows() for name in re.findall(r"`([a-z0-9-]+)`", rest)
+    ]
+    foreign = {
+        "dcm-from-euler",
+        "dcm-orthonormalize-first-order",
+    }  # their source is the thesis, as the page says
+    wrong = []
+    for numbers, name in kernels:
+        source = strapgen.derive(name).source
+        if (SAVAGE not in source) if name not in foreign else (SAVAGE in source):
+            wrong.append((name, source))
+        elif name not in foreign and not numbers <= equations(source):
+            wrong.append((name, sorted(numbers), source))
+    assert len(kernels) > 30 and wrong == []
 
 
 # The page for reviewers
