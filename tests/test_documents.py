@@ -195,6 +195,8 @@ def test_every_link_leads_somewhere():
     broken = []
     for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES):
         for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+            if "://" in target:
+                continue
             name, _, anchor = target.partition("#")
             path = page.parent / name if name else page
             if not path.exists() or (anchor and anchor not in anchors(path.read_text())):
@@ -453,6 +455,28 @@ def test_kernels_have_the_equations_of_the_lecture_that_the_page_says():
         elif name not in foreign and not numbers <= equations(source):
             wrong.append((name, sorted(numbers), source))
     assert len(kernels) > 30 and wrong == []
+
+
+# The page on other tools
+
+
+def test_the_page_on_other_tools_has_the_numbers_of_the_benchmark():
+    """Compare the table with the rows of the first section of the results, which the benchmark writes."""
+    section = (ROOT / "benchmarks" / "RESULTS.md").read_text().split("\n## ")[1]
+    assert section.startswith("Euler parameters, two angle increments")
+    rows = {
+        cells[1]: cells
+        for line in section.splitlines()
+        if len(cells := [c.strip() for c in line.split("|")]) > 10
+    }
+    tools, ours = ("SymForce", "CasADi", "wrenfold"), rows["strapgen"]
+    for kind, words in (("staged", "same textbook formulas"), ("transition", "given the transition form")):
+        measured = [rows[f"{tool}, {kind}"] for tool in tools]
+        for column, what in ((2, "multiplications"), (9, "ns a step")):
+            values = " | ".join(row[column] for row in (ours, *measured))
+            assert f"| {what}, {words} | {values} |" in DOCS["comparison"]
+    values = " | ".join(row[11] for row in (ours, *(rows[f"{tool}, staged"] for tool in tools)))
+    assert f"| ms from symbols to source | {values} |" in DOCS["comparison"]
 
 
 # The page for reviewers
