@@ -418,6 +418,25 @@ def test_the_commands_on_own_algorithms(shown_files, capsys):
         run(command, capsys)
 
 
+# The page on fixed point
+
+
+@pytest.mark.long
+def test_back_ends_side_by_side_are_those_of_the_command(capsys):
+    (block,) = re.findall(
+        r"^```\n(euler-rk4-2: coning motion.*?)^```", DOCS["fixed-point"], re.MULTILINE | re.DOTALL
+    )
+    (command,) = [c for c in shown_commands(DOCS["fixed-point"]) if "--backend numpy,c,c-float" in c]
+    shown, printed = (text.strip().splitlines() for text in (block, run(command, capsys)))
+    assert shown[:5] == printed[:5]
+    for ours, theirs in zip(shown[5:], printed[5:], strict=True):
+        (name, *numbers), (also, *others) = ours.split(), theirs.split()
+        assert (name, numbers[7:]) == (also, others[7:])
+        # Integers are the same everywhere; time and bytes are those of a machine, doubles those of its library.
+        if name.startswith("c-fixed"):
+            assert numbers[:5] == others[:5]
+
+
 # The page on the lecture of 1984
 
 
