@@ -105,17 +105,15 @@ BACKENDS: Mapping[str, Entry] = _Backends(
         ),
         "rust": Entry("generated Rust in double, compiled", "rust", *_C[:2], by_default=False),
         "rust-float": Entry("generated Rust in float, compiled", "rust-float", *_C[:2], by_default=False),
-<<<<<<< HEAD
         "rust-fixed32": Entry(
             "generated Rust in 32-bit fixed point, compiled", "rust-fixed", *_C_FIXED[:2], word=32, by_default=False
-=======
+        ),
         "octave": Entry(
             "generated MATLAB in double, run by GNU Octave",
             "matlab",
             "octave.OctaveEvaluator",
             "octave.OctaveBackend",
             by_default=False,
->>>>>>> main
         ),
         "fixed-model": Entry(
             "integer model of the fixed-point C in Python, any word",
