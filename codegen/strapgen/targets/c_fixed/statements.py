@@ -146,7 +146,7 @@ class StatementPrinter:
             case IntegerMaximum((first, *others)):
                 lines.append(self._declared(kind, name, self.narrowed(first, value), note, constant=False))
                 for other in others:
-                    lines.append(f"if ({self.scaled(other)} > {self.as_wide(name)}) {{")
+                    lines.append(_branch("if", self.scaled(other), ">", self.as_wide(name)))
                     lines.append(_assigned(name, self.narrowed(other, value)))
                     lines.append("}")
             case IntegerSelection(cases, otherwise):
@@ -172,7 +172,7 @@ class StatementPrinter:
         lines = [_noted(self.unset(kind, value.name), note)]
         for number, (left, right, result) in enumerate(cases):
             word = "if" if not number else "} else if"
-            lines.append(f"{word} ({self.scaled(left)} >= {self.scaled(right)}) {{")
+            lines.append(_branch(word, self.scaled(left), ">=", self.scaled(right)))
             lines.append(_assigned(value.name, self.narrowed(result, value)))
         lines.append("} else {")
         lines.append(_assigned(value.name, self.narrowed(otherwise, value)))
@@ -182,7 +182,11 @@ class StatementPrinter:
         limits = self.constant(value.low), self.constant(value.high)
         condition = f"if (({name} < {limits[0]}) || ({name} > {limits[1]})) {{"
         if len(condition) > 90:
-            condition = condition.replace(" || ", "\n        || ")
+            first, second = condition.split(" || ")
+            indent = " " * 12
+            condition = (
+                f"{fill_expression(first, indent, 95)}\n        {fill_expression(f'|| {second}', indent, 87)}"
+            )
         return [condition, f"    {self.refusal()}", "}"]
 
     def narrow(self, text: str, value: Value, shift: int = 0) -> str:
@@ -222,7 +226,7 @@ class StatementPrinter:
             word = self.word.residual
             text = self.cast(word, f"({left})")
             if self.checks:  # a call that a later check refuses leaves it as it was
-                lines.append(f"{self.start(word, f'next_{feedback.name}')} {text};")
+                lines.append(self._declared(word, f"next_{feedback.name}", text))
             else:
                 lines.append(f"{place} = {text};")
             total = f"{name}_sum"
@@ -365,6 +369,12 @@ def _exactly(term: Term) -> str:
     ):
         return ""
     return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
+
+
+def _branch(word: str, left: str, sign: str, right: str) -> str:
+    """Return the head of a branch that compares two numbers."""
+    text = f"{word} ({left} {sign} {right}) {{"
+    return text if len(text) <= 95 else f"{word} ({left}\n        {sign} {right}) {{"
 
 
 def _assigned(name: str, text: str) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.sources import Sources
 from strapgen.targets import definitions
@@ -85,5 +83,7 @@ def _array(kind: str, size: int) -> str:
 def _word(bits: int, name: str) -> Word:
     """Return the types of a word as C++ calls them."""
     word = WORDS[bits].within(name)
-    fields = ("type", "residual", "fast", "wide", "magnitude")
-    return replace(word, **{field: standard(getattr(word, field)) for field in fields})
+    wide, magnitude = standard(word.wide), standard(word.magnitude)
+    if bits == 64:  # several headers may define the same type
+        wide, magnitude = "int128", "uint128"
+    return Word(bits, standard(word.type), standard(word.residual), standard(word.fast), wide, magnitude)
