@@ -18,7 +18,8 @@ from strapgen.targets.names import Naming
 from strapgen.targets.rust.text import module_name
 from strapgen.toolchain.shared_libraries import COMPILERS
 
-SIMULATE = "simulate euler --motion constant --set x_deg_s=1 --step 1 --duration 2 --backend rust"
+#: A step that no other test compiles: what is loaded already needs no compiler.
+SIMULATE = "simulate euler --method rk1 --increments 7 --motion constant --step 1 --duration 2 --backend rust"
 
 
 @pytest.fixture
@@ -72,7 +73,7 @@ def test_modules_stand_in_one_crate_without_the_standard_library_and_never_panic
     said = built(rustc, tmp_path, 2021, "-Copt-level=1", "--emit=asm")
     assert said.returncode == 0, said.stderr
     assembly = (tmp_path / "lib.s").read_text()
-    assert names[0] in assembly
+    assert any(name in assembly for name in names)  # what is short is expanded where it is called
     assert "panic" not in assembly
 
 
