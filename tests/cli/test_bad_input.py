@@ -328,7 +328,7 @@ BAD = {
     f"simulate nonsense.py {CONSTANT}": "nonsense.py: algorithm() returned int; a Kernel is needed",
     f"compare none.py {CONSTANT}": "algorithm none.py is no file",
     # fixed point
-    "generate euler --word 32": "the options of fixed point go with --target c-fixed or fixed-model, not with numpy",
+    "generate euler --word 32": "the options of fixed point go with --target c-fixed or cpp-fixed or rust-fixed",
     "generate euler --target c --carry full": "the options of fixed point go with --target c-fixed",
     "generate --all --carry full": "a fixed-point option does not go with it",
     "generate euler --target c-fixed --word 24": "word is 24; in C it is 16, 32, 64 bits",

@@ -139,8 +139,8 @@ def _true_change(ring: Any, motion: tuple[Any, Any], part: str) -> list[Powers]:
 def _of_error(part: str, power: int, one: Coefficients, rates: int) -> Iterator[Equation]:
     """Yield a condition for every term of an error."""
     notation = with_forces(TEXT, rates)
-    for covariant, polynomial in one.items():
-        for monomial, number in polynomial.items():
+    for covariant, polynomial in sorted(one.items()):
+        for monomial, number in sorted(polynomial.items()):
             term = covariant_text({covariant: {monomial: sp.S.One}}, notation=notation)
             yield Equation(f"h^{power}, {part}: {term}", power, exact(number))
 
