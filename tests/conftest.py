@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import browser_checks
+import built_site
 import hypothesis
 import numpy as np
 import pytest
@@ -62,6 +63,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="FILE",
         type=Path,
         help="append a line to FILE for every kernel that tests compile, and compile each when it is needed",
+    )
+    parser.addoption(
+        "--site",
+        metavar="FOLDER",
+        type=Path,
+        help="test the pages of a site that was built before, and every one of them",
     )
     parser.addoption(
         "--all-combinations",
@@ -235,3 +242,9 @@ def browser() -> Iterator[Browser]:
     """Headless Chromium, for the checks of pages in browser_checks.py."""
     with browser_checks.chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="session")
+def site(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the documentation as a site, for the checks of its pages."""
+    return built_site.folder(tmp_path_factory, pytestconfig.getoption("site"))

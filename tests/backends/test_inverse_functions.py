@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import generated
+from precisions import precision
 
 import strapgen
 from strapgen.backends import BACKENDS, of_sources
@@ -63,5 +64,5 @@ def test_whole_turns_are_taken_off(backend_name):
 
 def test_the_resolution_is_the_targets(backend_name):
     evaluator = made(backend_name, lambda x: x + resolution)
-    wanted = {"c-float": 2.0**-23, "c-fixed32": 2.0**-30, "c-fixed16": 2.0**-14, "fixed-model": 2.0**-30}
-    assert float(evaluator(0.0)[0]) == wanted.get(backend_name, 2.0**-52)
+    wanted = {"float": 2.0**-23, "32": 2.0**-30, "16": 2.0**-14}
+    assert float(evaluator(0.0)[0]) == wanted.get(precision(backend_name), 2.0**-52)

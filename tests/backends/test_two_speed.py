@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from precisions import precision, single
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
@@ -59,7 +60,7 @@ def test_coning_is_that_of_the_source_in_every_slow_cycle(algorithm, backend_nam
     turned = rotations(runner, run.attitudes)
     drift = (turned[:-1].inv() * turned[1:]).as_rotvec()[:, 2] / SLOW
     # In floating point what an attitude near 1 is rounded to; in fixed point its certified bound.
-    allowed = 2e-5 if backend_name == "c-float" else 1e-10
+    allowed = 2e-5 if single(backend_name) else 1e-10
     if BACKENDS[backend_name].fixed:
         coning, attitude = runner.loops[0].fixed.outputs[1], runner.loops[1].fixed.outputs[0]
         allowed = 8 * float(attitude.errors[0] + 10 * coning.errors[0]) / SLOW
@@ -147,14 +148,12 @@ def test_back_ends_agree(algorithm, sculling, backend_name, rng):
     assert run.attitudes.shape == (12, *made(algorithm, sculling, "numpy").state.shape)
     assert run.velocity_changes.shape == (4, 3)
     attitude, velocity = {
-        "numpy": (0, 0),
-        "c": (0, 1e-15),
+        "double": (0, 0 if backend_name == "numpy" else 1e-15),
         "exact": (1e-15, 1e-15),
-        "c-float": (4e-6, 4e-6),
-        "c-fixed32": (2e-8, 1e-6),
-        "fixed-model": (2e-8, 1e-6),
-        "c-fixed16": (2e-3, 3e-2),
-    }[backend_name]
+        "float": (4e-6, 4e-6),
+        "32": (2e-8, 1e-6),
+        "16": (2e-3, 3e-2),
+    }[precision(backend_name)]
     assert np.abs(run.attitudes - wanted.attitudes).max() <= attitude
     assert np.abs(run.velocity_changes - wanted.velocity_changes).max() <= velocity
 

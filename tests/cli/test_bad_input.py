@@ -426,7 +426,7 @@ BAD = {
     "generate eulr": "algorithm 'eulr' is not known",
     "generate euler --method heun": "method 'heun' is not known",
     "generate euler --increments 9": "increments is 9",
-    "generate euler --target rust": "target 'rust' is not known; allowed: numpy, c, c-float",
+    "generate euler --target basic": "target 'basic' is not known; allowed: numpy, c, c-float",
     "generate euler --format csv": "format 'csv' is not known",
     "generate --check": "an algorithm is needed, or --all",
     "generate euler --target numpy --name step": "--name goes with targets in C, C++ and Rust, not with numpy",

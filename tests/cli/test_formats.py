@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from gathering import each
 
+from strapgen.backends import BACKENDS
 from strapgen.cli import main
 from strapgen.reports.plots import figures
 
@@ -21,7 +22,7 @@ WAVE = "--step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --ph
 #: Commands with what their first column is called, and the number of rows.
 TABLES = {
     "list": ("kind", None),
-    "list backends": ("name", 7),
+    "list backends": ("name", len(BACKENDS)),
     "tableau rk4": ("row", 5),
     "coning --samples 3": ("older", 2),
     "window show window-3-3": ("name", 50),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from precisions import precision
 
 from strapgen import evaluator
 from strapgen.ir.fixed_settings import Settings
@@ -24,7 +25,7 @@ from strapgen.systems.two_speed_sources import ALGORITHMS
 LOG = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"
 GRAVITY = 9.80665
 #: What rounding may make of ten seconds of the wobble, in rad: 250 slow cycles of some last places of what is summed.
-ROUNDING = {"c-float": 2e-5, "c-fixed32": 1e-7, "c-fixed16": 2e-3, "fixed-model": 1e-7}
+ROUNDING = {"float": 2e-5, "32": 1e-7, "16": 2e-3}
 
 
 @pytest.fixture(scope="module")
@@ -46,12 +47,12 @@ def test_a_wobble_on_one_spot(algorithm, sculling, backend_name, wobble):
     computed = evaluator("dcm-from-euler-angles")(made.angles)
     # The first cycle knows no increment before it: a twelfth of their cross product is missing.
     missing = np.linalg.norm(np.cross(*wobble.increments[:2])) / 12
-    allowed = 1.5 * missing + ROUNDING.get(backend_name, 1e-9)
+    allowed = 1.5 * missing + ROUNDING.get(precision(backend_name), 1e-9)
     assert np.linalg.norm(drift_between(computed, true), axis=-1).max() <= allowed
     # (47) leaves out the square of the angle of a slow cycle: up to a sixth of it, of the whole reaction to gravity.
     angle = np.linalg.norm(wobble.increments, axis=-1).max() * 4
     left_out = angle**2 / 6 * GRAVITY
-    rounding = {"c-float": 1e-4, "c-fixed16": 0.2}.get(backend_name, 1e-6)
+    rounding = {"float": 1e-4, "16": 0.2}.get(precision(backend_name), 1e-6)
     assert np.abs(made.velocity_changes - [0, 0, GRAVITY]).max() <= left_out + rounding
 
 

@@ -128,6 +128,8 @@ BUILT_IN = {
     ),
     "cpp": Target("C++17 in double: one header", _EMIT.format("cpp"), language="C++", number="double"),
     "cpp-float": Target("C++17 in float: one header", _EMIT.format("cpp"), language="C++", number="float"),
+    "rust": Target("Rust in double: one module", _EMIT.format("rust"), language="Rust", number="double"),
+    "rust-float": Target("Rust in float: one module", _EMIT.format("rust"), language="Rust", number="float"),
     "fixed-model": Target(  # a reference that tests generate: it is not in the tree
         "Python on integers, bit for bit what the fixed-point C computes",
         _EMIT.format("integer_model"),

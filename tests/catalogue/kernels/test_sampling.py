@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from derived import kernel, program
+from precisions import single
 
 import strapgen
 from strapgen.catalogue import choose
@@ -85,7 +86,7 @@ def test_every_back_end_stays_within_its_bound(name, backend_name, rng):
     if strapgen.BACKENDS[backend_name].fixed:
         settings = Settings(word=strapgen.BACKENDS[backend_name].word or 32, ranges=RANGES[name])
     evaluator = strapgen.evaluator(choice, backend_name, settings)
-    unit = Fraction(1, 1 << (24 if backend_name == "c-float" else 53))
+    unit = Fraction(1, 1 << (24 if single(backend_name) else 53))
     for _ in range(10):
         inputs = {
             signal.name: [Fraction(int(k), 512) for k in rng.integers(-64, 65, size=3)]

@@ -73,7 +73,7 @@ def generate(
     if output.check:
         _check_files(files, output, format)
         return
-    paths = {path.name: path for path in output.write(files)}
+    paths = dict(zip(files, output.write(files), strict=True))
     written = [[paths[name] for name in group] for group in groups]
     rows = zip(results, written, strict=True)
     if format == "json":
