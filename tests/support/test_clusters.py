@@ -124,9 +124,7 @@ def machines(tmp_path):
 
 @pytest.mark.long
 # What is killed knows nothing of the study: every study and every kill once.
-@pytest.mark.parametrize(
-    ("study", "killed"), zip(STUDIES, ["scheduler", "worker-1", "client"], strict=True)
-)
+@pytest.mark.parametrize(("study", "killed"), zip(STUDIES, ["scheduler", "worker-1", "client"], strict=True))
 def test_a_study_is_completed_whatever_is_killed(tmp_path, machines, study, killed):
     def client(*more):
         words = [*STUDIES[study], "--format", "json", *more]
