@@ -21,6 +21,7 @@ import typer.main
 import strapgen
 from strapgen.catalogue.methods import tableaux
 from strapgen.cli import app, main
+from strapgen.toolchain import octave
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "paths").glob("*.md")])
@@ -319,6 +320,8 @@ def test_a_command_of_a_page(command, workplace, capsys):
     compiler = re.search(r"--cross (\S+)", command)
     if compiler is not None and shutil.which(compiler[1]) is None:
         pytest.skip(f"{compiler[1]} is not on this machine")
+    if "octave" in command and (reason := octave.missing()):
+        pytest.skip(reason)
     if command.startswith("strapgen evidence"):  # one tool will do: make evidence runs them all
         command += " --tool z3"
     run(command, capsys)

@@ -98,7 +98,7 @@ def test_bad_targets_and_settings_are_refused_before_anything_is_derived(monkeyp
 
     choice, cases = (
         choose("euler"),
-        [("rust", None, "'rust' is not known"), ("c", 16, "takes no fixed-point")],
+        [("cobol", None, "'cobol' is not known"), ("c", 16, "takes no fixed-point")],
     )
     for target, word, message in [*cases, ("c-fixed", 24, "word is 24; in C it is 16, 32, 64 bits")]:
         with pytest.raises(InputError, match=message):

@@ -12,6 +12,7 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.support.exceptions import CompilerError
+from strapgen.toolchain import octave
 from strapgen.toolchain.shared_libraries import COMPILERS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,6 +53,24 @@ def test_the_program_of_a_language_prints_what_the_page_says(language, workplace
     subprocess.run([compiler.path(), *shlex.split(build)[1:]], cwd=workplace, check=True)
     said = subprocess.run(shlex.split(run), cwd=workplace, capture_output=True, text=True, check=True)
     assert f"It prints `{said.stdout.strip()}`" in section
+
+
+def test_the_script_in_matlab_prints_what_the_page_says(workplace):
+    if reason := octave.missing():
+        pytest.skip(reason)
+    section = PAGE.partition("\n## MATLAB and GNU Octave\n")[2].partition("\n## ")[0]
+    generate, normalize, run, _ = commands(section)
+    for command in (generate, normalize):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(command)[1:])
+        assert stop.value.code in (0, None)
+    script = Path("examples/languages/run_step.m")
+    assert run == f"octave-cli {script}"
+    said = subprocess.run([*octave.command(), script], capture_output=True, text=True, check=True)
+    assert f"It prints `{said.stdout.strip()}` too" in section
+    texts = [script.read_text(), Path("out/matlab/euler_rk4_2.m").read_text()]
+    for excerpt in re.findall(r"^```matlab\n(.*?)^```", section, flags=re.MULTILINE | re.DOTALL):
+        assert any(excerpt in text for text in texts), excerpt
 
 
 @pytest.mark.parametrize("language", SECTIONS)

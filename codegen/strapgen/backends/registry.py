@@ -102,6 +102,13 @@ BACKENDS: Mapping[str, Entry] = _Backends(
         "cpp-float": Entry("generated C++ in float, compiled", "cpp-float", *_C[:2], by_default=False),
         "rust": Entry("generated Rust in double, compiled", "rust", *_C[:2], by_default=False),
         "rust-float": Entry("generated Rust in float, compiled", "rust-float", *_C[:2], by_default=False),
+        "octave": Entry(
+            "generated MATLAB in double, run by GNU Octave",
+            "matlab",
+            "octave.OctaveEvaluator",
+            "octave.OctaveBackend",
+            by_default=False,
+        ),
         "fixed-model": Entry(
             "integer model of the fixed-point C in Python, any word",
             "fixed-model",

@@ -47,7 +47,8 @@ class Target:
     words : tuple of int, optional
         The lengths of word that it supports in fixed point, in bits; None stands for any.
     language : str, optional
-        Language of the files: those in "C", "C++" and "Rust" are compiled, those in "Python" imported.
+        Language of the files: those in "C", "C++" and "Rust" are compiled, those in "Python" imported, and those
+        in "MATLAB" run by Octave.
     number : str, optional
         Type of the numbers in floating point: "double" or "float".
     folder : str, optional
@@ -91,9 +92,9 @@ class Target:
         return self.language == "C"
 
     @property
-    def linked(self) -> bool:
-        """Whether a compiler makes a library of its files, whose functions have names that a user can choose."""
-        return self.language in ("C", "C++", "Rust")
+    def nameable(self) -> bool:
+        """Whether a user can choose the name of its functions, whose loops stand in files of their own."""
+        return self.language in ("C", "C++", "Rust", "MATLAB")
 
     def function(self) -> Callable[[Any, str], Sources]:
         """Return the function that prints a program, imported if it is a text."""
@@ -130,6 +131,12 @@ BUILT_IN = {
     "cpp-float": Target("C++17 in float: one header", _EMIT.format("cpp"), language="C++", number="float"),
     "rust": Target("Rust in double: one module", _EMIT.format("rust"), language="Rust", number="double"),
     "rust-float": Target("Rust in float: one module", _EMIT.format("rust"), language="Rust", number="float"),
+    "matlab": Target(
+        "MATLAB and GNU Octave in double: one function file",
+        _EMIT.format("matlab"),
+        language="MATLAB",
+        number="double",
+    ),
     "fixed-model": Target(  # a reference that tests generate: it is not in the tree
         "Python on integers, bit for bit what the fixed-point C computes",
         _EMIT.format("integer_model"),
