@@ -30,7 +30,7 @@ LONG = {
     ("dcm", "coning-combined"): (3, 3, 0),
     ("euler", "window-3-3"): (1, 3, 3),
     ("cayley-klein", "taylor4"): (2, 0, 0),
-    ("dcm", "crouch-grossman3"): (2, 0, 0),
+    ("euler", "crouch-grossman3"): (2, 0, 0),
     ("euler", "magnus6"): (3, 0, 0),
     ("dcm", "munthe-kaas4"): (2, 0, 0),
     ("euler", "fit-exact"): (2, 0, 0),
