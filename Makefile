@@ -10,7 +10,7 @@ DOCS := .venv/.ready-for-docs
 
 .PHONY: help demo test test-long test-modules mutants check bench generate clean \
   check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page \
-  evidence-tools language-tools site-tools faults fuzz release-check docs docs-serve
+  evidence-tools language-tools site-tools faults fuzz release-check docs docs-serve docs-check
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
@@ -33,6 +33,7 @@ help:
 	@echo "make release-check  build the archives in dist/; have the wheel pass the tests away from the sources"
 	@echo "make docs      build the documentation as a site that needs no network: docs/_build/html/index.html"
 	@echo "make docs-serve  the same, at http://127.0.0.1:8000 for the page that runs strapgen in the browser"
+	@echo "make docs-check  build the site; open each of its pages in Chromium, on a telephone and on a desk"
 	@echo "make clean     remove .venv and what tools left behind"
 
 $(READY): pyproject.toml
@@ -181,13 +182,16 @@ $(DOCS): $(READY)
 	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e '.[docs]'
 	@touch $@
 
-# npm brings MathJax, which the pages then have beside them.
+# npm and PyPI bring MathJax and Python for the browser, which the pages then have beside them.
 docs: $(DOCS)
 	$(BIN)/python docs/site/build.py
 	@echo "docs/_build/html/index.html"
 
 docs-serve: docs
 	$(BIN)/python -m http.server --bind 127.0.0.1 --directory docs/_build/html 8000
+
+docs-check: docs $(TOOLS)
+	$(BIN)/python -m pytest -n auto --dist worksteal -m long --site docs/_build/html tests/test_site.py tests/test_try_page.py
 
 clean:
 	rm -rf docs/_build .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import ctypes
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -47,11 +48,12 @@ def least(candidates: dict, rounds: int, clock=time.perf_counter) -> dict[str, f
     return times
 
 
-def built(folder: Path) -> ctypes.CDLL:
-    """Return the loops and the chain, compiled into one library."""
+def built(folder: Path, narrow: bool) -> ctypes.CDLL:
+    """Return the loops and the chain, compiled into one library; narrow ones take no instructions beyond SSE2."""
     sources = generated_sources.sources(choose("euler"), "c")
     for name, text in sources.files.items():
-        (folder / name).write_text(text)
+        chosen = re.sub(r"__builtin_cpu_supports\(.*?\)", "0", text) if narrow else text
+        (folder / name).write_text(chosen)
     code = Path(__file__).with_name("throughput.c")
     library = folder / "throughput.so"
     options = [*compiler.C_FLAGS, "-shared", "-fPIC", f"-I{folder}", str(code), "-o", str(library), "-lm"]
@@ -100,11 +102,11 @@ def show(what: str, ratio: float, limit: float | None = None) -> None:
     print(f"{what:<78}{ratio:>8.2f}" + ("" if limit is None else f"   at most {limit:g}"))
 
 
-def loops(rounds: int) -> None:
+def loops(rounds: int, narrow: bool = False) -> None:
     """Print the ratios of loops in C."""
     increments = np.random.default_rng(1).normal(scale=0.002, size=(RUNS * STEPS, 2, 3))
     with tempfile.TemporaryDirectory() as folder:
-        calls = Loops(built(Path(folder)), increments)
+        calls = Loops(built(Path(folder), narrow), increments)
         times = least(
             {
                 "chain": calls.chain,
@@ -114,16 +116,17 @@ def loops(rounds: int) -> None:
             },
             rounds,
         )
+    print("with SSE2 alone:" if narrow else "with all that the processor has:")
     print(f"ns a step: {', '.join(f'{name} {t / len(increments) * 1e9:.2f}' for name, t in times.items())}")
     show(
         "a single run with history / the bare chain of quaternion products",
         times["history"] / times["chain"],
-        1.35,
+        None if narrow else 1.35,
     )
     show(
         f"one of {RUNS} runs without history / a single run, on one core",
         times["many"] / times["single"],
-        0.55,
+        None if narrow else 0.55,
     )
 
 
@@ -187,7 +190,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=40)
     options = parser.parse_args()
-    loops(5 * options.rounds)
+    for narrow in (False, True):
+        loops(5 * options.rounds, narrow)
     back_ends(max(1, options.rounds // 4))
     processes(max(1, options.rounds // 4))
 

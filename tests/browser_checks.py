@@ -78,6 +78,8 @@ CLIPPED = """() => {
   }
   return [...clipped];
 }"""
+#: Waits until the page has been drawn at its new size.
+NEXT_FRAME = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 SCROLLS = "() => document.scrollingElement.scrollWidth > document.scrollingElement.clientWidth"
 
 
@@ -192,12 +194,18 @@ def looked_at(browser: Browser, address: str | Path, width: int, dark: bool = Fa
 
 
 def faults(browser: Browser, address: str | Path, widths: tuple[int, ...] = WIDTHS) -> list[str]:
-    """Return a line for everything that is wrong with a page in any of the windows; none for a good page."""
-    return [
-        f"{address} at {width} px: {fault}"
-        for width in widths
-        for fault in looked_at(browser, address, width).faults()
-    ]
+    """Return a line for everything that is wrong with a page in a window of any width; none for a good page.
+
+    The page is loaded once, at the first width; then its window is drawn wider or narrower.
+    """
+    lines = []
+    with opened(browser, address, widths[0]) as window:
+        window.page.wait_for_load_state("networkidle")
+        for width in widths:
+            window.page.set_viewport_size({"width": width, "height": HEIGHT})
+            window.page.evaluate(NEXT_FRAME)
+            lines += [f"{address} at {width} px: {fault}" for fault in window.view().faults()]
+    return lines
 
 
 class _Handler(SimpleHTTPRequestHandler):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import browser_checks
+import built_site
 import hypothesis
 import numpy as np
 import pytest
@@ -26,8 +27,8 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.plots import figures
 from strapgen.support.exceptions import CompilerError
 from strapgen.targets import BUILT_IN
-from strapgen.toolchain import compiler, shared_libraries
-from strapgen.toolchain.shared_libraries import COMPILERS, LibraryCompiler
+from strapgen.toolchain import compiler, octave, shared_libraries
+from strapgen.toolchain.shared_libraries import COMPILERS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -43,6 +44,11 @@ BACKEND_NAMES = [
 #: Back ends on which Cayley-Klein parameters run too. Their programs are those of Euler parameters but for names, which
 #: tests/lowering proves: numpy and C in double show it, the others would compile the same C again.
 CAYLEY_KLEIN = ("numpy", "c")
+
+
+#: Where all tests run in Octave too, which takes a program a thousand times as long as C: what holds of the behaviour
+#: there, and of the bits of all kernels in tests/targets/test_matlab.py, says the rest.
+IN_OCTAVE = Path(__file__).parent / "backends"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -64,6 +70,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="append a line to FILE for every kernel that tests compile, and compile each when it is needed",
     )
     parser.addoption(
+        "--site",
+        metavar="FOLDER",
+        type=Path,
+        help="test the pages of a site that was built before, and every one of them",
+    )
+    parser.addoption(
         "--all-combinations",
         action="store_true",
         help="with -m long: run every combination of the parameters of a test",
@@ -78,19 +90,22 @@ def pytest_pycollect_makeitem(collector: pytest.Collector, obj: object) -> list[
     return [] if is_quick and any(mark.name == "long" for mark in marks) else None
 
 
-def _compiler_of(values: Mapping[str, object]) -> LibraryCompiler | None:
-    """Return the compiler of shared libraries that a test needs, by the back end among its parameters."""
+def _other_language(values: Mapping[str, object]) -> Callable[[], object] | None:
+    """Return what finds the compiler of C++ or Rust or the Octave that a test needs, by the back end it runs on."""
     for name in (values.get(key) for key in ("backend_name", "backend", "name")):
         target = BACKENDS[name].target if isinstance(name, str) and name in BACKENDS else ""
         if target in BUILT_IN and BUILT_IN[target].language in COMPILERS:
-            return COMPILERS[BUILT_IN[target].language]
+            return COMPILERS[BUILT_IN[target].language].path
+        if target == "matlab":
+            return octave.command
     return None
 
 
-def _missing(compiler: LibraryCompiler) -> str:
-    """Return why a compiler cannot be used; "" if it is there."""
+@cache
+def _missing(program: Callable[[], object]) -> str:
+    """Return why a program cannot be used; "" if it is there."""
     try:
-        compiler.path()
+        program()
     except CompilerError as error:
         return str(error)
     return ""
@@ -113,15 +128,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left = []
     for item in items:
         values = getattr(getattr(item, "callspec", None), "params", {})
-        compiler = _compiler_of(values)
+        program = _other_language(values)
         if (
-            compiler is not None
+            program is not None
         ):  # the code of C in another language: tests of the targets hold the bits to those of C
             item.add_marker(pytest.mark.long)
-            item.add_marker(pytest.mark.skipif(bool(missing := _missing(compiler)), reason=missing))
+            item.add_marker(pytest.mark.skipif(bool(missing := _missing(program)), reason=missing))
         if any(map(_is_of_cayley_klein, values.values())):
             item.add_marker(pytest.mark.long)
-        if values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN:
+        if (program is octave.command and IN_OCTAVE not in item.path.parents) or (
+            values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN
+        ):
             left.append(item)
     _leave_out(config, items, left)
     mark_combinations(items)
@@ -235,3 +252,9 @@ def browser() -> Iterator[Browser]:
     """Headless Chromium, for the checks of pages in browser_checks.py."""
     with browser_checks.chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="session")
+def site(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the documentation as a site, for the checks of its pages."""
+    return built_site.folder(tmp_path_factory, pytestconfig.getoption("site"))

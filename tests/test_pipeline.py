@@ -98,7 +98,7 @@ def test_bad_targets_and_settings_are_refused_before_anything_is_derived(monkeyp
 
     choice, cases = (
         choose("euler"),
-        [("rust", None, "'rust' is not known"), ("c", 16, "takes no fixed-point")],
+        [("cobol", None, "'cobol' is not known"), ("c", 16, "takes no fixed-point")],
     )
     for target, word, message in [*cases, ("c-fixed", 24, "word is 24; in C it is 16, 32, 64 bits")]:
         with pytest.raises(InputError, match=message):
@@ -113,7 +113,9 @@ def test_settings_beside_a_quantized_program_are_refused():
 
 def test_targets_take_their_own_kind_of_program():
     program = strapgen.lower(strapgen.derive("euler-product"))
-    with pytest.raises(InputError, match="target c does not take fixed-point programs; these do: c-fixed, f"):
+    with pytest.raises(
+        InputError, match="target c does not take fixed-point programs; these do: c-fixed, cpp-fixed"
+    ):
         targets.emit(strapgen.quantize(program), "c")
     with pytest.raises(InputError, match="target c-fixed takes quantized programs alone"):
         targets.emit(program, "c-fixed")

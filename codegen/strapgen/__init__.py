@@ -21,9 +21,9 @@ if _typing.TYPE_CHECKING:
     from strapgen.backends import exact as exact
     from strapgen.backends import increments as _increments
     from strapgen.backends.commit_late import CommitLate as CommitLate
-    from strapgen.backends.late_recording import recording_attitudes as recording_attitudes
-    from strapgen.backends.late_unit import GapError as GapError
-    from strapgen.backends.late_unit import SampleKind as SampleKind
+    from strapgen.backends.late.recording import recording_attitudes as recording_attitudes
+    from strapgen.backends.late.unit import GapError as GapError
+    from strapgen.backends.late.unit import SampleKind as SampleKind
     from strapgen.backends.registry import BACKENDS as BACKENDS
     from strapgen.backends.systems import SystemRunner as SystemRunner
     from strapgen.backends.systems import system_runner as system_runner
@@ -40,6 +40,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods import windows as windows
     from strapgen.catalogue.methods.samples import Samples as Samples
     from strapgen.catalogue.methods.samples import increments_signal as increments_signal
+    from strapgen.catalogue.methods.samples import turns_signal as turns_signal
+    from strapgen.catalogue.methods.samples import velocities_signal as velocities_signal
     from strapgen.catalogue.methods.tableau import Tableau as Tableau
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.methods.window import Window as Window
@@ -118,8 +120,8 @@ _NAMES = {
         "evaluator",
     ),
     "backends.commit_late": ("CommitLate",),
-    "backends.late_recording": ("recording_attitudes",),
-    "backends.late_unit": (
+    "backends.late.recording": ("recording_attitudes",),
+    "backends.late.unit": (
         "GapError",
         "SampleKind",
     ),
@@ -143,6 +145,8 @@ _NAMES = {
     "catalogue.methods.samples": (
         "Samples",
         "increments_signal",
+        "turns_signal",
+        "velocities_signal",
     ),
     "catalogue.methods.tableau": ("Tableau",),
     "catalogue.methods.tableaux": ("TABLEAUX",),

@@ -1,9 +1,10 @@
-"""Builds the site: stages the pages, runs Sphinx on them, then adds the page that runs strapgen in the browser.
+"""Builds the site: stages the pages, runs Sphinx on them, then adds what the page that runs strapgen needs.
 
     python docs/site/build.py [FOLDER]
 
-The site is in FOLDER/html; FOLDER is docs/_build unless another one is named. What npm brings stays in
-docs/_build/vendor for the next build.
+The site is in FOLDER/html; FOLDER is docs/_build unless another one is named. What registries bring stays in
+docs/_build/vendor and docs/_build/downloads for the next build. Where the registries cannot be reached, the site has
+all pages but for the program in the page that runs strapgen.
 """
 
 from __future__ import annotations
@@ -15,14 +16,20 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BUILD = ROOT / "docs" / "_build"
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE / "try")]
 
 import mathjax  # noqa: E402
 import reference_commands  # noqa: E402
 import reference_python  # noqa: E402
+import vendor  # noqa: E402
 from navigation import GENERATED, SECTIONS, site_file  # noqa: E402
 from repository_pages import MOST_PAGES, file_page, folder_page, tracked  # noqa: E402
-from staging import IMAGES, Stage, home, landing, rewritten  # noqa: E402
+from staging import IMAGES, Stage, home, landing, rewritten, with_program  # noqa: E402
+
+#: The page that runs strapgen in the browser, and its part of the page that is not Markdown.
+PROGRAM_PAGE = "docs/try.md"
+PROGRAM = HERE / "try" / "page.html"
+LEFT_OUT = "<p>This copy of the site was built without a network: strapgen does not run in it.</p>\n"
 
 
 class Site:
@@ -32,10 +39,12 @@ class Site:
     ----------
     stage : Stage
         Where the pages are written.
+    runs : bool, optional
+        Whether strapgen runs on its page.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+    def __init__(self, stage: Stage, runs: bool = True) -> None:
+        self.stage, self.runs = stage, runs
         self.files = tracked(ROOT)
         self.folders = {
             "/".join(name.split("/")[:n]) for name in self.files for n in range(1, name.count("/") + 1)
@@ -96,6 +105,9 @@ class Site:
             return file_page(path, text)
         if path == "README.md":
             text = home(text)
+        if path == PROGRAM_PAGE:
+            program = PROGRAM.read_text() if self.runs else LEFT_OUT
+            return with_program(rewritten(text, path, self.target), program)
         if path in self.landings:
             text = landing(ROOT, self.landings[path], text)
         return ("" if path in self.in_navigation else "---\norphan: true\n---\n") + rewritten(
@@ -120,16 +132,18 @@ def _copy(path: str) -> str:
     return f"repository/{path}.txt"
 
 
-def stage_pages(folder: Path) -> None:
+def stage_pages(folder: Path, runs: bool = True) -> None:
     """Write what Sphinx reads: the pages, the references and the files to which they link.
 
     Parameters
     ----------
     folder : Path
         Folder for the pages.
+    runs : bool, optional
+        Whether strapgen runs on its page.
     """
     stage = Stage(folder)
-    Site(stage).write_pages()
+    Site(stage, runs).write_pages()
     reference = next(section for section in SECTIONS if section.title == "Reference")
     site = Site(stage)
     stage.write("reference/index.md", rewritten(landing(ROOT, reference, ""), reference.landing, site.target))
@@ -155,13 +169,25 @@ def main(arguments: list[str]) -> int:
         mathjax.vendor(BUILD / "vendor" / "mathjax")
     except RuntimeError as error:
         return _refuse(f"docs: {error}")
-    stage_pages(out / "source")
+    runs = _brought(BUILD / "downloads")
+    stage_pages(out / "source", runs)
     options = ["-c", str(HERE), "-d", str(out / "doctrees"), "-W", "--keep-going", "-q", "-j", "auto"]
     options += ["-D", f"html_static_path=static,{BUILD / 'vendor'}"]
-    steps = [[sys.executable, "-m", "sphinx", "-b", "html", *options, str(out / "source"), str(out / "html")]]
-    if (HERE / "try" / "vendor.py").is_file():
-        steps.append([sys.executable, str(HERE / "try" / "vendor.py"), str(out / "html")])
-    return next((status for step in steps if (status := subprocess.run(step).returncode)), 0)
+    command = [sys.executable, "-m", "sphinx", "-b", "html", *options, str(out / "source"), str(out / "html")]
+    status = subprocess.run(command).returncode
+    if runs and not status:
+        vendor.write(out / "html" / "try", BUILD / "downloads")
+    return status
+
+
+def _brought(folder: Path) -> bool:
+    """Bring what the page that runs strapgen needs; say in one line that it is left out where that fails."""
+    try:
+        vendor.bring(folder)
+    except RuntimeError as error:
+        print(f"docs: strapgen does not run on its page, which is left out: {error}", file=sys.stderr)
+        return False
+    return True
 
 
 def _refuse(line: str) -> int:

@@ -51,6 +51,7 @@ html_theme = "furo"
 html_title = "strapgen"
 html_static_path = ["static"]  # build.py adds what npm brings
 html_css_files = ["site.css"]
+html_favicon = "static/icon.svg"
 html_copy_source = False
 html_show_sourcelink = False
 # A summary in a search result would be fetched, which browsers refuse on pages from disk.

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import shutil
-import subprocess
+import io
 import tarfile
-import tempfile
 from pathlib import Path
+
+import npm
 
 #: The last release in which one file holds all extensions, and all fonts as outlines; it loads nothing else.
 PACKAGE = "mathjax@3.2.2"
@@ -31,21 +29,10 @@ def vendor(folder: Path) -> None:
     """
     if all((folder / name).is_file() for name in _MEMBERS.values()):
         return
-    if shutil.which("npm") is None:
-        raise RuntimeError("npm is needed to bring MathJax: on Debian, apt-get install npm")
-    with tempfile.TemporaryDirectory() as place:
-        command = ["npm", "pack", "--silent", "--pack-destination", place, PACKAGE]
-        done = subprocess.run(command, capture_output=True, text=True)
-        archives = [*Path(place).glob("*.tgz")]
-        if done.returncode or not archives:
-            said = (done.stderr.strip() or "it brought no archive").splitlines()[-1]
-            raise RuntimeError(f"npm pack {PACKAGE} failed: {said}")
-        digest = base64.b64encode(hashlib.sha512(archives[0].read_bytes()).digest()).decode()
-        if digest != SHA512:
-            raise RuntimeError(f"{PACKAGE} from npm has the checksum {digest}, not {SHA512}")
-        folder.mkdir(parents=True, exist_ok=True)
-        with tarfile.open(archives[0]) as archive:
-            for member, name in _MEMBERS.items():
-                content = archive.extractfile(member)
-                assert content is not None
-                (folder / name).write_bytes(content.read())
+    data = npm.archive(PACKAGE, SHA512, "MathJax")
+    folder.mkdir(parents=True, exist_ok=True)
+    with tarfile.open(fileobj=io.BytesIO(data)) as archive:
+        for member, name in _MEMBERS.items():
+            content = archive.extractfile(member)
+            assert content is not None
+            (folder / name).write_bytes(content.read())

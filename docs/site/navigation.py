@@ -35,6 +35,12 @@ def _docs(*names: str) -> tuple[str, ...]:
 
 SECTIONS = (
     Section(
+        "Try it",
+        "docs/try.md",
+        "You want to see the formula, the code and the errors of an algorithm now, without an installation.",
+        (),
+    ),
+    Section(
         "Firmware",
         "docs/paths/firmware.md",
         "You need C for a processor, with bounds that you can sign and tests that come with it.",

@@ -95,6 +95,20 @@ def landing(root: Path, section: Section, text: str) -> str:
     )
 
 
+def with_program(text: str, program: str) -> str:
+    """Return the page that runs strapgen: its first section, the program, and the other sections.
+
+    Parameters
+    ----------
+    text : str
+        The page in Markdown.
+    program : str
+        The program in HTML.
+    """
+    first, heading, others = text.partition("\n## ")
+    return f"---\nhide-toc: true\n---\n{first}\n```{{raw}} html\n{program}```\n{heading}{others}"
+
+
 def _toctree(entries: list[tuple[str, str]], hidden: bool) -> str:
     lines = [f"{title} </{document(path)}>" if title else f"/{document(path)}" for title, path in entries]
     options = [":hidden:"] if hidden else [":maxdepth: 1"]

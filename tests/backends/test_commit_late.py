@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen.backends.commit_late import CommitLate
-from strapgen.backends.late_recording import recording_attitudes
-from strapgen.backends.late_unit import GapError, SampleKind
+from strapgen.backends.late.recording import recording_attitudes
+from strapgen.backends.late.unit import GapError, SampleKind
 from strapgen.catalogue.methods.late_filters import LateFilters, polynomial
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS

@@ -9,8 +9,8 @@ import pytest
 
 import strapgen
 from strapgen.backends.commit_late import CommitLate
-from strapgen.backends.late_recording import recording_attitudes
-from strapgen.backends.late_unit import GapError
+from strapgen.backends.late.recording import recording_attitudes
+from strapgen.backends.late.unit import GapError
 from strapgen.support.exceptions import InputError, InputTypeError
 
 #: Rounding of a few dozen steps, each of some hundred operations on numbers up to 1.

@@ -363,18 +363,19 @@ def test_a_killed_writer_leaves_one_folder_that_the_next_one_removes(folder, ren
     assert contents(folder) == few() and not staging.exists()
 
 
-def test_files_for_other_targets_stand_beside_the_tree(folder, capsys):
-    generate = ("generate", "--all", "--target", "cpp", "--out", str(folder))
+@pytest.mark.parametrize(("target", "ending"), [("cpp", ".hpp"), ("matlab", ".m")])
+def test_files_for_other_targets_stand_beside_the_tree(target, ending, folder, capsys):
+    generate = ("generate", "--all", "--target", target, "--out", str(folder))
     assert command(capsys, *generate)[0] == 0
-    headers = {name for name in contents(folder) if name.startswith("cpp/")}
-    assert contents(folder).keys() == few().keys() | headers
-    assert {Path(name).suffix for name in headers} == {".hpp"} and len(headers) == len(FEW)
+    others = {name for name in contents(folder) if name.startswith(f"{target}/")}
+    assert contents(folder).keys() == few().keys() | others
+    assert {Path(name).suffix for name in others} == {ending} and len(others) == len(FEW)
     assert command(capsys, *CHECK, str(folder))[0] == 0, "the tree is what it was"
     assert command(capsys, *generate, "--check")[0] == 0
-    (folder / "cpp" / "left.hpp").write_text((folder / min(headers)).read_text())
+    (folder / target / f"left{ending}").write_text((folder / min(others)).read_text())
     (folder / "c" / "mine.c").write_text("mine")
     status, said, error = command(capsys, *generate, "--check")
-    assert (status, "left.hpp" in said, "mine.c" in said) == (1, True, False)
-    assert "strapgen generate --all --target cpp rebuilds it" in error
+    assert (status, f"left{ending}" in said, "mine.c" in said) == (1, True, False)
+    assert f"strapgen generate --all --target {target} rebuilds it" in error
     assert command(capsys, *generate)[0] == 0
-    assert contents(folder).keys() == few().keys() | headers | {"c/mine.c"}
+    assert contents(folder).keys() == few().keys() | others | {"c/mine.c"}

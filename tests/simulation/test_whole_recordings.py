@@ -9,7 +9,7 @@ import pytest
 
 import strapgen
 from strapgen.backends.increments import pulses
-from strapgen.backends.late_recording import recording_attitudes
+from strapgen.backends.late.recording import recording_attitudes
 from strapgen.simulation.recording import Recording, propagate
 from strapgen.simulation.whole_recordings import covers, propagate_whole
 from strapgen.support.exceptions import InputError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -11,12 +12,13 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.support.exceptions import CompilerError
+from strapgen.toolchain import octave
 from strapgen.toolchain.shared_libraries import COMPILERS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "languages.md").read_text()
 #: The section of each language on the page.
-SECTIONS = {"C++": "C++"}
+SECTIONS = {"C++": "C++", "Rust": "Rust"}
 
 
 def commands(text: str) -> list[str]:
@@ -28,7 +30,8 @@ def commands(text: str) -> list[str]:
 @pytest.fixture
 def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder to work in, with the examples and what the first commands of the page generate."""
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    # A copy: Rust finds modules beside the folder in which the file really lies.
+    shutil.copytree(ROOT / "examples" / "languages", tmp_path / "examples" / "languages")
     monkeypatch.chdir(tmp_path)
     for command in commands(PAGE.partition("\nFiles that")[0]):
         with pytest.raises(SystemExit) as stop:
@@ -50,6 +53,24 @@ def test_the_program_of_a_language_prints_what_the_page_says(language, workplace
     subprocess.run([compiler.path(), *shlex.split(build)[1:]], cwd=workplace, check=True)
     said = subprocess.run(shlex.split(run), cwd=workplace, capture_output=True, text=True, check=True)
     assert f"It prints `{said.stdout.strip()}`" in section
+
+
+def test_the_script_in_matlab_prints_what_the_page_says(workplace):
+    if reason := octave.missing():
+        pytest.skip(reason)
+    section = PAGE.partition("\n## MATLAB and GNU Octave\n")[2].partition("\n## ")[0]
+    generate, normalize, run, _ = commands(section)
+    for command in (generate, normalize):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(command)[1:])
+        assert stop.value.code in (0, None)
+    script = Path("examples/languages/run_step.m")
+    assert run == f"octave-cli {script}"
+    said = subprocess.run([*octave.command(), script], capture_output=True, text=True, check=True)
+    assert f"It prints `{said.stdout.strip()}` too" in section
+    texts = [script.read_text(), Path("out/matlab/euler_rk4_2.m").read_text()]
+    for excerpt in re.findall(r"^```matlab\n(.*?)^```", section, flags=re.MULTILINE | re.DOTALL):
+        assert any(excerpt in text for text in texts), excerpt
 
 
 @pytest.mark.parametrize("language", SECTIONS)

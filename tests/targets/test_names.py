@@ -32,13 +32,15 @@ from strapgen.ir.sources import Sources
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
 from strapgen.targets import names
 from strapgen.targets.c import c_library
-from strapgen.toolchain import compiler
+from strapgen.targets.matlab import names as matlab_names
+from strapgen.toolchain import compiler, octave
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 STEPS = 19  # more than the loop in C takes together
 FIXED = Settings(carry="full")
 
-KEYWORDS = sorted(names._C_WORDS | {"lambda", "def", "None", "True", "yield", "match", "await", "print"})
+PYTHON_WORDS = {"lambda", "def", "None", "True", "yield", "match", "await", "print"}
+KEYWORDS = sorted(names._C_WORDS | PYTHON_WORDS | matlab_names._WORDS)
 MACROS = ["NULL", "INT32_MAX", "I", "EOF", "NAN", "M_PI", "SIZE_MAX", "INFINITY", "EDOM", "SIGINT"]
 FUNCTIONS = [
     "sqrt",
@@ -137,7 +139,8 @@ def printed_names() -> list[str]:
         texts = strapgen.generate(
             REFERENCE, target, FIXED if targets.TARGETS[target].fixed else None
         ).files.values()
-        language = names.PYTHON if target in ("numpy", "fixed-model") else names.C
+        kind = targets.TARGETS[target].language
+        language = {"Python": names.PYTHON, "MATLAB": matlab_names.MATLAB}.get(kind, names.C)
         found = found.union(*language.scopes(texts))
     return sorted(name for name in found if name.isidentifier())
 
@@ -254,6 +257,14 @@ def check_python(step: Lowered) -> np.ndarray:
     return result
 
 
+def check_matlab(step: Lowered) -> None:
+    """Check that the loop in MATLAB computes the run."""
+    sources = strapgen.generate(step.program, "matlab")
+    name, turns = f"{sources.function.name}_propagate", INCREMENTS[:, None].transpose(1, 2, 0)
+    (history,) = octave.call([sources], name, [START, turns], [(3, STEPS + 1)])
+    np.testing.assert_allclose(history.T, EXPECTED, rtol=0, atol=1e-14)
+
+
 def check_c(folder: Path, steps: list[Lowered], models: list[np.ndarray]) -> None:
     """Check that the C targets compile together and that their loops compute the run."""
     sources = [strapgen.generate(step.program, "c") for step in steps]
@@ -326,6 +337,9 @@ def test_every_target_computes_the_same_under_any_names(several, tmp_path_factor
         admission._require_formulas(kernel)
     steps = list(map(lowered, kernels))
     check_c(tmp_path_factory.mktemp("names"), steps, list(map(check_python, steps)))
+    if not octave.missing():
+        for one in steps:
+            check_matlab(one)
 
 
 #: Kernels that are called as functions, headers and keywords are.

@@ -15,9 +15,9 @@ import numpy as np
 from strapgen.backends import fitted
 from strapgen.backends.evaluators import Array
 from strapgen.backends.fixed_numbers import integers, numbers
-from strapgen.backends.late_unit import LateUnit, SampleKind
-from strapgen.backends.late_unit_fixed import LateUnitInFixedC, LateUnitOnIntegers, sample_integers
-from strapgen.backends.late_unit_in_c import LateUnitInC
+from strapgen.backends.late.unit import LateUnit, SampleKind
+from strapgen.backends.late.unit_fixed import LateUnitInFixedC, LateUnitOnIntegers, sample_integers
+from strapgen.backends.late.unit_in_c import LateUnitInC
 from strapgen.backends.registry import BACKENDS
 from strapgen.catalogue.methods.window import Window
 from strapgen.ir.fixed_interface import Argument

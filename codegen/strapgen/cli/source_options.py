@@ -33,12 +33,18 @@ class SourceOptions:
     ] = None
     name: Annotated[
         str | None,
-        option("--name", metavar="NAME", help="In C, C++ and Rust: name of the function and of its files."),
+        option(
+            "--name",
+            metavar="NAME",
+            help="In C, C++, Rust and MATLAB: name of the function and of its files.",
+        ),
     ] = None
     prefix: Annotated[
         str | None,
         option(
-            "--prefix", metavar="TEXT", help="In C, C++ and Rust: what the name of the function begins with."
+            "--prefix",
+            metavar="TEXT",
+            help="In C, C++, Rust and MATLAB: what the name of the function begins with.",
         ),
     ] = None
     with_runs: WithRuns = False
@@ -64,7 +70,7 @@ class SourceOptions:
 
     @property
     def for_libraries(self) -> str | None:
-        """The first option that is stated and goes with C, C++ and Rust; None if there is none."""
+        """The first option that is stated and goes with C, C++, Rust and MATLAB; None if there is none."""
         stated = {
             "--name": self.name is not None,
             "--prefix": self.prefix is not None,
@@ -82,8 +88,10 @@ class SourceOptions:
         """
         from strapgen.targets import TARGETS
 
-        if self.for_libraries and not TARGETS[target].linked:
-            raise InputError(f"{self.for_libraries} goes with targets in C, C++ and Rust, not with {target}")
+        if self.for_libraries and not TARGETS[target].nameable:
+            raise InputError(
+                f"{self.for_libraries} goes with targets in C, C++, Rust and MATLAB, not with {target}"
+            )
         if self.project and not TARGETS[target].compiled:
             raise InputError(f"--project goes with targets in C, not with {target}")
 

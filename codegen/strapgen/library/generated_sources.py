@@ -149,8 +149,8 @@ def sources(
 
     stated = _text(settings) if settings else ""
     targets.require(target, settings)
-    if naming.option and not targets.TARGETS[target].linked:
-        raise InputError(f"{naming.option} goes with targets in C, C++ and Rust, not with {target}")
+    if naming.option and not targets.TARGETS[target].nameable:
+        raise InputError(f"{naming.option} goes with targets in C, C++, Rust and MATLAB, not with {target}")
     code = targets.registry.identity(target)
     key = cache.digest(
         [

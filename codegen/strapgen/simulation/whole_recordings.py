@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from strapgen.backends.increments import pulses
-from strapgen.backends.late_recording import recording_attitudes
+from strapgen.backends.late.recording import recording_attitudes
 from strapgen.catalogue import Choice
 from strapgen.library.commit_late_sources import NORMALIZATIONS
 from strapgen.simulation.recording import History, Recording, record_interval

@@ -21,7 +21,7 @@ def fill_expression(text: str, indent: str, width: int = 99) -> str:
     What is still too long is wrapped at products and comparisons, then between arguments, then behind a parenthesis.
     """
     pieces = [text]
-    for place in (r" (?=[+?:-] )", r" (?=(?:[*/]|>=|[|]{2}) )", r"(?<=,) ", r"(?<=[\w)]\()(?=\S)"):
+    for place in (r" (?=[+?:-] )", r" (?=(?:\.?[*/]|>=|[|]{2}) )", r"(?<=[,;]) ", r"(?<=[\w)]\()(?=\S)"):
         pieces = [
             part
             for piece in pieces

@@ -12,11 +12,13 @@ _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 class Printer:
     """Prints nodes with the fewest parentheses that keep the order of the operations.
 
-    Sums and products look the same in every language here; a target's printer prints constants and functions.
+    Sums look the same in every language here; a target's printer prints constants and functions.
     """
 
     #: The step from 1 to the next number of the target.
     resolution = DOUBLE_RESOLUTION
+    #: The operators of a product and of a quotient.
+    times, over = "*", "/"
 
     def text(self, node: Node) -> str:
         """Return a node as source text."""
@@ -57,10 +59,10 @@ class Printer:
         return f"{self._inside(left, _SUM)} - {self._inside(right, _PRODUCT)}", _SUM
 
     def _multiply(self, left: Node, right: Node) -> tuple[str, int]:
-        return f"{self._inside(left, _PRODUCT)} * {self._inside(right, _UNARY)}", _PRODUCT
+        return f"{self._inside(left, _PRODUCT)} {self.times} {self._inside(right, _UNARY)}", _PRODUCT
 
     def _divide(self, left: Node, right: Node) -> tuple[str, int]:
-        return f"{self._inside(left, _PRODUCT)} / {self._inside(right, _UNARY)}", _PRODUCT
+        return f"{self._inside(left, _PRODUCT)} {self.over} {self._inside(right, _UNARY)}", _PRODUCT
 
     def _negate(self, argument: Node) -> tuple[str, int]:
         # Two signs in a row are another operator in C.

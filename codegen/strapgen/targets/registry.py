@@ -47,7 +47,8 @@ class Target:
     words : tuple of int, optional
         The lengths of word that it supports in fixed point, in bits; None stands for any.
     language : str, optional
-        Language of the files: those in "C", "C++" and "Rust" are compiled, those in "Python" imported.
+        Language of the files: those in "C", "C++" and "Rust" are compiled, those in "Python" imported, and those
+        in "MATLAB" run by Octave.
     number : str, optional
         Type of the numbers in floating point: "double" or "float".
     folder : str, optional
@@ -91,9 +92,9 @@ class Target:
         return self.language == "C"
 
     @property
-    def linked(self) -> bool:
-        """Whether a compiler makes a library of its files, whose functions have names that a user can choose."""
-        return self.language in ("C", "C++", "Rust")
+    def nameable(self) -> bool:
+        """Whether a user can choose the name of its functions, whose loops stand in files of their own."""
+        return self.language in ("C", "C++", "Rust", "MATLAB")
 
     def function(self) -> Callable[[Any, str], Sources]:
         """Return the function that prints a program, imported if it is a text."""
@@ -107,6 +108,7 @@ class Target:
 #: The target that other back ends use for what is not theirs, such as the conversion of a state to a matrix.
 NUMPY = "numpy"
 _EMIT = f"{__name__.rpartition('.')[0]}.{{}}.emit:emit"
+_FIXED = f"{__name__.rpartition('.')[0]}.{{}}.fixed:emit"
 #: The targets of strapgen by name.
 BUILT_IN = {
     NUMPY: Target(
@@ -128,6 +130,28 @@ BUILT_IN = {
     ),
     "cpp": Target("C++17 in double: one header", _EMIT.format("cpp"), language="C++", number="double"),
     "cpp-float": Target("C++17 in float: one header", _EMIT.format("cpp"), language="C++", number="float"),
+    "cpp-fixed": Target(
+        "C++17 in fixed point: one header, constexpr, with the bits of the C",
+        _FIXED.format("cpp"),
+        fixed=True,
+        words=(16, 32, 64),
+        language="C++",
+    ),
+    "rust": Target("Rust in double: one module", _EMIT.format("rust"), language="Rust", number="double"),
+    "rust-float": Target("Rust in float: one module", _EMIT.format("rust"), language="Rust", number="float"),
+    "rust-fixed": Target(
+        "Rust in fixed point: one module, no unsafe code, with the bits of the C",
+        _FIXED.format("rust"),
+        fixed=True,
+        words=(16, 32, 64),
+        language="Rust",
+    ),
+    "matlab": Target(
+        "MATLAB and GNU Octave in double: one function file",
+        _EMIT.format("matlab"),
+        language="MATLAB",
+        number="double",
+    ),
     "fixed-model": Target(  # a reference that tests generate: it is not in the tree
         "Python on integers, bit for bit what the fixed-point C computes",
         _EMIT.format("integer_model"),

@@ -17,6 +17,7 @@ import mpmath
 import sympy as sp
 
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.vibration.response import Form, Pair
 from strapgen.vibration.systems import T_L, T_M, F, T
@@ -72,6 +73,11 @@ class Assessment:
     recursion: bool
     computed: dict[Pair, Form]
     continuous: dict[Pair, Form]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel}: mean rate in {self.unit}, {len(self.computed)} pairs of channels"
 
     @cached_property
     def error(self) -> dict[Pair, Form]:
@@ -305,28 +311,34 @@ class Assessment:
         symbols = (F, *self.times)
         return {
             part: {
-                pair: (_Function.of(form.real, symbols), _Function.of(form.imaginary, symbols))
+                pair: (_Function(form.real, symbols), _Function(form.imaginary, symbols))
                 for pair, form in self.forms(part).items()
             }
             for part in PARTS
         }
 
 
-class _Function(NamedTuple):
+class _Function:
     """An expression and the sum of its terms' magnitudes as functions in double, and the expression in many digits."""
 
-    value: Callable[..., Any]
-    size: Callable[..., Any]
-    exactly: Callable[..., Any]
+    def __init__(self, expression: sp.Expr, symbols: Sequence[sp.Symbol]) -> None:
+        self._expression, self._symbols = expression, symbols
 
-    @classmethod
-    def of(cls, expression: sp.Expr, symbols: Sequence[sp.Symbol]) -> _Function:
-        size = sp.Add(*map(sp.Abs, sp.Add.make_args(expression)))
-        return cls(
-            sp.lambdify(symbols, expression, "numpy"),
-            sp.lambdify(symbols, size, "numpy"),
-            sp.lambdify(symbols, expression, "mpmath"),
-        )
+    @cached_property
+    def value(self) -> Callable[..., Any]:
+        function: Callable[..., Any] = sp.lambdify(self._symbols, self._expression, "numpy")
+        return function
+
+    @cached_property
+    def size(self) -> Callable[..., Any]:
+        size = sp.Add(*map(sp.Abs, sp.Add.make_args(self._expression)))
+        function: Callable[..., Any] = sp.lambdify(self._symbols, size, "numpy")
+        return function
+
+    @cached_property
+    def exactly(self) -> Callable[..., Any]:
+        function: Callable[..., Any] = sp.lambdify(self._symbols, self._expression, "mpmath")
+        return function
 
 
 def _values(function: _Function, hertz: NDArray[np.float64], lengths: list[Fraction]) -> NDArray[np.float64]:

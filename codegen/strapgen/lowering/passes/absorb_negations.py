@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import lru_cache
 
-from strapgen.ir.program import Constant, Node, Operation, Program, Reference
+from strapgen.ir.program import Constant, Node, Operation, Program, Reference, names_in
 from strapgen.lowering.names import is_temporary
-from strapgen.lowering.passes.rewriting import rewritten, with_values
+from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, with_each
 
 _EVEN = ("cos", "sinc")
 
@@ -25,23 +25,32 @@ def absorb_negations(program: Program) -> Program:
     >>> absorb_negations(Program("p", "p", "", "", "", (), signals, body, (result,))).body[0].value
     Operation(kind='subtract', arguments=(Reference(name='b'), Reference(name='a')))
     """
-    program = with_values(program, lambda value: rewritten(value, _rule))
+    values = [_absorbed(assignment.value) for assignment in program.body]
     results = {
         node.name for result in program.results for node in result.nodes if isinstance(node, Reference)
     }
-    for place in range(len(program.body)):
-        name, inner = program.body[place].name, _inside(program.body[place].value)
-        if inner is None or not is_temporary(name) or name in results:
-            continue
+    for place, assignment in enumerate(program.body):
+        inner = _inside(values[place])
+        if inner is not None and is_temporary(assignment.name) and assignment.name not in results:
+            values = [_with_negated(value, assignment.name) for value in values]
+            values[place] = inner
+    return with_each(program, [_with_signed_constant(value) for value in values])
 
-        def rule(node: Node, name: str = name) -> Node:
-            return Operation("negate", (node,)) if node == Reference(name) else _rule(node)
 
-        body = tuple(
-            replace(a, value=inner if a.name == name else rewritten(a.value, rule)) for a in program.body
-        )
-        program = replace(program, body=body)
-    return with_values(program, _with_signed_constant)
+@lru_cache(REMEMBERED)
+def _absorbed(value: Node) -> Node:
+    """Return a value with its signs moved up; the value itself if none moves."""
+    outcome = rewritten(value, _rule)
+    return value if outcome == value else outcome
+
+
+def _with_negated(value: Node, name: str) -> Node:
+    """Return a value with the negative of a name in its place, and the signs moved up."""
+    if name not in names_in(value):
+        return _absorbed(value)
+    return rewritten(
+        value, lambda node: Operation("negate", (node,)) if node == Reference(name) else _rule(node)
+    )
 
 
 def _inside(node: Node) -> Node | None:

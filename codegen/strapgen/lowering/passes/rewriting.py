@@ -25,10 +25,15 @@ def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:
 
 def with_values(program: Program, change: Callable[[Node], Node]) -> Program:
     """Return a program with every assigned value changed."""
-    body = []
-    for assignment in program.body:
-        value = change(assignment.value)
-        body.append(assignment if value == assignment.value else replace(assignment, value=value))
+    return with_each(program, [change(assignment.value) for assignment in program.body])
+
+
+def with_each(program: Program, values: list[Node]) -> Program:
+    """Return a program with other values; the program itself if they are equal."""
+    body = [
+        assignment if value == assignment.value else replace(assignment, value=value)
+        for assignment, value in zip(program.body, values, strict=True)
+    ]
     if not any(map(is_not, body, program.body)):
         return program
     return replace(program, body=tuple(body))

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import combinations
 
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in
@@ -21,48 +21,132 @@ from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses
 _Pair = tuple[str, Node, Node, bool]
 
 
-@dataclass
+@dataclass(eq=False)
 class _Many:
-    """A sum or a product of any number of members."""
+    """A sum or a product of any number of members; its node and its pairs are worked out once until it changes."""
 
     kind: str
     members: list[tuple[bool, Node | _Many]]
 
+    @cached_property
+    def terms(self) -> list[Term]:
+        return [(sign, _tree(member)) for sign, member in self.members]
 
-@dataclass
-class _Entry:
-    """An assignment, its value as sums and products, and in how many of these each pair occurs."""
+    @cached_property
+    def node(self) -> Node:
+        if self.kind == "add":
+            return plain(signed_sum(self.terms))
+        nodes = [node for _, node in self.terms]
+        return chain("multiply", nodes) if self.kind == "multiply" else Operation(self.kind, tuple(nodes))
 
-    assignment: Assignment
-    tree: Node | _Many
-    pairs: Counter[_Pair] = field(init=False)
+    @cached_property
+    def pairs(self) -> frozenset[_Pair]:
+        if self.kind not in ("add", "multiply"):
+            return frozenset()
+        members = sorted([(node, sign) for sign, node in self.terms], key=repr)
+        return frozenset(
+            [(self.kind, a, b, one == other) for (a, one), (b, other) in combinations(members, 2)]
+        )
 
-    def __post_init__(self) -> None:
-        self.pairs = _pairs_of(self.assignment.value)
+    def places(self, pair: _Pair) -> tuple[int, ...]:
+        """Return the places of the first two members that are a pair; none if the pair does not occur."""
+        kind, a, b, equal = pair
+        if self.kind != kind:
+            return ()
+        first = [(k, sign) for k, (sign, node) in enumerate(self.terms) if node == a]
+        second = [(k, sign) for k, (sign, node) in enumerate(self.terms) if node == b] if first else []
+        places = ((i, j) for i, one in first for j, other in second if i != j and (one == other) == equal)
+        return next(places, ())
+
+    def forget(self) -> None:
+        """Have all be worked out anew."""
+        for name in ("terms", "node", "pairs"):
+            self.__dict__.pop(name, None)
 
 
 class _Counts:
     """In how many sums and products each pair occurs; of thousands of pairs the few that occur twice stand apart."""
 
     def __init__(self) -> None:
-        self._all: dict[_Pair, int] = {}
-        self._repeated: dict[_Pair, int] = {}
+        self.numbers: dict[_Pair, int] = {}
+        self._all: Counter[int] = Counter()
+        self._repeated: dict[int, int] = {}
+        self._texts: dict[int, str] = {}
+        self._pairs: list[_Pair] = []
 
-    def add(self, pairs: Counter[_Pair], sign: int = 1) -> None:
-        """Add the pairs of an entry, or take them away."""
-        for pair, number in pairs.items():
-            total = self._all[pair] = self._all.get(pair, 0) + sign * number
-            if total > 1:
-                self._repeated[pair] = total
-            else:
-                self._repeated.pop(pair, None)
+    def number(self, pair: _Pair) -> int:
+        """Return the number by which a pair is counted: its hash takes long."""
+        number = self.numbers.setdefault(pair, len(self._pairs))
+        if number == len(self._pairs):
+            self._pairs.append(pair)
+        return number
+
+    def add(self, number: int, times: int) -> None:
+        """Count a pair so many times more."""
+        total = self._all[number] = self._all[number] + times
+        if total > 1:
+            self._repeated[number] = total
+        else:
+            self._repeated.pop(number, None)
 
     def most_frequent(self) -> _Pair | None:
         """Return the pair that occurs in most sums or products, the first of several; None if none occurs twice."""
         most = max(self._repeated.values(), default=0)
-        return min(
-            (pair for pair, number in self._repeated.items() if number == most), key=repr, default=None
-        )
+        several = [number for number, times in self._repeated.items() if times == most]
+        return self._pairs[min(several, key=self._text)] if several else None
+
+    def _text(self, number: int) -> str:
+        if number not in self._texts:
+            self._texts[number] = repr(self._pairs[number])
+        return self._texts[number]
+
+
+class _Entry:
+    """An assignment, its value as sums and products, and in how many of these each pair occurs."""
+
+    def __init__(self, assignment: Assignment, counts: _Counts) -> None:
+        self.assignment = assignment
+        self.tree = _flat(assignment.value)
+        self.pairs: Counter[int] = Counter()
+        self._counts = counts
+        for pair, times in _pairs_of(assignment.value).items():
+            self._count(pair, times)
+
+    def _count(self, pair: _Pair, times: int) -> None:
+        number = self._counts.number(pair)
+        self._counts.add(number, times)
+        self.pairs[number] += times
+        if not self.pairs[number]:
+            del self.pairs[number]
+
+    def replace(self, pair: _Pair, name: Reference) -> None:
+        """Replace a pair once in each sum or product that holds it."""
+        self._replace(self.tree, pair, name)
+
+    def _replace(self, many: Node | _Many, pair: _Pair, name: Reference) -> bool:
+        """Replace a pair in a part of the tree; return whether it occurs there."""
+        if not isinstance(many, _Many):
+            return False
+        before, places = many.terms, many.places(pair)
+        removed = [many.members[k][1] for k in places]
+        others = [member for k, (_, member) in enumerate(many.members) if k not in places]
+        below = [self._replace(member, pair, name) for member in others]
+        if not places and not any(below):
+            return False
+        assert many.terms is before, "the pairs are those of what stood here"
+        pairs = many.pairs
+        if places:
+            i, j = places
+            many.members[i] = many.members[i][0], name
+            del many.members[j]
+        many.forget()
+        for gone in pairs - many.pairs:
+            self._count(gone, -1)
+        for new in many.pairs - pairs:
+            self._count(new, 1)
+        for gone in (gone for member in removed for part in _inside(member) for gone in part.pairs):
+            self._count(gone, -1)
+        return True
 
 
 def share_pairs(program: Program) -> Program:
@@ -82,23 +166,17 @@ def share_pairs(program: Program) -> Program:
     """
     inlined = _inlined(program)
     names = shared_names(inlined)
-    entries = [_Entry(assignment, _flat(assignment.value)) for assignment in inlined.body]
     counts = _Counts()
-    for entry in entries:
-        counts.add(entry.pairs)
+    entries = [_Entry(assignment, counts) for assignment in inlined.body]
     while pair := counts.most_frequent():
         name = next(names)
         kind, a, b, equal = pair
-        holders = [place for place, entry in enumerate(entries) if pair in entry.pairs]
-        for entry in (entries[place] for place in holders):
-            counts.add(entry.pairs, -1)
-            _replace(entry.tree, pair, Reference(name))
-            entry.pairs = _count(entry.tree)
-            counts.add(entry.pairs)
+        number = counts.number(pair)
+        holders = [place for place, entry in enumerate(entries) if number in entry.pairs]
+        for place in holders:
+            entries[place].replace(pair, Reference(name))
         value = Operation(kind if equal else "subtract", (a, b))
-        shared = _Entry(Assignment(name, value), _flat(value))
-        counts.add(shared.pairs)
-        entries.insert(holders[0], shared)
+        entries.insert(holders[0], _Entry(Assignment(name, value), counts))
     if len(entries) == len(inlined.body):
         return program
     body = tuple(replace(entry.assignment, value=_tree(entry.tree)) for entry in entries)
@@ -152,14 +230,7 @@ def _factors(node: Node) -> Iterator[Node]:
 
 
 def _tree(many: Node | _Many) -> Node:
-    if not isinstance(many, _Many):
-        return many
-    members = [(sign, _tree(member)) for sign, member in many.members]
-    if many.kind == "add":
-        return plain(signed_sum(members))
-    if many.kind == "multiply":
-        return chain("multiply", [node for _, node in members])
-    return Operation(many.kind, tuple(node for _, node in members))
+    return many.node if isinstance(many, _Many) else many
 
 
 def _inside(many: Node | _Many) -> Iterator[_Many]:
@@ -169,39 +240,10 @@ def _inside(many: Node | _Many) -> Iterator[_Many]:
             yield from _inside(member)
 
 
-def _pairs(many: _Many) -> Iterator[_Pair]:
-    if many.kind in ("add", "multiply") and len(many.members) > 1:
-        members = sorted(((_tree(member), sign) for sign, member in many.members), key=repr)
-        for (a, one), (b, other) in combinations(members, 2):
-            yield many.kind, a, b, one == other
-
-
 @lru_cache(REMEMBERED)
 def _pairs_of(value: Node) -> Counter[_Pair]:
     """Return in how many sums and products of a value each pair occurs; nobody changes it."""
-    return _count(_flat(value))
-
-
-def _count(tree: Node | _Many) -> Counter[_Pair]:
-    """Return in how many sums and products of a tree each pair occurs."""
     counts: Counter[_Pair] = Counter()
-    for many in _inside(tree):
-        counts.update(set(_pairs(many)))
+    for many in _inside(_flat(value)):
+        counts.update(many.pairs)
     return counts
-
-
-def _replace(tree: Node | _Many, pair: _Pair, name: Reference) -> None:
-    """Replace a pair once in each sum or product that holds it."""
-    kind, a, b, equal = pair
-    for many in list(_inside(tree)):
-        if many.kind != kind:
-            continue
-        nodes = [_tree(member) for _, member in many.members]
-        places = [
-            (i, j) for i, x in enumerate(nodes) for j, y in enumerate(nodes) if i != j and (x, y) == (a, b)
-        ]
-        places = [(i, j) for i, j in places if (many.members[i][0] == many.members[j][0]) == equal]
-        if places:
-            i, j = places[0]
-            many.members[i] = many.members[i][0], name
-            del many.members[j]

@@ -91,6 +91,10 @@ class CPrinter(Printer):
         """Return a call."""
         return FUNCTIONS[kind].format(*arguments, s=self.real.suffix, n=self.name)
 
+    def declared(self, kind: str, name: str, value: str) -> str:
+        """Return the declaration of a value."""
+        return f"const {kind} {name} = {value};"
+
 
 def _nearest_single(value: Fraction) -> np.float32:
     """Return the nearest single; rounding to double first could miss it."""
@@ -199,7 +203,7 @@ def code_of(
 
     return {
         "loads": [
-            f"const {kind} {element} = {place(signal, number)};"
+            printer.declared(kind, element, place(signal, number))
             for signal in program.inputs
             if signal.shape
             for number, element in enumerate(signal.elements)
@@ -208,7 +212,7 @@ def code_of(
         "body": [
             {
                 "text": fill_expression(
-                    f"const {kind} {a.name} = {printer.text(a.value)};",
+                    printer.declared(kind, a.name, printer.text(a.value)),
                     " " * 4 * (depth + 1),
                     99 - 4 * depth,
                 ),

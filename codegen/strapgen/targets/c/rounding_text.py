@@ -40,13 +40,22 @@ def _renamed(names: list[str], printed: list[str]) -> dict[str, str]:
     return dict(zip(names, printed, strict=True))
 
 
-def rounding_text(bounds: RoundingBounds, program: Program) -> str:
+def rounding_text(
+    bounds: RoundingBounds,
+    program: Program,
+    flag: str = "-ffp-contract=off",
+    library: str = "the C library",
+) -> str:
     """Return the error bounds of a call and of a run, with their conditions.
 
     Parameters
     ----------
     bounds : RoundingBounds
     program : Program
+    flag : str, optional
+        The flag that keeps a compiler from fusing a product and a sum; "" where none does so.
+    library : str, optional
+        What computes sines and arc tangents.
 
     Returns
     -------
@@ -63,7 +72,7 @@ def rounding_text(bounds: RoundingBounds, program: Program) -> str:
         growth = bounds.accumulation.growth - 1
         stretched = f" exp({decimal_above(growth)} N)" if growth else ""
         text += f"; the {row} after N steps is at most {decimal_above(bounds.accumulation.per_step)} N{stretched} long"
-    return f"{text}. This holds for {_conditions(bounds)}"
+    return f"{text}. This holds for {_conditions(bounds, flag, library)}"
 
 
 def _errors(bounds: RoundingBounds) -> str:
@@ -77,7 +86,7 @@ def _errors(bounds: RoundingBounds) -> str:
     return ", ".join(parts)
 
 
-def _conditions(bounds: RoundingBounds) -> str:
+def _conditions(bounds: RoundingBounds, flag: str, library: str) -> str:
     """Return what the bounds hold for."""
     sizes: dict[str, list[str]] = {}
     for condition in bounds.inputs:
@@ -88,8 +97,9 @@ def _conditions(bounds: RoundingBounds) -> str:
     parts = [f"{', '.join(names)} {size}" for size, names in sizes.items()]
     if bounds.functions:
         names = " and ".join(bounds.functions)
-        parts.append(f"{names} of the C library within a unit in the last place")
-    return "; ".join([*parts, "IEEE 754, each operation rounded to the nearest; -ffp-contract=off"])
+        parts.append(f"{names} of {library} within a unit in the last place")
+    parts += ["IEEE 754, each operation rounded to the nearest", *filter(None, [flag])]
+    return "; ".join(parts)
 
 
 def _plain(value: Fraction) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from strapgen.backends.c import real_type
 from strapgen.backends.evaluators import Array
-from strapgen.backends.late_unit import GapError, refusal
+from strapgen.backends.late.unit import GapError, refusal
 from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain import compiler

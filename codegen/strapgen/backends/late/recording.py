@@ -15,7 +15,7 @@ from strapgen.backends import backend as attitude_backend
 from strapgen.backends import evaluator
 from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.increments import StepWindows
-from strapgen.backends.late_unit import GapError, SampleKind, refusal
+from strapgen.backends.late.unit import GapError, SampleKind, refusal
 from strapgen.catalogue.methods.late_filters import NEXT, SHORT, LateFilters, short_place
 from strapgen.catalogue.methods.lost_samples import REACH
 from strapgen.catalogue.methods.window import Window

@@ -9,8 +9,8 @@ import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
 from strapgen.backends.fixed_numbers import in_units
-from strapgen.backends.late_unit import LateUnit, SampleKind
-from strapgen.backends.late_unit_in_c import LateUnitInC
+from strapgen.backends.late.unit import LateUnit, SampleKind
+from strapgen.backends.late.unit_in_c import LateUnitInC
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
 from strapgen.library.commit_late_sources import LateSources

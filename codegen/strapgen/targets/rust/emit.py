@@ -1,0 +1,142 @@
+"""The Rust target in floating point: one module with a function and its contract, and a C interface beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+
+from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.sources import Function, Sources
+from strapgen.rounding import rounding_bounds
+from strapgen.targets import contract, contract_lines, definitions
+from strapgen.targets.c import emit as c
+from strapgen.targets.c.rounding_text import rounding_text, with_names
+from strapgen.targets.cpp.emit import interface_values
+from strapgen.targets.cpp.text import CHECK, runs_of
+from strapgen.targets.names import function_name, printed
+from strapgen.targets.rendering import render
+from strapgen.targets.rust.text import RUST, TYPES, array, constants, module_name, structure_name
+
+#: Functions of the C library by the operation that calls them.
+_LIBRARY = {
+    "sqrt": ("sqrt",),
+    "sin": ("sin",),
+    "cos": ("cos",),
+    "sinc": ("sin",),
+    "atan2": ("atan2",),
+    "direction": ("atan2",),
+    "maximum": ("fmax",),
+}
+_PARAMETERS = {"atan2": ("y", "x"), "fmax": ("x", "y")}
+_FUNCTIONS = {
+    "sqrt": "sqrt({})",
+    "sin": "sin({})",
+    "cos": "cos({})",
+    "sinc": "sinc({})",
+    "atan2": "atan2({}, {})",
+    "direction": "atan2({}, {})",
+    "wrap": "wrapped({})",
+    "maximum": "fmax({}, {})",
+    "at_least": "{} >= {}",
+    "select": "(if {} {{ {} }} else {{ {} }})",
+}
+
+
+class RustPrinter(c.CPrinter):
+    """Prints nodes as Rust expressions: sums and products are those of C, choices and declarations are not."""
+
+    def constant(self, value: Fraction) -> str:
+        """Return the shortest literal that reads as the nearest number of the type, which Rust infers."""
+        return super().constant(value).removesuffix(self.real.suffix)
+
+    def function(self, kind: str, arguments: list[str]) -> str:
+        """Return a call or a choice."""
+        return _FUNCTIONS[kind].format(*arguments)
+
+    def declared(self, kind: str, name: str, value: str) -> str:
+        """Return the declaration of a value."""
+        return f"let {name}: {TYPES[kind]} = {value};"
+
+
+def emit(program: Program, target: str) -> Sources:
+    """Generate a Rust module for a program, with the C interface through which other languages call it.
+
+    Parameters
+    ----------
+    program : Program
+    target : str
+        A target whose numbers are those of a type of C.
+
+    Returns
+    -------
+    Sources
+        One module with the function ``<name>``; and two files with ``<name>``, ``<name>_array`` and, for a step,
+        ``<name>_propagate`` for C, the functions of the same names that the target ``c`` has.
+    """
+    real = c.real_of(target)
+    name = module_name(function_name(program, real.infix))
+    scalars = [signal.name for signal in program.inputs if not signal.shape]
+    rounding = rounding_bounds(program, real.name)
+    _, files = printed(
+        program,
+        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
+        RUST,
+        scalars,
+    )
+    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
+    return Sources(
+        program.kernel,
+        target,
+        files,
+        function,
+        program.operations,
+        program.temporaries,
+        program.companions,
+        recursion=program.recursion,
+        runs=runs_of(name, "rust", "rs"),
+        rounding=rounding,
+    )
+
+
+def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
+    """Return the module and the C interface of a program with its printed names."""
+    printer = RustPrinter(c.real_of(target), name)
+    kind = TYPES[printer.real.name]
+    command = f"{contract.generating(program)} --target {target}"
+    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
+    outputs = [(array(kind, r.signal.size), r.signal.name) for r in program.outputs]
+    header, runs = runs_of(name, "rust", "rs")
+    several = len(outputs) > 1
+    returned = [f"[{', '.join(map(printer.text, result.nodes))}]" for result in program.outputs]
+    values = interface_values(program, printer, name, header) | {
+        "file": f"{name}.rs",
+        "kind": kind,
+        "command": command,
+        "check": CHECK,
+        "contract": contract_lines.of_program(program, name, command, rounding),
+        "constants": constants(definitions.of_program(program, name, printer), printer.real.name),
+        "normalizing": contract.upkeep_text(program, target=target),
+        "rounding": rounding_text(rounding, program, flag=""),
+        "structure": structure_name(name),
+        "result": structure_name(name) if several else outputs[0][0],
+        "outputs": outputs,
+        "rust_arguments": ", ".join(
+            f"{s.name}: &{array(kind, s.size)}" if s.shape else f"{s.name}: {kind}" for s in program.inputs
+        ),
+        "returned": list(zip((o for _, o in outputs), returned, strict=True)),
+        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
+        "code": c.code_of(program, printer) | {"stores": []},
+        "library": _library(nodes),
+        "functions": {node.kind for node in nodes},
+        "turn": tuple(map(printer.constant, c.HALF_TURNS)),
+        "several": several,
+    }
+    templates = {f"{name}.rs": "rust/module.rs.j2", header: "cpp/interface.h.j2", runs: "rust/runs.rs.j2"}
+    return {file: render(template, **values) for file, template in templates.items()}
+
+
+def _library(nodes: Iterable[Operation]) -> dict[str, tuple[str, ...]]:
+    """Return the functions of the C library that some operations call, with the names of their parameters."""
+    names = sorted({name for node in nodes for name in _LIBRARY.get(node.kind, ())})
+    return {name: _PARAMETERS.get(name, ("x",)) for name in names}
