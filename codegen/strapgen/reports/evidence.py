@@ -19,8 +19,8 @@ _HEAD = """# Evidence for the standard catalogue
 The kernels of `c_fixed/`: 32-bit fixed point for increments of up to 1/8 rad. "proved" holds for all inputs in their
 ranges; "agrees" holds for the inputs that were run; "fails" says that a tool has no proof, where another has one; "not
 examined" that it has no theorem for something in the code. [docs/evidence.md](../docs/evidence.md) says what each claim
-means and how you repeat a proof by hand. The digest is that of the kernel's source and header, so that a changed file
-shows.
+means and how you repeat a proof by hand. The digest is that of the kernel's source and header without
+the version of strapgen, so that a changed file shows.
 """
 
 

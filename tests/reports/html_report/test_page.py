@@ -14,12 +14,16 @@ from gathering import each
 
 from strapgen.catalogue import choose, standard
 from strapgen.cli import main
+from strapgen.evidence import subjects
+from strapgen.evidence.subjects import Subject
+from strapgen.evidence.verdicts import Verdict
 from strapgen.experiments.dossier.algorithm import dossier
 from strapgen.experiments.dossier.conditions import Conditions
-from strapgen.reports.evidence import read_page
+from strapgen.reports.evidence import evidence_page, read_page
 from strapgen.reports.html_report.algorithm_view import view
 from strapgen.reports.html_report.content import Content
 from strapgen.reports.html_report.page import report_page
+from strapgen.support.version import VERSION
 
 ROOT = Path(__file__).resolve().parents[3]
 #: A step and a kernel that is none, on a few back ends and beside a few methods.
@@ -129,13 +133,26 @@ def test_charts_tables_and_tabs_answer(browser, page):
 
 
 def test_evidence_stands_beside_the_very_code_that_was_examined_alone():
-    recorded = read_page((ROOT / "generated" / "EVIDENCE.md").read_text())
-    known = dossier(choose("euler-product"))
-    assert view(known, recorded).evidence == recorded.results["euler_product_w32"]
-    assert recorded.results["euler_product_w32"]["no overflow: 16-bit int"].startswith("proved")
-    changed = replace(recorded, digests=recorded.digests | {"euler_product_w32": "0123456789abcdef"})
+    choice = choose("euler-product")
+    proof = Verdict("euler_product_w32", "no overflow: AVR", "z3", "4.16", "proved", 0.1)
+    recorded = read_page(evidence_page([proof], {proof.kernel: Subject(choice).digest}))
+    known = dossier(choice)
+    assert view(known, recorded).evidence == {"no overflow: AVR": "proved, z3"}
+    changed = read_page(evidence_page([proof], {proof.kernel: "0123456789abcdef"}))
     assert view(known, changed).evidence == {}
     assert view(known, None).evidence == {}
+
+
+def test_a_new_version_that_generates_the_same_code_keeps_the_evidence(monkeypatch):
+    subject = Subject(choose("euler-product"))
+    digest = subject.digest
+    files = {name: text.replace(VERSION, "9.8.7") for name, text in subject.sources.files.items()}
+    assert files != subject.sources.files
+    newer = Subject(choose("euler-product"))
+    newer.__dict__["sources"] = replace(subject.sources, files=files)
+    assert newer.digest != digest
+    monkeypatch.setattr(subjects, "VERSION", "9.8.7")
+    assert newer.digest == digest
 
 
 def test_no_text_of_a_user_is_markup():
