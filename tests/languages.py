@@ -7,9 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from strapgen.backends import of_sources
+from strapgen.backends.fixed import FixedEvaluator
 from strapgen.catalogue import Choice
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
+from strapgen.support.exceptions import InputError
 from strapgen.toolchain import compiler
 
 #: Kernels with every kind of operation that code in floating point has, with scalar inputs and with several outputs.
@@ -54,3 +57,32 @@ def check_lines(sources: Sources) -> None:
         if len(line) > 99
     ]
     assert not long
+
+
+def check_integers_of_c(
+    choices: Iterable[Choice], target: str, settings: Settings, rng: np.random.Generator
+) -> None:
+    """Check that kernels return on a target the integers and the residuals of C, or refuse the same samples."""
+    pairs = [
+        [of_sources(generated_sources.sources(choice, name, settings)) for name in (target, "c-fixed")]
+        for choice in choices
+    ]
+    accepted = 0
+    for evaluators in pairs:
+        ranges = [(a.low, a.high, a.signal.size) for a in evaluators[0].interface.inputs]
+        samples = [
+            [rng.integers(low, high, size=(1, size)) for low, high, size in ranges] for _ in range(SAMPLES)
+        ]
+        one, reference = ([_answer(evaluator, sample) for sample in samples] for evaluator in evaluators)
+        assert one == reference, evaluators[0].kernel
+        accepted += sum(isinstance(answer, bytes) for answer in one)
+    assert accepted > SAMPLES * len(pairs) / 4
+
+
+def _answer(evaluator: FixedEvaluator, sample: list[np.ndarray]) -> bytes | str:
+    """Return what a function makes of a sample: its outputs and residuals, or why it refuses."""
+    try:
+        outputs, residuals = evaluator.run(sample, evaluator.fresh(1))
+    except InputError as error:
+        return str(error)
+    return b"".join(array.tobytes() for array in (*outputs, residuals))

@@ -113,7 +113,9 @@ def test_settings_beside_a_quantized_program_are_refused():
 
 def test_targets_take_their_own_kind_of_program():
     program = strapgen.lower(strapgen.derive("euler-product"))
-    with pytest.raises(InputError, match="target c does not take fixed-point programs; these do: c-fixed, f"):
+    with pytest.raises(
+        InputError, match="target c does not take fixed-point programs; these do: c-fixed, cpp-fixed"
+    ):
         targets.emit(strapgen.quantize(program), "c")
     with pytest.raises(InputError, match="target c-fixed takes quantized programs alone"):
         targets.emit(program, "c-fixed")

@@ -7,14 +7,21 @@ import types
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import strapgen
+from strapgen.analysis import growth, velocity_series
+from strapgen.analysis.solving import SolvedStep
+from strapgen.catalogue.methods import coning_coefficients
+from strapgen.catalogue.methods.shaped_coning import SHAPES
+from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
 from strapgen.support.brief import LINES, WIDTH, full_text, short_repr
 
+ROOT = Path(__file__).resolve().parents[1]
 TURN = np.full((8, 2, 3), 0.01)
 
 
@@ -101,6 +108,58 @@ OBJECTS: dict[str, Callable[[], Any]] = {
 }
 
 
+def unknown_steps() -> SolvedStep:
+    return strapgen.unknowns.solve(strapgen.choose(f"{ROOT}/examples/three_samples.py"), 4)
+
+
+def heun() -> UnknownTableau:
+    return strapgen.unknowns.read_tableau(f"{ROOT}/examples/heun3.toml")
+
+
+#: An object of each class of a public module, and of some that functions of one return.
+MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
+    "unknowns.Equation": lambda: heun().conditions()[0],
+    "unknowns.ErrorSeries": lambda: strapgen.algorithm("euler", "rk4", increments=2).series(terms=1).step,
+    "unknowns.Family": lambda: heun().solve().families[0],
+    "unknowns.LeadingError": lambda: unknown_steps().leading[0][0],
+    "unknowns.PolynomialSolution": lambda: heun().solve(),
+    "unknowns.SolvedStep": unknown_steps,
+    "unknowns.UnknownTableau": heun,
+    "exact.Interpreter": lambda: strapgen.exact.Interpreter(program()),
+    "exact.ExactBackend": lambda: stepper("exact"),
+    "exact.ExactEvaluator": lambda: strapgen.evaluator("euler-from-dcm", "exact"),
+    "gyro.StepWindows": lambda: strapgen.gyro.StepWindows(lambda first, stop: TURN, 2),
+    "study.Case": lambda: strapgen.study.Study().cases()[0],
+    "study.Study": lambda: strapgen.study.Study(words=(8,) * 200),
+    "study.Outcome": lambda: strapgen.study.Outcome(
+        strapgen.study.Study().cases()[0], 1.0, 1.0, 1.0, 1.0, None
+    ),
+    "window_design.FamilyBrief": lambda: strapgen.window_design.FamilyBrief(7, 7, Fraction(13, 10)),
+    "sensors.InstrumentErrors": lambda: strapgen.sensors.read("ahrs"),
+    "sensors.TriadErrors": lambda: strapgen.sensors.read("ahrs").gyro,
+    "sensors.Sampling": strapgen.sensors.Sampling,
+    "sensors.WarmUp": lambda: strapgen.sensors.WarmUp(rate=np.ones(3)),
+    "sensors.Heating": strapgen.sensors.Heating,
+    "sensors.OutputNoise": strapgen.sensors.OutputNoise,
+    "sensors.MeasurementUnit": lambda: strapgen.sensors.MeasurementUnit(strapgen.sensors.read("ahrs"), 0.01),
+    "spectrum": lambda: strapgen.vibration.Spectrum(np.ones_like, {"angle_x": np.ones_like}, (1.0, 2.0)),
+    "shape": lambda: SHAPES["coning-shaped-8"],
+    "design": lambda: coning_coefficients.design(3, 0, "combined"),
+    "unknowns.VelocitySeries": lambda: velocity_series.series(
+        strapgen.choose("velocity-position", "magnus2", 1)
+    ),
+    "growth": lambda: growth.growth(strapgen.choose("dcm", "rk1")),
+    "stability": lambda: growth.stability(strapgen.choose("dcm", "rk1")),
+    "vibration.Assessment": lambda: strapgen.vibration.of(strapgen.choose("euler", "rk1", 1)),
+    "vibration.Rates": lambda: strapgen.vibration.Rates(1.0, 1.0, 0.0),
+}
+#: Formulas in a notebook: kernels, series, tableaux, order conditions, coefficients, windows.
+FORMULAS = (
+    *(name for name in MODULE_OBJECTS if name.startswith("unknowns.")),
+    *("shape", "design", "stability"),
+)
+
+
 def too_long(text: str) -> bool:
     lines = text.split("\n")
     return not 1 <= len(lines) <= LINES or max(map(len, lines)) > WIDTH
@@ -121,6 +180,34 @@ def test_every_public_object_shows_itself_in_five_lines():
     assert {name: text for name, text in texts.items() if too_long(text)} == {}
     unspoken = {name: text for name, text in texts.items() if " object at 0x" in text}
     assert unspoken == {}
+
+
+def test_objects_of_public_modules_show_themselves_too():
+    modules = [(name, getattr(strapgen, name)) for name in strapgen.__all__]
+    classes = {
+        f"{name}.{each}"
+        for name, module in modules
+        if isinstance(module, types.ModuleType) and name != "algebra"  # whose classes are SymPy's functions
+        for each in getattr(module, "__all__", vars(module))
+        if inspect.isclass(value := getattr(module, each)) and not each.startswith("_")
+        if value.__module__.startswith(module.__name__) or hasattr(module, "__all__")
+    }
+    assert classes == {name for name in MODULE_OBJECTS if "." in name}
+    objects = {name: build() for name, build in MODULE_OBJECTS.items()}
+    assert {name: repr(value) for name, value in objects.items() if too_long(repr(value))} == {}
+    assert [name for name, value in objects.items() if " object at 0x" in repr(value)] == []
+    shown = {name: objects[name]._repr_latex_() for name in FORMULAS}
+    shown |= {name: OBJECTS[name]()._repr_latex_() for name in ("AttitudeAlgorithm", "Kernel", "Window")}
+    shown["unknowns"] = strapgen.derive(strapgen.choose(f"{ROOT}/examples/three_samples.py"))._repr_latex_()
+    assert (
+        r"+ a \mathbf{d}_{1} \times \mathbf{d}_{2} + b \mathbf{d}_{1} \times \mathbf{d}_{3}"
+        in shown["unknowns"]
+    )
+    shown["Tableau"] = strapgen.TABLEAUX["rk4"]._repr_latex_()
+    begins = ("\\begin{align*}", "\\[")
+    assert [
+        name for name, text in shown.items() if not text.startswith(begins) or len(text.splitlines()) > 40
+    ] == []
 
 
 def test_a_repr_that_is_too_long_is_seen():

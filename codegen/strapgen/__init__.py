@@ -40,6 +40,8 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods import windows as windows
     from strapgen.catalogue.methods.samples import Samples as Samples
     from strapgen.catalogue.methods.samples import increments_signal as increments_signal
+    from strapgen.catalogue.methods.samples import turns_signal as turns_signal
+    from strapgen.catalogue.methods.samples import velocities_signal as velocities_signal
     from strapgen.catalogue.methods.tableau import Tableau as Tableau
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.methods.window import Window as Window
@@ -143,6 +145,8 @@ _NAMES = {
     "catalogue.methods.samples": (
         "Samples",
         "increments_signal",
+        "turns_signal",
+        "velocities_signal",
     ),
     "catalogue.methods.tableau": ("Tableau",),
     "catalogue.methods.tableaux": ("TABLEAUX",),

@@ -20,6 +20,7 @@ from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.support import stages
 from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.support.suggestions import some
 from strapgen.support.timing import timed
 
 if TYPE_CHECKING:
@@ -191,7 +192,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
 
 def _require_target(target: Any, settings: Any) -> None:
     if not isinstance(target, str):
-        names = ", ".join(targets.TARGETS)
+        names = some(targets.TARGETS)
         raise InputTypeError(f"target is {stages.describe(target)}; a name is needed: {names}")
     _require_settings(settings)
     targets.require(target, settings)

@@ -11,7 +11,9 @@ import pytest
 import sympy as sp
 
 import strapgen
-from strapgen.analysis.conditions import Demand, conditions
+from strapgen.analysis import velocity_conditions, velocity_series
+from strapgen.analysis.conditions import conditions
+from strapgen.analysis.demands import Demand
 from strapgen.analysis.one_step import step
 from strapgen.analysis.series import series
 from strapgen.analysis.solving import SolvedStep, solve
@@ -22,6 +24,8 @@ from strapgen.support.exceptions import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = str(ROOT / "examples" / "three_samples.py")
+RATES = str(ROOT / "examples" / "rates_at_nodes.py")
+VELOCITY = str(ROOT / "examples" / "two_velocity_samples.py")
 PAIRS = str(ROOT / "tests" / "data" / "algorithms" / "pairs.py")
 MILLER = {"a": sp.Rational(57, 80), "b": sp.Rational(33, 80)}
 
@@ -160,7 +164,7 @@ def test_the_command_answers_in_json(capsys):
     ("line", "reason"),
     [
         ("{example} --order 9", "order on general motion is 9; a whole number from 1 to 8 is needed"),
-        ("{example} --order 3 --on cone", "motion 'cone' is not known"),
+        ("{example} --order 3 --on cone", "motion of the attitude step 'cone' is not known"),
         ("{example} --order 3 --on coning,coning=5", "--on has coning twice"),
         ("{example} --order 3 --on coning=x", "--on is 'x'; a whole number is needed"),
         ("{example} --order 4 --set c=1", "unknown 'c' is not known; allowed: a"),
@@ -168,11 +172,18 @@ def test_the_command_answers_in_json(capsys):
         ("{example} --order 5 --set a=1", "there is no solution"),
         ("euler --order 3", "kernel euler-rk4-2 has no unknowns"),
         ("missing.py --order 3", "is no file"),
+        ("imu-compensate --order 3", "kernel imu-compensate is no attitude step"),
+        ("{example} --order 3 --on sculling", "motion of the attitude step 'sculling' is not known"),
+        (
+            "{velocity} --order 3 --on coning",
+            "motion of the step of velocity and position 'coning' is not known",
+        ),
+        ("{velocity} --order 7", "order on general motion is 7; a whole number from 1 to 6 is needed"),
     ],
 )
 def test_bad_input_gets_one_line(line, reason, capsys):
     with pytest.raises(SystemExit) as stop:
-        main(["solve", *shlex.split(line.format(example=EXAMPLE))])
+        main(["solve", *shlex.split(line.format(example=EXAMPLE, velocity=VELOCITY))])
     said = capsys.readouterr()
     assert (stop.value.code, said.out, said.err.count("\n")) == (2, "", 1)
     assert reason in said.err
@@ -182,3 +193,79 @@ def test_values_that_the_family_excludes_are_refused():
     solved = solve(strapgen.choose(EXAMPLE), {"general": 4})
     with pytest.raises(InputError, match="there is no number 1"):
         solved.values({}, family=1)
+
+
+@pytest.fixture(scope="module")
+def on_rates() -> SolvedStep:
+    return solve(strapgen.choose(RATES), 4)
+
+
+def test_the_rotation_vector_of_rates_at_three_nodes(on_rates):
+    """Simpson's weights, and h^2/12 times the product of the outer rates: W. Magnus, CPAM 7 (1954), third term."""
+    sixth = sp.Rational(1, 6)
+    assert on_rates.values() == {"p": sixth, "q": 4 * sixth, "r": sixth, "a": 0, "b": sixth / 2}
+    # To products of two rates the conditions on a polynomial are those on any motion.
+    second = solve(strapgen.choose(RATES), {"polynomial": 4}).conditions
+    assert {e.label: e.value for e in second}.items() <= {
+        e.label: e.value for e in on_rates.conditions
+    }.items()
+
+
+def test_a_solved_step_on_rates_runs_with_the_order_that_was_solved_for(on_rates):
+    values = {name: str(value) for name, value in on_rates.values().items()}
+    backend = strapgen.backend(strapgen.choose(RATES, constants=values), backend="numpy")
+    cone = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    runs = [strapgen.simulate(backend, cone, step, 10) for step in (0.25, 0.125)]
+    coarse, fine = (abs(run.drift).max() for run in runs)
+    # Of the order 4: half the step leaves a sixteenth, and what is of higher order less than a tenth of it.
+    assert coarse / fine == pytest.approx(16, rel=0.1)
+
+
+def test_the_velocity_and_position_of_two_samples():
+    """P. G. Savage, J. Guid. Control Dyn. 21 (1998) 208-221: 2/3 for sculling, 5/6 and 1/6 for the position."""
+    third = sp.Rational(1, 3)
+    solved = solve(strapgen.choose(VELOCITY), {"general": 3, "polynomial": 4})
+    values = solved.values()
+    assert {name: values[name] for name in ("a", "b", "c1", "c2")} == {
+        "a": 2 * third, "b": -2 * third, "c1": sp.Rational(5, 6), "c2": sp.Rational(1, 6)
+    }  # fmt: skip
+    sculling = solve(strapgen.choose(VELOCITY), {"sculling": 4})
+    assert {name: sculling.values()[name] for name in "ab"} == {"a": 2 * third, "b": -2 * third}
+    # By transference c w_i x w_j of the angle is c (w_i x f_j - w_j x f_i) of the velocity: twice the mean. A drift
+    # has the opposite sign of an error in the angle.
+    (leading,) = sculling.leading[0]
+    coning = solved_pairs(2, 0, coning=4)
+    assert (leading.power, leading.terms[0].value) == (5, -2 * coning.leading[0][0].terms[0].value)
+
+
+def test_the_series_of_a_velocity_comes_back_from_json_with_its_unknowns():
+    one = velocity_series.series(strapgen.choose(VELOCITY), terms=2)
+    data = json.loads(json.dumps(one.as_dict()))
+    assert data["unknowns"] == ["a", "b", "c1", "c2", "k11", "k12", "k21", "k22"]
+    again = velocity_series.VelocitySeries.from_dict(data)
+    assert again == one
+    assert sp.Symbol("a", real=True) in sp.sympify(again.velocity[2][0, again.known][()]).free_symbols
+
+
+def test_a_condition_on_a_change_that_the_step_does_not_return_is_refused(tmp_path):
+    path = tmp_path / "velocity.py"
+    text = Path(VELOCITY).read_text()
+    position = "    build.output(" + text.split("    build.output(")[2].split("    return build")[0]
+    path.write_text(text.replace(position, ""))
+    with pytest.raises(InputError, match="returns no position_change"):
+        solve(strapgen.choose(path), {"position": 2})
+    assert len(solve(strapgen.choose(path), 3).conditions) == 3
+
+
+@pytest.mark.parametrize(("increments", "previous"), [(2, 0), (1, 1)])
+def test_conditions_of_a_known_velocity_say_whether_it_has_the_order(increments, previous):
+    known = strapgen.derive(strapgen.choose("velocity-position", "magnus4", increments, previous=previous))
+    order = known.order.step
+    for motion in ("velocity", "sculling"):
+        assert velocity_conditions.conditions(known, Demand(motion, order)) == []
+    later = velocity_conditions.conditions(known, Demand("general", order), more=1)
+    assert {each.order for each in later} <= {order, order + 1}
+    whole = {each.label: each.value for each in later}
+    second = velocity_conditions.conditions(known, Demand("polynomial", order + 1))
+    assert {each.label: each.value for each in second}.items() <= whole.items()
+    assert second

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from pathlib import Path
 
 import pytest
 
@@ -132,3 +133,20 @@ def test_image(outcomes):
 def test_studies_that_cannot_be_run(values, said):
     with pytest.raises(InputError, match=said):
         cases(**values)
+
+
+def test_a_window_takes_its_samples_from_beside_the_step():
+    """Of a user's rate too, and with pulses, which are counted along the whole row."""
+    rate = str(Path(__file__).resolve().parents[2] / "examples" / "own_rate.py")
+    chosen = {
+        "increments": 1,
+        "methods": ("window-3-3", "rk4"),
+        "duration": "2",
+        "words": (24,),
+        "carries": ("full",),
+    }
+    window, rk4 = map(run_case, cases(**chosen, motion_name=rate, pulses_arcsec=("2",)))
+    # One increment alone leaves a rate that does not change in the step: an order of 2 in place of 6.
+    assert window.truncation_deg < 1e-2 * rk4.truncation_deg
+    assert window.rounding_deg <= window.bound_deg
+    assert 0.1 < window.quantization_deg / window.expected_deg < 4

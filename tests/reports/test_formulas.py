@@ -14,6 +14,7 @@ import sympy as sp
 from strapgen import pipeline
 from strapgen.catalogue import choose, standard
 from strapgen.reports import formulas
+from strapgen.reports.display import latex
 
 SOME = [
     choice for choice in standard() if choice.kernel in ("euler-rk4-2", "dcm-rk2-2", "cayley-klein-rk1-2")
@@ -50,7 +51,10 @@ def test_latex_has_an_equation_for_every_formula(kernel):
     text = formulas.elements_latex(kernel)
     assert text.startswith("\\begin{align*}\n") and text.endswith("\n\\end{align*}")
     rows = text.splitlines()[1:-1]
-    assert sum(" &= " in row for row in rows) == sum(stage.signal.size for stage in stages(kernel))
+    lefts = [row.partition(" &= ")[0] for row in rows if " &= " in row]
+    letters = [left for left in lefts if re.fullmatch(r"q_\{\d+\}", left)]  # of what no line holds
+    assert len(lefts) - len(letters) == sum(stage.signal.size for stage in stages(kernel))
+    assert all(f"{letter} &=" in text and text.count(letter) > 1 for letter in letters)
     assert all(" &= " in row or row.startswith("    &\\quad {} ") for row in rows)
     assert all(row.endswith(" \\\\") for row in rows[:-1]) and not rows[-1].endswith("\\\\")
     assert text.count("{") == text.count("}")
@@ -161,3 +165,16 @@ def test_a_program_reads_back_as_the_kernel():
         sp.Rational(values[n].numerator, values[n].denominator) for n in kernel.outputs[0].signal.elements
     ]
     assert found == expected["next"]
+
+
+def test_what_no_line_holds_gets_a_letter_of_its_own():
+    """A letter stands for the same expression in all formulas, and its own formula comes before them."""
+    text = formulas.elements_latex(pipeline.derive("euler", "crouch-grossman3", 2))
+    rows = [row for row in text.splitlines() if " &= " in row]
+    lefts = [row.partition(" &= ")[0] for row in rows]
+    assert [left for left in lefts if left.startswith("q_")] == [f"q_{{{k}}}" for k in range(1, 6)]
+    for left in lefts:
+        if left.startswith("q_"):
+            assert not any(left in row for row in rows[: lefts.index(left)])
+    for part in latex.parts(text.partition("q_{1} &= ")[2].partition(" \\\\\n")[0]):
+        assert latex.width(part) < latex.PAGE

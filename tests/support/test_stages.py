@@ -13,6 +13,7 @@ from strapgen.backends import exact
 from strapgen.simulation import recording
 from strapgen.support import stages
 from strapgen.support.exceptions import InputTypeError
+from strapgen.support.suggestions import some
 
 
 @cache
@@ -125,7 +126,7 @@ SAID = {
         "name",
     ): "simulate takes a Motion, not 'euler'; strapgen.motion('euler', ...) makes one",
     ("settings", "number"): "settings is 3; strapgen.Settings is needed",
-    ("target", "settings"): f"target is Settings; a name is needed: {', '.join(strapgen.TARGETS)}",
+    ("target", "settings"): f"target is Settings; a name is needed: {some(strapgen.TARGETS)}",
 }
 
 

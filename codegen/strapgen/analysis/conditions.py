@@ -10,49 +10,23 @@ times, so that the drift is that of a run.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
-from strapgen.analysis import one_step
+from strapgen.analysis import one_step, sampled_motion
+from strapgen.analysis.demands import Demand
 from strapgen.analysis.invariants import Invariants, invariants
 from strapgen.analysis.notation import covariant_text
 from strapgen.analysis.one_step import Step
-from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.covariants import Frame
 from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.families import Equation
 from strapgen.symbolic.power_series import Powers
 
-#: Motions on which conditions are stated.
-ON = ("general", "coning", "polynomial")
-#: Highest order, on a general motion and to second order in the rate.
-MOST_GENERAL, MOST_SECOND = 8, 16
 #: Order in the rate of the terms that conditions on coning and on polynomials have.
 _PRODUCTS = 2
-
-
-@dataclass(frozen=True)
-class Demand:
-    """A motion and the order that a step is to have on it.
-
-    Parameters
-    ----------
-    motion : str
-        One of `ON`.
-    order : int
-        The last power of the step at which its error has to vanish.
-    """
-
-    motion: str
-    order: int
-
-    def __post_init__(self) -> None:
-        checks.choice("motion", self.motion, ON)
-        most = MOST_GENERAL if self.motion == "general" else MOST_SECOND
-        checks.count(f"order on {self.motion} motion", self.order, largest=most)
 
 
 def conditions(attitude_step: Step, demand: Demand, more: int = 0) -> list[Equation]:
@@ -84,10 +58,7 @@ def conditions(attitude_step: Step, demand: Demand, more: int = 0) -> list[Equat
     3 h^3, drift: |w0|^2 w0 -1/24
     3 h^3, drift: w0 x w1 -1/6
     """
-    if attitude_step.nodes is not None:
-        raise InputError(
-            f"kernel {attitude_step.kernel.name} takes rates; conditions are stated for increments"
-        )
+    demand.require(velocity=False)
     top = demand.order + more
     try:
         if demand.motion == "general":
@@ -113,33 +84,15 @@ def _of_second_order(attitude_step: Step, count: int, top: int) -> dict[int, Inv
     The small quantity of the series is the size of the rate, and the length of the step stands in the ring.
     """
     frame = Frame(count)
-    ring, h, *_ = sp.ring(["h", *map(str, frame.ring.symbols)], attitude_step.domain)
-    vectors = [[_with_step(ring, x) for x in vector] for vector in frame.vectors]
-    numbers = attitude_step.increments_per_step
-    sampled = []
-    for k in attitude_step.intervals:
-        begin, end = sp.Rational(k, numbers), sp.Rational(k + 1, numbers)
-        shares = [(end ** (j + 1) - begin ** (j + 1)) / sp.factorial(j + 1) for j in range(count)]
-        weights = [ring.domain.from_sympy(share) * h ** (j + 1) for j, share in enumerate(shares)]
-        for axis in range(3):
-            total = sum((v[axis] * w for v, w in zip(vectors, weights, strict=True)), ring.zero)
-            sampled.append(Powers(ring, {1: total}, _PRODUCTS))
+    ring, *_ = sp.ring(["h", *map(str, frame.ring.symbols)], attitude_step.domain)
+    vectors = [[sampled_motion.with_step(ring, x) for x in vector] for vector in frame.vectors]
+    sampled = sampled_motion.of_small_motion(ring, vectors, attitude_step.shares(count), _PRODUCTS)
     state = one_step.state_of(attitude_step, sampled, ring, _PRODUCTS)
     computed = one_step.matrix_of(attitude_step, state, ring, _PRODUCTS)
     error = one_step.parts_of_error(computed, _true_matrix(ring, vectors), ring, _PRODUCTS)["error"]
-    rows: dict[int, list[Any]] = {}
     target = frame.ring.clone(domain=attitude_step.domain)
-    for number, element in enumerate(error):
-        for part in element.parts.values():
-            for (power, *place), coefficient in part.terms():
-                if power <= top:
-                    row = rows.setdefault(power, [target.zero] * 9)
-                    row[number] = row[number] + target.from_dict({tuple(place): coefficient})
-    return {power: invariants(frame, row) for power, row in sorted(rows.items()) if any(row)}
-
-
-def _with_step(ring: Any, element: Any) -> Any:
-    return ring.from_dict({(0, *place): ring.domain.convert(c) for place, c in element.terms()})
+    rows = sampled_motion.by_power(target, error, top)
+    return {power: invariants(frame, row) for power, row in rows.items()}
 
 
 def _true_matrix(ring: Any, vectors: list[list[Any]]) -> list[Powers]:

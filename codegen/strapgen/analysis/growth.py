@@ -13,12 +13,13 @@ import sympy as sp
 from strapgen.analysis import motion_rates, one_step
 from strapgen.analysis.constant_rate import ANGLE, ConstantRate, constant_rate
 from strapgen.analysis.invariants import scalar, scalar_value
-from strapgen.analysis.notation import scalar_text
+from strapgen.analysis.notation import intervals_text, scalar_text
 from strapgen.analysis.one_step import Step
 from strapgen.analysis.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support import checks
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.polynomials import Polynomial
 from strapgen.symbolic.rotations import cross_elements, dot
@@ -50,6 +51,11 @@ class Growth:
     length: dict[int, sp.Expr] | None
     determinant: dict[int, sp.Expr]
     invariant: dict[str, dict[int, Polynomial]]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel}, {self.motion} motion"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the sums as plain JSON data."""
@@ -234,6 +240,12 @@ class Stability:
     kernel: str
     stretch_squared: sp.Expr
     contractive: list[tuple[float, float | None]] | None
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel}, a step of the angle x: no state grows where x is {intervals_text(self.contractive)}"
 
     def stretch(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factor for angles in rad, an array of any shape.

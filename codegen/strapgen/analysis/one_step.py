@@ -13,6 +13,8 @@ from typing import Any
 import sympy as sp
 
 from strapgen import catalogue, pipeline
+from strapgen.analysis import sampled_motion
+from strapgen.analysis.sampled_motion import Rate
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.support.exceptions import InputError, InputTypeError
@@ -27,9 +29,6 @@ _LEAST = Fraction(1, 10**14)
 
 #: Number of further powers that are tried if a series has no term where its order says it should.
 PATIENCE = 4
-
-#: The rate and its derivatives, each a vector of polynomials.
-Rate = Sequence[Sequence[Any]]
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,12 @@ class Step:
         if not self.lowest:
             return number
         return Fraction(f"{float(number):.{_DIGITS - 1}e}") if abs(number) > _LEAST else Fraction(0)
+
+    def shares(self, terms: int) -> list[list[sp.Expr]]:
+        """Return what t^j/j! adds to each sample, j from 0 on, as a multiple of the (j + 1)-th power of the step."""
+        if self.nodes is not None:
+            return [sampled_motion.node_shares(node, terms) for node in self.nodes]
+        return [sampled_motion.increment_shares(k, self.increments_per_step, terms) for k in self.intervals]
 
     @property
     def domain(self) -> Any:
@@ -243,10 +248,7 @@ def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list
     list of Powers
         The elements of the state, row-major.
     """
-    if attitude_step.nodes is None:
-        sampled = increments(ring, rate, attitude_step.increments_per_step, attitude_step.intervals, top)
-    else:
-        sampled = turns(ring, rate, attitude_step.nodes, top)
+    sampled = sampled_motion.elements(ring, rate, attitude_step.shares(len(rate)), top)
     return state_of(attitude_step, sampled, ring, top)
 
 
@@ -284,70 +286,6 @@ def matrix_of(attitude_step: Step, elements: list[Powers], ring: Any, top: int) 
 def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> list[Powers]:
     """Return the elements of the last output of a kernel."""
     return outputs(kernel, values, ring, top)[kernel.outputs[-1].signal.name]
-
-
-def increments(ring: Any, rate: Rate, count: int, intervals: range, top: int) -> list[Powers]:
-    """Return the elements of exact increments in rad, row by row.
-
-    Parameters
-    ----------
-    ring : PolyRing
-        Ring of the coefficients.
-    rate : sequence of sequence of ring element
-        The rate in rad/s and its derivatives at the beginning of the step.
-    count : int
-        Increments of the step.
-    intervals : range
-        Numbers of the sampling intervals: 0 is the first of the step, -1 the one before it.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    list of Powers
-        Three elements for each increment, oldest first.
-    """
-    elements = []
-    for k in intervals:
-        begin, end = sp.Rational(k, count), sp.Rational(k + 1, count)
-        shares = [(end ** (j + 1) - begin ** (j + 1)) / sp.factorial(j + 1) for j in range(len(rate))]
-        elements += _moments(ring, rate, shares, top)
-    return elements
-
-
-def turns(ring: Any, rate: Rate, nodes: Sequence[Number], top: int) -> list[Powers]:
-    """Return the elements of the rate at nodes of the step, times its length, row by row.
-
-    Parameters
-    ----------
-    ring : PolyRing
-        Ring of the coefficients.
-    rate : sequence of sequence of ring element
-        The rate in rad/s and its derivatives at the beginning of the step.
-    nodes : sequence of Fraction or Expr
-        Nodes as fractions of the step.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    list of Powers
-        Three elements for each node, in rad.
-    """
-    elements = []
-    for node in nodes:
-        shares = [evaluation.exact(node) ** j / sp.factorial(j) for j in range(len(rate))]
-        elements += _moments(ring, rate, shares, top)
-    return elements
-
-
-def _moments(ring: Any, rate: Rate, shares: Sequence[sp.Expr], top: int) -> list[Powers]:
-    """Return sum_j shares[j] w_j h^(j+1) for every axis."""
-    numbers = [ring.domain.from_sympy(share) for share in shares]
-    return [
-        Powers(ring, {j + 1: vector[axis] * numbers[j] for j, vector in enumerate(rate)}, top)
-        for axis in range(3)
-    ]
 
 
 def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:

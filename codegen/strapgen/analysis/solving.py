@@ -1,22 +1,27 @@
-"""Solves the conditions on the unknown coefficients of an attitude step, and says what error its families leave."""
+"""Solves the conditions on the unknown coefficients of a step, and says what error its families leave."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import sympy as sp
 
-from strapgen.analysis import one_step
-from strapgen.analysis.conditions import Demand, conditions
-from strapgen.analysis.one_step import Step
+from strapgen import pipeline
+from strapgen.analysis import one_step, velocity_conditions
+from strapgen.analysis.conditions import conditions
+from strapgen.analysis.demands import Demand
 from strapgen.catalogue import Choice
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic import elimination, families
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution
 from strapgen.symbolic.kernel import Kernel
 
+#: States the conditions of a demand, and of some orders beyond it.
+State: TypeAlias = Callable[[Demand, int], list[Equation]]
 #: Number of powers of the step beyond an order at which a leading error is looked for.
 _PATIENCE = 3
 #: Most terms of a sum of squares that is minimised.
@@ -47,6 +52,12 @@ class LeadingError:
     square: sp.Expr
     least: dict[sp.Symbol, sp.Expr]
 
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"h^{self.power} on {self.motion} motion: {len(self.terms)} terms"
+
 
 @dataclass(frozen=True)
 class SolvedStep:
@@ -55,7 +66,7 @@ class SolvedStep:
     Parameters
     ----------
     kernel : Kernel
-        The attitude step with its unknowns.
+        The step of attitude, or of velocity and position, with its unknowns.
     demands : tuple of Demand
         The motions, and the order on each.
     conditions : tuple of Equation
@@ -70,6 +81,13 @@ class SolvedStep:
     conditions: tuple[Equation, ...]
     solution: PolynomialSolution
     leading: tuple[tuple[LeadingError, ...], ...]
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        demands = ", ".join(f"order {demand.order} on {demand.motion} motion" for demand in self.demands)
+        return f"of {self.kernel.name}: {demands}\n{len(self.conditions)} conditions; {self.solution!r}"
 
     @property
     def families(self) -> tuple[Family, ...]:
@@ -116,10 +134,12 @@ def solve(choice: Choice, order: int | Mapping[str, int]) -> SolvedStep:
     Parameters
     ----------
     choice : Choice
-        An attitude step with unknowns.
+        A step with unknowns: of attitude, on increments or on rates at nodes, or of velocity and position.
     order : int or mapping of str to int
         Order on a general motion, or orders by motion: "general" (any smooth rate), "polynomial", of the degree that
-        the increments determine, and "coning", the last two to products of two rates. All conditions have to hold.
+        the samples determine, and "coning", the last two to products of two rates. For velocity and position "general"
+        stands for both changes and "velocity" or "position" for one; "polynomial" and "sculling" hold to products of a
+        rate and a force. All conditions have to hold.
 
     Returns
     -------
@@ -140,31 +160,41 @@ def solve(choice: Choice, order: int | Mapping[str, int]) -> SolvedStep:
     """
     orders = order if isinstance(order, Mapping) else {"general": order}
     demands = [Demand(motion, each) for motion, each in orders.items()]
-    attitude_step = one_step.step(choice)
-    kernel = attitude_step.kernel
+    kernel, state = _statement(choice)
+    for demand in demands:
+        demand.require(kernel.takes_velocity)
     if not kernel.unknowns:
         raise InputError(f"kernel {kernel.name} has no unknowns; KernelBuilder.parameter declares one")
     unknowns = [sp.Symbol(name, real=True) for name in kernel.unknowns]
     equations = [
         replace(equation, label=f"{demand.motion}, {equation.label}") if len(demands) > 1 else equation
         for demand in demands
-        for equation in conditions(attitude_step, demand)
+        for equation in state(demand, 0)
     ]
     solution = elimination.solve(equations, unknowns)
     leading = tuple(
-        tuple(one for demand in demands if (one := _leading(attitude_step, demand, family)))
+        tuple(one for demand in demands if (one := _leading(state, demand, family)))
         for family in solution.families
     )
     return SolvedStep(kernel, tuple(demands), tuple(equations), solution, leading)
 
 
-def _leading(attitude_step: Step, demand: Demand, family: Family) -> LeadingError | None:
+def _statement(choice: Choice) -> tuple[Kernel, State]:
+    """Return the kernel of a choice, and what states the conditions on it."""
+    if isinstance(choice, Choice) and choice.takes_velocity:
+        kernel = pipeline.derive(choice)
+        return kernel, partial(velocity_conditions.conditions, kernel)
+    attitude_step = one_step.step(choice)
+    return attitude_step.kernel, partial(conditions, attitude_step)
+
+
+def _leading(state: State, demand: Demand, family: Family) -> LeadingError | None:
     """Return the first error of a family beyond an order; None if there is none within a few powers."""
     for more in range(1, _PATIENCE + 1):
         power = demand.order + more
         terms = [
             Equation(each.label, each.order, families.simple(each.value.xreplace(family.values)))
-            for each in conditions(attitude_step, demand, more)
+            for each in state(demand, more)
             if each.order == power
         ]
         terms = [each for each in terms if each.value != 0]

@@ -2,6 +2,8 @@
 
 from strapgen.analysis.series import ErrorSeries, series
 from strapgen.analysis.solving import LeadingError, SolvedStep, solve
+from strapgen.analysis.velocity_series import VelocitySeries
+from strapgen.analysis.velocity_series import series as velocity_series
 from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
 from strapgen.catalogue.methods.unknown_tableau import read as read_tableau
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution
@@ -14,7 +16,9 @@ __all__ = [
     "PolynomialSolution",
     "SolvedStep",
     "UnknownTableau",
+    "VelocitySeries",
     "read_tableau",
     "series",
     "solve",
+    "velocity_series",
 ]

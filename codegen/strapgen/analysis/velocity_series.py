@@ -6,27 +6,32 @@ axes. Their increments are exact, and so are the true changes: the integral of R
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
 
 from strapgen import pipeline
-from strapgen.analysis import invariants, one_step
+from strapgen.analysis import invariants, one_step, sampled_motion
 from strapgen.analysis.notation import TEXT, covariant_text, with_forces
 from strapgen.catalogue import Choice
 from strapgen.support import checks
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
+from strapgen.symbolic import reading
 from strapgen.symbolic.covariants import Coefficients, Frame
+from strapgen.symbolic.evaluation import exact
 from strapgen.symbolic.kernel import Kernel
 from strapgen.symbolic.power_series import Powers, field, outputs
 
-#: The name of the kernels in the catalogue, and the parts of a series.
-NAME = "velocity-position"
+#: The parts of a series, which are the outputs of a kernel by what changes.
 PARTS = ("velocity", "position")
 #: Most terms of a series: the number of products grows fast.
 MOST_TERMS = 3
+#: The last power that is looked at where a kernel does not say its order.
+_MOST_POWER = 8
 
 
 @dataclass(frozen=True)
@@ -42,17 +47,31 @@ class VelocitySeries:
         the specific force.
     known : int
         The last power of the step that was derived.
+    parts : tuple of str, optional
+        What the kernel computes, of `PARTS`; the terms of another part are empty.
+    unknowns : tuple of str, optional
+        Coefficients of the kernel that are not known: all terms are polynomials in them.
     """
 
     kernel: str
     velocity: dict[int, Coefficients]
     position: dict[int, Coefficients]
     known: int
+    parts: tuple[str, ...] = PARTS
+    unknowns: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        order = "no error" if self.order is None else f"order {self.order}"
+        return f"of {self.kernel}: {order}, known to h^{self.known}"
 
     @property
     def order(self) -> int | None:
-        """One less than the first power of the error of the velocity; None if there is no error."""
-        return min(self.velocity) - 1 if self.velocity else None
+        """One less than the first power of the error of the velocity, or else the position; None without an error."""
+        first = self.coefficients(self.parts[0])
+        return min(first) - 1 if first else None
 
     def coefficients(self, part: str) -> dict[int, Coefficients]:
         """Return the terms of "velocity" or "position"."""
@@ -63,12 +82,58 @@ class VelocitySeries:
         """Return the series as plain JSON data."""
         notation = with_forces(TEXT, self.known)
         data: dict[str, Any] = {"kernel": self.kernel, "motion": "general", "order": self.order}
-        for part in PARTS:
+        for part in self.parts:
             data[part] = {
                 str(power): covariant_text(one, notation=notation)
                 for power, one in self.coefficients(part).items()
             }
-        return data | {"known_to_power": self.known}
+        data["known_to_power"] = self.known
+        data["terms"] = {
+            part: {str(power): _as_terms(one) for power, one in self.coefficients(part).items()}
+            for part in self.parts
+        }
+        return data | ({"unknowns": list(self.unknowns)} if self.unknowns else {})
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> VelocitySeries:
+        """Rebuild a series from `as_dict`, with its unknowns as symbols.
+
+        Raises
+        ------
+        InputError
+            If a text is no expression.
+        """
+        unknowns = tuple(data.get("unknowns", ()))
+        parts = {
+            part: {int(power): _of_terms(one, unknowns) for power, one in rows.items()}
+            for part, rows in data["terms"].items()
+        }
+        velocity, position = (parts.get(part, {}) for part in PARTS)
+        return cls(data["kernel"], velocity, position, data["known_to_power"], tuple(parts), unknowns)
+
+
+def _as_terms(coefficients: Coefficients) -> list[dict[str, Any]]:
+    """Return the terms of an error: numbers of vectors, the scalar products that stand before them, and a number."""
+    return [
+        {
+            "vectors": [*covariant],
+            "products": [[*product] for product in monomial],
+            "number": sp.sstr(exact(number)),
+        }
+        for covariant, polynomial in coefficients.items()
+        for monomial, number in polynomial.items()
+    ]
+
+
+def _of_terms(terms: Sequence[Mapping[str, Any]], unknowns: Sequence[str]) -> Coefficients:
+    symbols = {name: sp.Symbol(name, real=True) for name in unknowns}
+    coefficients: Coefficients = {}
+    for term in terms:
+        value = reading.expression("number", term["number"], symbols)
+        number = Fraction(int(value.p), int(value.q)) if value.is_Rational else value
+        monomial = tuple(tuple(product) for product in term["products"])
+        coefficients.setdefault(tuple(term["vectors"]), {})[monomial] = number
+    return coefficients
 
 
 def series(choice: Choice, terms: int = 1) -> VelocitySeries:
@@ -77,7 +142,7 @@ def series(choice: Choice, terms: int = 1) -> VelocitySeries:
     Parameters
     ----------
     choice : Choice
-        A kernel "velocity-position", by any method.
+        The kernel "velocity-position" by any method, or a user's step of velocity and position.
     terms : int, optional
         Number of terms of each, counted from its first one that is not zero.
 
@@ -98,27 +163,41 @@ def series(choice: Choice, terms: int = 1) -> VelocitySeries:
     (2, '-1/12 w0 x f1 + 1/12 w1 x f0')
     """
     checks.count("terms", terms, largest=MOST_TERMS)
-    if not isinstance(choice, Choice) or choice.name != NAME:
-        raise InputError(f"a series of velocity and position needs the kernel {NAME}")
-    kernel = pipeline.derive(choice)
+    kernel = pipeline.derive(choice) if isinstance(choice, Choice) else None
+    if kernel is None or not kernel.takes_velocity:
+        raise InputError(
+            "a series of velocity and position needs the kernel velocity-position, or one like it"
+        )
     top = 1 + (kernel.order.step if kernel.order else 0) + terms
-    most = top + one_step.PATIENCE
-    while True:
-        candidate = _series(choice, kernel, terms, top)
-        rows = [candidate.velocity, candidate.position]
-        if top >= most or all(len(row) >= terms for row in rows):
-            return candidate
-        top += 1
+    most = top + one_step.PATIENCE if kernel.order else _MOST_POWER
+    try:
+        while True:
+            candidate = _series(kernel, terms, top)
+            if top >= most or all(len(candidate.coefficients(part)) >= terms for part in candidate.parts):
+                return candidate
+            top += 1
+    except ArithmeticError as error:
+        raise InputError(f"kernel {kernel.name} has no series in the step length: {error}") from None
 
 
-def errors(
-    choice: Choice, kernel: Kernel, ring: Any, motion: Sequence[Any], top: int
-) -> dict[str, list[Powers]]:
+def parts_of(kernel: Kernel) -> tuple[str, ...]:
+    """Return what a kernel computes, of `PARTS`."""
+    names = {stage.signal.name for stage in kernel.outputs}
+    return tuple(part for part in PARTS if f"{part}_change" in names)
+
+
+def shares(kernel: Kernel, terms: int) -> list[list[sp.Expr]]:
+    """Return what t^j/j! adds to each sample of a kernel, as a multiple of the (j + 1)-th power of the step."""
+    count = kernel.inputs[0].shape[0] - kernel.previous - kernel.ahead
+    intervals = range(-kernel.previous, count + kernel.ahead)
+    return [sampled_motion.increment_shares(k, count, terms) for k in intervals]
+
+
+def errors(kernel: Kernel, ring: Any, motion: Sequence[Any], top: int) -> dict[str, list[Powers]]:
     """Return the errors of the velocity and position change up to a power of the step.
 
     Parameters
     ----------
-    choice : Choice
     kernel : Kernel
     ring : PolyRing
         Ring of the coefficients, over the field of the kernel.
@@ -128,16 +207,15 @@ def errors(
         The last power of the series.
     """
     rate, force = motion
-    count = choice.increments_per_step
-    intervals = range(-choice.previous, count + choice.ahead)
     values: dict[str, Any] = {}
     for signal, vectors in zip(kernel.inputs, (rate, force), strict=True):
-        elements = one_step.increments(ring, vectors, count, intervals, top)
+        elements = sampled_motion.elements(ring, vectors, shares(kernel, len(vectors)), top)
         values |= zip(signal.elements, elements, strict=True)
     computed = outputs(kernel, values, ring, top)
     true = true_changes(ring, rate, force, top)
     return {
-        part: [a - b for a, b in zip(computed[f"{part}_change"], true[part], strict=True)] for part in PARTS
+        part: [a - b for a, b in zip(computed[f"{part}_change"], true[part], strict=True)]
+        for part in parts_of(kernel)
     }
 
 
@@ -156,28 +234,53 @@ def true_changes(ring: Any, rate: Sequence[Any], force: Sequence[Any], top: int)
                 for k in range(3):
                     for n, element in turned[3 * i + k].parts.items():
                         power = n + j + 1
-                        share = sp.Rational(1, power)
-                        share = (
-                            share if part == "velocity" else share - sp.Rational(1, power + 1)
-                        ) / sp.factorial(j)
-                        term = element * vector[k] * ring.domain.from_sympy(share)
+                        share = ring.domain.from_sympy(share_of_change(part, n, j))
+                        term = element * vector[k] * share
                         total[power] = total.get(power, ring.zero) + term
             rows.append(Powers(ring, total, top))
         changes[part] = rows
     return changes
 
 
-def _series(choice: Choice, kernel: Kernel, terms: int, top: int) -> VelocitySeries:
-    """Derive the series up to a power, in the rotated frame of the vectors."""
-    frame = Frame(2 * top)
+def share_of_change(part: str, n: int, j: int) -> sp.Expr:
+    """Return the integral over a step of length 1 of t^n t^j/j!, and for the position of that times 1 - t."""
+    power = n + j + 1
+    share = sp.Rational(1, power) if part == "velocity" else sp.Rational(1, power * (power + 1))
+    return share / sp.factorial(j)
+
+
+def domain(kernel: Kernel) -> Any:
+    """Return the smallest domain that holds the numbers of a kernel and polynomials in its unknowns."""
     expressions = [x for stage in (*kernel.stages, *kernel.outputs) for x in stage.expressions]
-    ring = frame.ring.clone(domain=field(expressions))
+    return field(expressions, kernel.unknowns)
+
+
+def coefficients(kernel: Kernel, top: int, terms: int | None = None) -> dict[str, dict[int, Coefficients]]:
+    """Return the errors for any smooth motion by part and power, in vector-invariant form.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    top : int
+        The last power of the step, and the number of derivatives of the rate; those of the force follow.
+    terms : int, optional
+        Number of terms of each part; by default all.
+    """
+    frame = Frame(2 * top)
+    ring = frame.ring.clone(domain=domain(kernel))
     vectors = [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
     parts: dict[str, dict[int, Coefficients]] = {}
-    for part, elements in errors(choice, kernel, ring, (vectors[:top], vectors[top:]), top).items():
+    for part, elements in errors(kernel, ring, (vectors[:top], vectors[top:]), top).items():
         powers = sorted({power for element in elements for power in element.parts})[:terms]
         parts[part] = {
             power: invariants.vector(frame, [x.parts.get(power, ring.zero) for x in elements])
             for power in powers
         }
-    return VelocitySeries(kernel.name, parts["velocity"], parts["position"], top)
+    return parts
+
+
+def _series(kernel: Kernel, terms: int, top: int) -> VelocitySeries:
+    """Derive the series up to a power, in the rotated frame of the vectors."""
+    parts = coefficients(kernel, top, terms)
+    velocity, position = (parts.get(part, {}) for part in PARTS)
+    return VelocitySeries(kernel.name, velocity, position, top, parts_of(kernel), kernel.unknowns)

@@ -26,6 +26,7 @@ from strapgen.ir.program import OPERATIONS, Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support import checks, stages
+from strapgen.support.brief import short_repr
 
 #: Decimal digits of the arithmetic, of which a million steps lose six.
 DIGITS = 40
@@ -70,6 +71,11 @@ class Interpreter:
     >>> float(state[2])
     0.8
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.program.kernel}"
 
     def __init__(self, program: Program) -> None:
         self.program = program

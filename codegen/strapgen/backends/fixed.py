@@ -294,7 +294,7 @@ class CFixedBackend(FixedBackend):
     def __init__(self, parts: StepSources) -> None:
         step = CFixedEvaluator(parts.step)
         super().__init__(parts, step)
-        self.name = f"c-fixed{self.interface.settings.word}"
+        self.name = f"{self.sources.target}{self.interface.settings.word}"
         self._c = step
         self._function = self.sources.function.name
         self._generated = getattr(step.module.lib, f"{self._function}_propagate")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 #: Most pulses that can be counted, since a double represents every whole number up to here.
@@ -122,6 +123,11 @@ class StepWindows:
     pulse : number, optional
         As for `pulses`; by default increments are not quantized.
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self._count} samples a step, {self._beside} beside it"
 
     def __init__(
         self,

@@ -100,8 +100,22 @@ BACKENDS: Mapping[str, Entry] = _Backends(
         "c-fixed16": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=16),
         "cpp": Entry("generated C++ in double, compiled", "cpp", *_C[:2], by_default=False),
         "cpp-float": Entry("generated C++ in float, compiled", "cpp-float", *_C[:2], by_default=False),
+        "cpp-fixed32": Entry(
+            "generated C++ in 32-bit fixed point, compiled",
+            "cpp-fixed",
+            *_C_FIXED[:2],
+            word=32,
+            by_default=False,
+        ),
         "rust": Entry("generated Rust in double, compiled", "rust", *_C[:2], by_default=False),
         "rust-float": Entry("generated Rust in float, compiled", "rust-float", *_C[:2], by_default=False),
+        "rust-fixed32": Entry(
+            "generated Rust in 32-bit fixed point, compiled",
+            "rust-fixed",
+            *_C_FIXED[:2],
+            word=32,
+            by_default=False,
+        ),
         "octave": Entry(
             "generated MATLAB in double, run by GNU Octave",
             "matlab",

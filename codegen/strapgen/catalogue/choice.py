@@ -65,11 +65,21 @@ class Choice:
         """Return the choice of a user's kernel: an attitude step, or a kernel that comes with one."""
         user_kernel = kernel if isinstance(kernel, UserKernel) else UserKernel.of(kernel)
         head = user_kernel.head
-        if head.companions is None:
+        beside, step = head.beside, head.companions
+        if step is not None and not step.nodes:
+            beside = step.previous, step.ahead
+        if beside is None:
             return cls(head.name, user_kernel=user_kernel)
-        previous, ahead = head.companions.previous, head.companions.ahead
+        previous, ahead = beside
         increments = head.samples - previous - ahead
         return cls(head.name, None, increments, previous, ahead, user_kernel)
+
+    @property
+    def takes_velocity(self) -> bool:
+        """Whether it is a step of velocity and position, from increments of both kinds."""
+        if self.user_kernel is not None:
+            return self.user_kernel.head.beside is not None
+        return self.name == "velocity-position"
 
     @property
     def method_name(self) -> str | None:

@@ -291,7 +291,9 @@ def _choose_users(
 ) -> Choice:
     """Load a user's algorithm with the options that the user chose."""
     if rates:
-        raise InputError(f"{name}: an algorithm of a user takes increments, not rates")
+        raise InputError(
+            f"{name}: rates at nodes go with methods of the catalogue; the file of an algorithm says what it takes"
+        )
     options: dict[str, Any] = {}
     if isinstance(method, (Window, ShapedConing)):
         what = "window" if isinstance(method, Window) else "coning coefficients"
@@ -330,7 +332,10 @@ def choose_step(
         )
     if isinstance(name, str) and name not in ALGORITHMS and not name.endswith(".py"):
         checks.choice("algorithm", name, _algorithms(), _FILE)
-    return choose(name, method, increments, rates, previous, ahead)
+    choice = choose(name, method, increments, rates, previous, ahead)
+    if choice.takes_velocity:
+        raise InputError(f"algorithm {name} is a step of velocity and position; an attitude step is needed")
+    return choice
 
 
 def standard() -> list[Choice]:

@@ -27,6 +27,9 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 def nodes(choice: Choice) -> tuple[Number, ...]:
     """Return the nodes at which a step takes the rate; empty for one that takes increments."""
+    if choice.user_kernel is not None:
+        step_kernels = choice.user_kernel.head.companions
+        return step_kernels.nodes if step_kernels else ()
     if choice.method is None or choice.increments is not None:
         return ()
     return _method(choice.method).nodes

@@ -13,6 +13,7 @@ from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, sto
 from strapgen.design import lawson, mean_square, minimax
 from strapgen.design.rounding import rounded
 from strapgen.design.unknowns import Shape, Unknowns
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 #: Default of the noise for which one-sided filters are designed.
@@ -68,6 +69,8 @@ class FamilyBrief:
     title: str = ""
     start_noise: Fraction = Fraction(0)
     increments: int = 1
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Refuse a rotation that is not good enough for steps of several samples."""

@@ -16,6 +16,7 @@ import numpy as np
 from strapgen import catalogue
 from strapgen.backends import backend
 from strapgen.backends.increments import pulses
+from strapgen.catalogue import Choice
 from strapgen.experiments.comparison import certified_angle
 from strapgen.ir.fixed_settings import Settings
 from strapgen.simulation.motions import Motion
@@ -23,11 +24,14 @@ from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.simulation.runs import attitude, drift_between
 from strapgen.simulation.users_motions import any_motion
 from strapgen.support import cache, checks
+from strapgen.support.brief import short_repr
 from strapgen.support.clusters import Bundle, Cluster, moved
 from strapgen.support.exceptions import InputError
 from strapgen.support.resumable import side_by_side
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from strapgen.analysis.quantization_noise import QuantizationNoise
 
 #: Most cases of one study.
@@ -69,6 +73,8 @@ class Case:
     motion: str
     settings: tuple[tuple[str, str], ...]
 
+    __repr__ = short_repr
+
     def moved(self, begin: Path, end: Path) -> Case:
         """Return the case with the file of a user's motion in another folder, see `clusters.Movable`."""
         return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
@@ -109,6 +115,8 @@ class Outcome:
     truncation_deg: float
     bound_deg: float | None
     expected_deg: float | None = None
+
+    __repr__ = short_repr
 
     @property
     def dominates(self) -> str:
@@ -158,6 +166,8 @@ class Study:
     duration: str = "180"
     motion_name: str = "coning"
     settings: dict[str, str] | None = None
+
+    __repr__ = short_repr
 
     def cases(self) -> list[Case]:
         """Return every combination, unchecked."""
@@ -270,9 +280,10 @@ def run_case(case: Case) -> Outcome:
 def _run(case: Case) -> Outcome:
     h = checks.number("step", case.step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
-    exact = case.profile.increments(h, steps, case.increments)
+    choice = catalogue.choose_step(case.algorithm, case.method, case.increments)
+    exact = case.profile.increments(h, steps, case.increments, choice.previous, choice.ahead)
     pulse = float(checks.number("pulse_arcsec", case.pulse_arcsec)) / 3600
-    measured = pulses(exact, math.radians(pulse)) if pulse else exact
+    measured = pulses(exact, math.radians(pulse), choice.previous + choice.ahead) if pulse else exact
     settings = Settings(case.word, rounding=case.rounding, carry=case.carry)
     settings = settings.fitted(float(np.abs(measured).max()))
     double = backend(case.algorithm, case.method, case.increments, "numpy")
@@ -300,8 +311,13 @@ def _run(case: Case) -> Outcome:
         largest(same_attitude, plain_attitude),
         largest(plain_attitude, truth),
         None if bound is None else math.degrees(bound),
-        expected_noise(case, math.radians(pulse), exact) if pulse else None,
+        expected_noise(case, math.radians(pulse), _within(choice, exact)) if pulse else None,
     )
+
+
+def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the increments of the steps themselves, without those from beside them."""
+    return increments[:, choice.previous : choice.previous + choice.increments_per_step]
 
 
 def expected_noise(case: Case, pulse: float, increments: Any) -> float:

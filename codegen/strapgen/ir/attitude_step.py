@@ -88,6 +88,9 @@ class Companions:
         Number of increments from after the step that it takes in addition to its own.
     truncation : Truncation or None
         What the transition leaves out of a series; None where it is the exponential itself, or a method of its own.
+    nodes : tuple of Fraction
+        Of a user's step that takes the rate at nodes, these as fractions of the step; empty for one that takes
+        increments.
     """
 
     product: str | None
@@ -98,6 +101,7 @@ class Companions:
     isometry: bool = False
     ahead: int = 0
     truncation: Truncation | None = None
+    nodes: tuple[Fraction, ...] = ()
 
     __repr__ = short_repr
 
@@ -109,17 +113,20 @@ class Companions:
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data."""
         cut = self.truncation
-        return asdict(self) | {
+        data = asdict(self) | {
             "identity": [str(element) for element in self.identity],
             "truncation": cut and {**asdict(cut), "scale": str(cut.scale)},
+            "nodes": [str(node) for node in self.nodes],
         }
+        return data if self.nodes else {name: value for name, value in data.items() if name != "nodes"}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Companions:
         """Rebuild the record from `as_dict`."""
         cut = data["truncation"]
-        identity = tuple(map(Fraction, data["identity"]))
-        return cls(**{**data, "identity": identity, "truncation": cut and Truncation.from_dict(cut)})
+        identity, nodes = (tuple(map(Fraction, data.get(name, ()))) for name in ("identity", "nodes"))
+        truncation = cut and Truncation.from_dict(cut)
+        return cls(**{**data, "identity": identity, "truncation": truncation, "nodes": nodes})
 
 
 @dataclass(frozen=True)

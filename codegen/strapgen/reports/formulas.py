@@ -10,7 +10,7 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.lowering.canonical.vector_form import vector_form
-from strapgen.reports.display.latex import equations
+from strapgen.reports.display.expressions import named_equations
 from strapgen.reports.display.stages import stages_latex
 from strapgen.reports.display.vectors import vectors_latex
 from strapgen.reports.report import Report
@@ -121,7 +121,7 @@ def unknown_formulas_report(kernel: Kernel, show: str) -> Report:
         shown = {"latex": as_latex(kernel)} if show == "latex" else {}
         return kernel_as_data(kernel) | {"unknowns": list(kernel.unknowns)} | shown
 
-    return Report(texts[show], data)
+    return Report(texts[show], data, latex=texts["latex"])
 
 
 def program_as_data(program: Program) -> dict[str, str]:
@@ -155,21 +155,27 @@ def short_latex(kernel: Kernel) -> str | None:
 
 def _in_vectors(kernel: Kernel) -> str | None:
     """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
-    form = vector_form(kernel)
+    form = None if kernel.unknowns else vector_form(kernel)
     return stages_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
 
 
 def elements_latex(kernel: Kernel) -> str:
-    """Return a kernel's formulas element by element as one LaTeX align environment."""
+    """Return a kernel's formulas element by element as one LaTeX align environment.
+
+    A function or root that no line holds gets a letter with a number, and a line of its own before.
+    """
     names = {
         sp.Symbol(element, real=True): _latex_name(element)
         for signal in (*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs)))
         for element in signal.elements
     }
-    return equations(
-        (_latex_name(element), sp.latex(expression, symbol_names=names))
-        for stage in (*kernel.stages, *kernel.outputs)
-        for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
+    return named_equations(
+        (
+            (_latex_name(element), expression)
+            for stage in (*kernel.stages, *kernel.outputs)
+            for element, expression in zip(stage.signal.elements, stage.expressions, strict=True)
+        ),
+        names,
     )
 
 

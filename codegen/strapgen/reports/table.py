@@ -165,7 +165,7 @@ class TextTable:
 
     def _pages(self, lines: Sequence[Sequence[str]]) -> list[list[int]]:
         """Return the columns of each environment, the first one in all."""
-        widths = [max(len(_printed(line[k])) for line in lines) + _BETWEEN for k in range(len(self.columns))]
+        widths = [self._width(k, lines) for k in range(len(self.columns))]
         pages: list[list[int]] = [[0]]
         for k in range(1, len(widths)):
             if len(pages[-1]) > 1 and sum(widths[j] for j in pages[-1]) + widths[k] > _PAGE:
@@ -173,11 +173,19 @@ class TextTable:
             pages[-1].append(k)
         return pages
 
+    def _width(self, k: int, lines: Sequence[Sequence[str]]) -> int:
+        """Return the width of a column; text that leaves no room for another column is set in lines."""
+        widest = max(len(_printed(line[k])) for line in lines) + _BETWEEN
+        return _PAGE // 2 if self._in_lines(k, widest) else widest
+
+    def _in_lines(self, k: int, widest: int) -> bool:
+        return widest > _PAGE * 7 // 8 and self.columns[k].align == "<" and k < len(self.columns) - 1
+
     def _sheets(
         self, part: Sequence[int], heads: Sequence[str], rows: Sequence[Sequence[str]]
     ) -> list[list[Sequence[str]]]:
         """Return the rows of each environment of some columns, as many as a page holds."""
-        before = sum(max(len(_printed(row[k])) for row in [heads, *rows]) + _BETWEEN for k in part[:-1])
+        before = sum(self._width(k, [heads, *rows]) for k in part[:-1])
         room = max(10, _PAGE - before - 8)
         sheets: list[list[Sequence[str]]] = [[]]
         height = 0
@@ -195,7 +203,11 @@ class TextTable:
         widest = max(len(_printed(row[part[-1]])) for row in [heads, *rows])
         rules = {"<": "l", ">": "r", "^": "c"}
         letters = [rules[self.columns[k].align] for k in part]
-        before = sum(max(len(_printed(row[k])) for row in [heads, *rows]) + _BETWEEN for k in part[:-1])
+        widths = [max(len(_printed(row[k])) for row in [heads, *rows]) + _BETWEEN for k in part[:-1]]
+        for place, (k, width) in enumerate(zip(part[:-1], widths, strict=True)):
+            if self._in_lines(k, width):
+                letters[place] = r"p{0.5\linewidth}"
+        before = sum(self._width(k, [heads, *rows]) for k in part[:-1])
         if before + widest > _PAGE and letters[-1] == "l":  # long text is set in lines
             letters[-1] = rf"p{{{max(0.15, 1 - before / _PAGE - 0.1):.2f}\linewidth}}"
         lines = [" & ".join(row[k] for k in part) + r" \\" for row in (heads, *rows)]

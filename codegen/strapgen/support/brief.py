@@ -147,9 +147,18 @@ def _stated(value: Any) -> list[tuple[str, Any]]:
     for field in fields(value):
         content = getattr(value, field.name)
         default = field.default_factory() if field.default_factory is not MISSING else field.default
-        if field.repr and (default is MISSING or type(content) is not type(default) or content != default):
+        if field.repr and (
+            default is MISSING or type(content) is not type(default) or _differs(content, default)
+        ):
             stated.append((field.name, content))
     return stated
+
+
+def _differs(content: Any, default: Any) -> bool:
+    """Return whether a value is another than a default of its type; both may be arrays of numpy."""
+    if hasattr(content, "tolist"):
+        return bool(content.tolist() != default.tolist())
+    return bool(content != default)
 
 
 def _short(value: Any) -> str:

@@ -9,7 +9,9 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
+from strapgen.support.suggestions import counted
 from strapgen.symbolic import unknown_values
 from strapgen.symbolic.power_series import field
 
@@ -32,6 +34,12 @@ class Equation:
     order: int
     value: sp.Expr
 
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"{self.label}: {self.value} = 0"
+
 
 @dataclass(frozen=True)
 class Family:
@@ -53,6 +61,14 @@ class Family:
     free: tuple[sp.Symbol, ...]
     nonzero: tuple[sp.Expr, ...] = ()
     equations: tuple[sp.Expr, ...] = ()
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        free = ", ".join(symbol.name for symbol in self.free)
+        values = ", ".join(f"{symbol} = {value}" for symbol, value in self.values.items())
+        return f"free {free or 'nothing'}\n{values or 'no other unknowns'}"
 
     @property
     def dimension(self) -> int:
@@ -100,6 +116,13 @@ class PolynomialSolution:
     families: tuple[Family, ...]
     reason: str = ""
     solvable: int | None = None
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        names = ", ".join(symbol.name for symbol in self.unknowns)
+        return f"of {names}: " + (self.reason or counted(len(self.families), "family", "families"))
 
 
 def simple(expression: sp.Expr) -> sp.Expr:

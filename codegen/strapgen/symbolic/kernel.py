@@ -128,6 +128,9 @@ class Kernel:
     unknowns : tuple of str
         Names of the coefficients that are not known yet. Series and conditions are polynomials in them; no code can be
         generated before `substitute` has replaced all of them.
+    previous, ahead : int
+        Of a step of velocity and position, numbers of samples from before it and from after it that it takes in
+        addition; `companions` has those of an attitude step.
     """
 
     name: str
@@ -144,6 +147,8 @@ class Kernel:
     arguments: str = ""
     notes: tuple[str, ...] = field(default=())
     unknowns: tuple[str, ...] = ()
+    previous: int = 0
+    ahead: int = 0
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -160,6 +165,11 @@ class Kernel:
     def identifier(self) -> str:
         """The name in generated code."""
         return self.name.replace("-", "_")
+
+    @property
+    def takes_velocity(self) -> bool:
+        """Whether it is a step of velocity and position, from increments of both kinds."""
+        return [signal.name for signal in self.inputs] == ["increments", "velocity_increments"]
 
     @property
     def signals(self) -> tuple[Signal, ...]:

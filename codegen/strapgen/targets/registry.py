@@ -108,6 +108,7 @@ class Target:
 #: The target that other back ends use for what is not theirs, such as the conversion of a state to a matrix.
 NUMPY = "numpy"
 _EMIT = f"{__name__.rpartition('.')[0]}.{{}}.emit:emit"
+_FIXED = f"{__name__.rpartition('.')[0]}.{{}}.fixed:emit"
 #: The targets of strapgen by name.
 BUILT_IN = {
     NUMPY: Target(
@@ -129,8 +130,22 @@ BUILT_IN = {
     ),
     "cpp": Target("C++17 in double: one header", _EMIT.format("cpp"), language="C++", number="double"),
     "cpp-float": Target("C++17 in float: one header", _EMIT.format("cpp"), language="C++", number="float"),
+    "cpp-fixed": Target(
+        "C++17 in fixed point: one header, constexpr, with the bits of the C",
+        _FIXED.format("cpp"),
+        fixed=True,
+        words=(16, 32, 64),
+        language="C++",
+    ),
     "rust": Target("Rust in double: one module", _EMIT.format("rust"), language="Rust", number="double"),
     "rust-float": Target("Rust in float: one module", _EMIT.format("rust"), language="Rust", number="float"),
+    "rust-fixed": Target(
+        "Rust in fixed point: one module, no unsafe code, with the bits of the C",
+        _FIXED.format("rust"),
+        fixed=True,
+        words=(16, 32, 64),
+        language="Rust",
+    ),
     "matlab": Target(
         "MATLAB and GNU Octave in double: one function file",
         _EMIT.format("matlab"),

@@ -30,6 +30,8 @@ _CRATE = """#![no_std]
 fn panicked(_: &core::panic::PanicInfo) -> ! {
     loop {}
 }
+#[no_mangle]
+pub extern "C" fn rust_eh_personality() {}
 """
 
 

@@ -17,6 +17,7 @@ import mpmath
 import sympy as sp
 
 from strapgen.support import checks
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.vibration.response import Form, Pair
 from strapgen.vibration.systems import T_L, T_M, F, T
@@ -72,6 +73,11 @@ class Assessment:
     recursion: bool
     computed: dict[Pair, Form]
     continuous: dict[Pair, Form]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel}: mean rate in {self.unit}, {len(self.computed)} pairs of channels"
 
     @cached_property
     def error(self) -> dict[Pair, Form]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.support import checks, delimited
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.support.suggestions import counted, needed
 from strapgen.vibration.mean_rates import Assessment, Rates
@@ -67,6 +68,8 @@ class Spectrum:
     density: Callable[[Array], Array]
     transfers: Mapping[str, Callable[[Array], Array]]
     edges: tuple[float, ...]
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not isinstance(self.transfers, Mapping):

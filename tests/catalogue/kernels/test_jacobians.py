@@ -82,12 +82,17 @@ def test_jacobians_are_the_limits_of_differences(algorithm, method, size, rng):
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "most"),
+    ("algorithm", "method", "previous", "most"),
     # The fewest that SymForce, wrenfold and CasADi take, as benchmarks/jacobians.py counts them on their code.
-    [("euler", 708), ("dcm", 954)],
+    [
+        ("euler", "rk4", 0, 708),
+        ("dcm", "rk4", 0, 954),
+        pytest.param("euler", "coning-combined", 3, 6471, marks=pytest.mark.long),
+        pytest.param("dcm", "coning-combined", 3, 12392, marks=pytest.mark.long),
+    ],
 )
-def test_they_take_fewer_operations_than_common_subexpressions_do(algorithm, most):
-    operations = program(choose(f"{algorithm}-jacobian", "rk4", 2)).operations
+def test_they_take_fewer_operations_than_common_subexpressions_do(algorithm, method, previous, most):
+    operations = program(choose(f"{algorithm}-jacobian", method, previous or 2, previous=previous)).operations
     assert operations["multiply"] + operations["add"] < most
 
 

@@ -225,7 +225,7 @@ def test_a_bad_file_gets_one_line(change, reason):
         ("tableau {heun} --set c2=2/3 c3=1", "3*c2 - 2 is 0 with these values; the family excludes it"),
         ("tableau {heun} --set c2=1/3", "c3 has no value"),
         ("tableau {heun} --set c2=1 c3=1/2 --family 4", "family is 4"),
-        ("tableau {heun} --format csv", "families are text or json"),
+        ("tableau {heun} --format csv", "families are text, json or latex"),
         ("tableau rk4 --set c2=1", "rk4 has none"),
         ("derive euler --tableau {heun}", "its coefficients hold unknowns; strapgen tableau solves for them"),
     ],

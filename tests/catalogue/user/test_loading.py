@@ -272,6 +272,17 @@ WRONG = {
         '(3,), ("d_x"',
         "takes state, increments; state and increments (K, 3)",
     ),
+    "nodes of increments": (
+        ",) * 9)",
+        ",) * 9, nodes=(0,))",
+        "takes increments and has nodes; nodes go with turns",
+    ),
+    "no nodes": ('Signal("increments"', 'Signal("turns"', "its companions need as many different nodes"),
+    "a decimal node": (
+        'Signal("increments"',
+        'Companions = functools.partial(Companions, nodes=(0.5,)); Signal("turns"',
+        "its nodes are (0.5,); whole numbers and fractions.Fraction are needed",
+    ),
     "output": (
         'Signal.matrix("next", "next"), state * (1 + twice[0])',
         'Signal.vector("next", "next"), twice',
@@ -357,7 +368,7 @@ def test_an_attitude_kernel_must_turn_the_state_into_a_matrix(folder):
         ("mrp.py", {"method": "magnus4"}, "method 'magnus4' has no tableau; these have: rk1, "),
         ("mrp.py", {"increments": 9}, "increments is 9; a whole number from 1 to 8"),
         ("mrp.py", {"previous": 33}, "previous is 33; a whole number from 0 to 32"),
-        ("mrp.py", {"rates": True}, "mrp.py: an algorithm of a user takes increments, not rates"),
+        ("mrp.py", {"rates": True}, "mrp.py: rates at nodes go with methods of the catalogue"),
     ],
 )
 def test_options_that_an_algorithm_does_not_take(here, file, chosen, said):

@@ -190,7 +190,8 @@ COMMANDS = (
     "compare euler --step 0.25 --duration 1 --backend numpy,exact --format json",
     "converge euler --steps 0.5,0.25 --duration 1 --backend numpy --format json",
     "converge euler --method window-7-7 --steps 0.5,0.25 --duration 1 --format json",
-    "study word-length --words 16 --duration 1 --steps 0.25 --format json",
+    "study word-length --words 16 --increments 1 --methods window-3-3 --duration 1 --steps 0.25 --format json",
+    "frontier --method coning-compressed:1+1 --duration 1 --format json",
     "study velocity-position --method rk4:2 --duration 1 --format json",
     "series euler --method rk2 --terms 1 --format json",
 )

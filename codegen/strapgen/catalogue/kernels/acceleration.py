@@ -30,6 +30,8 @@ NAVIGATION_VELOCITY = Signal.vector(
     bound=Fraction(64),
     frame="n",
 )
+#: The equation of Savage that takes the velocity to navigation axes, by state and form of the sculling integral.
+VELOCITY_EQUATIONS = {("dcm", 1): "(51)", ("dcm", 2): "(52)", ("euler", 1): "(57)", ("euler", 2): "(58)"}
 
 
 def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> sp.Matrix:
@@ -133,11 +135,10 @@ def velocity(name: str, form: int) -> Kernel:
     state, u, eta = map(build.input, (KINEMATICS[name].state, VELOCITY_SUM, SCULLING))
     beta = build.input(ANGLE_SUM) if form == 2 else None
     build.output(TRANSFORMED, rotated(build, name, state, compensated(build, form, u, eta, beta)))
-    equations = {("dcm", 1): "(51)", ("dcm", 2): "(52)", ("euler", 1): "(57)", ("euler", 2): "(58)"}
     return build.kernel(
         f"{name}-velocity-{form}",
         f"Velocity increment in navigation axes by {_words(name)}, with S{form}",
-        f"{SAVAGE}, equation {equations[name, form]}",
+        f"{SAVAGE}, equation {VELOCITY_EQUATIONS[name, form]}",
     )
 
 

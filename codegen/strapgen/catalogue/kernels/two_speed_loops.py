@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from strapgen.catalogue.kernels.acceleration import (
     NAVIGATION_VELOCITY,
+    VELOCITY_EQUATIONS,
     compensated,
     frame_correction,
     rotated,
@@ -36,6 +37,10 @@ from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
+
+#: Equations of Savage that turn a state by a rotation vector, and with the navigation frame.
+_UPDATE = {"dcm": "(2) to (4)", "euler": "(9) to (14)"}
+_TURNED_FRAME = {"dcm": "(5), (6)", "euler": "(15)"}
 
 
 def fast(form: int) -> Kernel:
@@ -108,7 +113,7 @@ def slow(name: str, form: int) -> Kernel:
     return build.kernel(
         f"{name}-two-speed-slow-{form}",
         f"Two speeds: slow loop of the {_title(name)}",
-        f"{SAVAGE}, equations (2) to (14), (22), (27) and {'(51)' if form == 1 else '(52)'}",
+        f"{SAVAGE}, equations {_UPDATE[name]}, (22), (27) and {VELOCITY_EQUATIONS[name, form]}",
         recursion=Recursion(
             tuple((held.name, signal.name) for held, signal, _ in states),
             kept=(kinematics.state.name, PREVIOUS_TURN.name),
@@ -145,7 +150,7 @@ def navigation(name: str) -> Kernel:
     return build.kernel(
         f"{name}-two-speed-navigation",
         f"Two speeds: navigation loop of the {_title(name)}",
-        f"{SAVAGE}, equations (5), (15) and (59)",
+        f"{SAVAGE}, equations {_TURNED_FRAME[name]} and (59)",
         recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
     )
 

@@ -89,6 +89,8 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
         "of Orientation of Rigid Bodies (1973)",
         order=order,
         arguments=f"velocity-position {option}",
+        previous=previous,
+        ahead=ahead,
     )
 
 

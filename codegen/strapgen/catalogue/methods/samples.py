@@ -98,7 +98,7 @@ def turns_signal(nodes: Sequence[Number]) -> Signal:
 def label(node: Number) -> str:
     """Return a node as part of a name: a short fraction as it is, any other number with four decimals."""
     text = str(node)
-    if not isinstance(node, Fraction) or len(text) > 11:
+    if not isinstance(node, (int, Fraction)) or len(text) > 11:
         text = f"{float(node):.4f}"
     return text.replace("/", "_").replace(".", "_").replace("-", "minus_")
 

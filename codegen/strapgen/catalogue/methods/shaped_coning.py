@@ -21,6 +21,7 @@ from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, ra
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.support import checks, toml_files
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
 
@@ -93,6 +94,15 @@ class ShapedConing:
     gyro: GyroResponse | None = None
     level: Decimal | None = None
     file: str = field(default="", compare=False, repr=False)
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"{self.name}: {self.title}\n{counted(self.samples, 'sample')}, {self.previous} before"
 
     @property
     def option(self) -> str:

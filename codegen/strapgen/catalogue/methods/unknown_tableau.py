@@ -16,6 +16,7 @@ from strapgen.catalogue.methods.derivative_words import word_text, words
 from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.support import checks, toml_files
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic import elimination, families, reading, unknown_values
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution
@@ -55,6 +56,13 @@ class UnknownTableau:
     nodes: tuple[sp.Expr, ...]
     matrix: tuple[tuple[sp.Expr, ...], ...]
     weights: tuple[sp.Expr, ...]
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        stages = f"{len(self.nodes)} stages, order {self.order}"
+        return f"{self.name}: {self.title}\n{stages}; unknowns {', '.join(self.unknowns)}"
 
     @cached_property
     def stages(self) -> Stages:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
-from strapgen.support.brief import short_repr
+from strapgen.support.brief import notebook_latex, short_repr
 from strapgen.support.exceptions import InputError
 from strapgen.support.suggestions import counted
 
@@ -104,6 +104,7 @@ class Window:
     sibling: bool = False
 
     __repr__ = short_repr
+    _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         samples = f"{self.previous} samples before a step of {self.increments}, {self.ahead} ahead"

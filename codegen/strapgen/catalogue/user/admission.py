@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterator
+from fractions import Fraction
 
 import sympy as sp
 
@@ -28,6 +29,8 @@ _FUNCTIONS = (sp.sin, sp.cos, sp.sinc, sp.atan2, sp.asin, sp.acos, Direction, Wr
 #: The step, the time, what an expression in JSON may hold, and what SymPy reads as numbers.
 _SYMBOLS_OF_SERIES = {"h", "t", "S", "E", "I", "cosine", "sine", *reading.FUNCTIONS, *reading.CONSTANTS}
 _COMPARISONS = (sp.Gt, sp.Ge, sp.Lt, sp.Le)
+#: Outputs of a step of velocity and position.
+CHANGES = ("velocity_change", "position_change")
 ALLOWED = (
     "exact numbers, + - * /, whole powers, square roots, sin, cos, sinc, atan2, asin, acos, Max, "
     "and Piecewise on < <= > >= with a last case that is always true"
@@ -192,7 +195,56 @@ def _faults(expression: sp.Basic) -> Iterator[str]:
         yield type(expression).__name__
 
 
+def _require_changes(kernel: Kernel) -> None:
+    """Check a step of velocity and position."""
+    shapes = [signal.shape for signal in kernel.inputs]
+    if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
+        _refuse(kernel, "increments and velocity_increments of one shape (K, 3) are needed")
+    outputs = [stage.signal for stage in kernel.outputs]
+    if not outputs or any(signal.name not in CHANGES or signal.shape != (3,) for signal in outputs):
+        names = ", ".join(signal.name for signal in outputs) or "nothing"
+        _refuse(kernel, f"it returns {names}; {' and '.join(CHANGES)}, (3,) each, or one of them, are needed")
+    _require_beside(kernel, kernel.previous, kernel.ahead, shapes[0][0])
+    if kernel.companions is not None:
+        _refuse(kernel, "a step of velocity and position has no companions")
+
+
+def _require_beside(kernel: Kernel, previous: int, ahead: int, samples: int) -> None:
+    """Check the numbers of samples from before a step and from after it."""
+    for name, number in (("previous", previous), ("ahead", ahead)):
+        if type(number) is not int:
+            _refuse(kernel, f"{name} {number!r} is no number")
+    if min(previous, ahead) < 0 or previous + ahead >= samples:
+        _refuse(kernel, f"{previous} of its {samples} increments are previous ones and {ahead} are ahead")
+
+
+def _require_samples(kernel: Kernel, step: Companions) -> None:
+    """Check the inputs of an attitude step: its state, and increments or rates at nodes."""
+    names = [signal.name for signal in kernel.inputs]
+    shape: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
+    if names not in (["state", "increments"], ["state", "turns"]) or len(shape) != 2 or shape[1] != 3:
+        _refuse(
+            kernel,
+            f"it takes {', '.join(names)}; state and increments (K, 3), state and turns (K, 3), or increments and "
+            "velocity_increments are needed",
+        )
+    _require_beside(kernel, step.previous, step.ahead, shape[0])
+    if names[1] == "increments":
+        if step.nodes:
+            _refuse(kernel, "it takes increments and has nodes; nodes go with turns")
+        return
+    if not all(isinstance(node, (int, Fraction)) for node in step.nodes):
+        _refuse(kernel, f"its nodes are {step.nodes!r}; whole numbers and fractions.Fraction are needed")
+    if len(step.nodes) != shape[0] or len(set(step.nodes)) != shape[0]:
+        _refuse(kernel, f"it takes rates at {shape[0]} nodes; its companions need as many different nodes")
+    if step.beside:
+        _refuse(kernel, "it takes rates; previous and ahead go with increments")
+
+
 def _require_step(kernel: Kernel) -> None:
+    if kernel.takes_velocity:
+        _require_changes(kernel)
+        return
     step = kernel.companions
     if step is None:
         _refuse(kernel, "it has no companions; an attitude step needs them")
@@ -201,15 +253,9 @@ def _require_step(kernel: Kernel) -> None:
         _refuse(kernel, f"its companions are {step!r}; strapgen.Companions is needed")
     if not isinstance(step.isometry, bool):
         _refuse(kernel, f"isometry {step.isometry!r} is no truth value")
-    for name in ("previous", "ahead"):
-        if type(getattr(step, name)) is not int:
-            _refuse(kernel, f"{name} {getattr(step, name)!r} is no number")
     if kernel.order is not None and not isinstance(kernel.order, Order):
         _refuse(kernel, f"its order is {kernel.order!r}; strapgen.Order is needed")
-    names = [signal.name for signal in kernel.inputs]
-    samples: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
-    if names != ["state", "increments"] or len(samples) != 2 or samples[1] != 3:
-        _refuse(kernel, f"it takes {', '.join(names)}; state and increments (K, 3) are needed")
+    _require_samples(kernel, step)
     state = kernel.inputs[0]
     if len(kernel.outputs) != 1 or kernel.outputs[0].signal.shape != state.shape:
         _refuse(kernel, f"one output of the shape of the state, {state.shape}, is needed")
@@ -218,11 +264,6 @@ def _require_step(kernel: Kernel) -> None:
     for number in step.identity:
         if not hasattr(number, "numerator") or isinstance(number, bool):
             _refuse(kernel, f"identity holds {number!r}; whole numbers or fractions are needed")
-    if min(step.previous, step.ahead) < 0 or step.beside >= samples[0]:
-        _refuse(
-            kernel,
-            f"{step.previous} of its {samples[0]} increments are previous ones and {step.ahead} are ahead",
-        )
     if (step.product is None) != (kernel.transition is None):
         _refuse(kernel, "a product and a transition go together")
     stages = {stage.signal.name: stage.signal for stage in kernel.stages}
@@ -239,7 +280,8 @@ def _require_step(kernel: Kernel) -> None:
 
 def _companions(kernel: Kernel) -> list[tuple[str, str]]:
     step = kernel.companions
-    assert step is not None, "checked before"
+    if step is None:  # a step of velocity and position
+        return []
     roles = ("product", "orthonormalize", "attitude")
     return [(role, name) for role in roles if (name := getattr(step, role)) is not None]
 

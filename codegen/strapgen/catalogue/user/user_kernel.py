@@ -32,6 +32,9 @@ class Head:
         Text that differs between different kernels, without their arguments.
     unknowns : tuple of str
         Coefficients that are not known.
+    beside : tuple of (int, int), optional
+        Of a step of velocity and position, the numbers of samples from before it and from after it; None for any
+        other kernel.
     """
 
     name: str
@@ -40,6 +43,7 @@ class Head:
     brought: tuple[str, ...]
     text: str
     unknowns: tuple[str, ...] = ()
+    beside: tuple[int, int] | None = None
 
     @classmethod
     def of(cls, kernel: Kernel) -> Head:
@@ -48,7 +52,8 @@ class Head:
         brought = tuple(other.name for other in kernel.own)
         text = _text(replace(kernel, arguments=""))
         samples = shape[0] if shape else 1
-        return cls(kernel.name, samples, kernel.companions, brought, text, kernel.unknowns)
+        beside = (kernel.previous, kernel.ahead) if kernel.takes_velocity else None
+        return cls(kernel.name, samples, kernel.companions, brought, text, kernel.unknowns, beside)
 
 
 class UserKernel:

@@ -87,7 +87,7 @@ def compare(
         stated = {"--source": files, "--fail-above": fail_above, "--plot": output.plot}
         others, names = [name for name in stated if stated[name]], _backends(backend, reference, None)
         return compared_system(algorithm, methods, names, reference, others, source, fixed, output)
-    choices = methods.choices(algorithm)
+    choices = _taking_increments(methods.choices(algorithm))
     names = _backends(backend, reference, files)
     most = limit("--fail-above", fail_above)
     source.check()
@@ -122,6 +122,16 @@ def compare(
     )
     if most is not None:
         _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
+
+
+def _taking_increments(choices: list[Choice]) -> list[Choice]:
+    """Return choices, and refuse a user's step that takes rates: back ends are compared on increments."""
+    for choice in choices:
+        if choice.increments is None:
+            raise InputError(
+                f"kernel {choice.kernel} takes rates at nodes; compare needs a step that takes increments"
+            )
+    return choices
 
 
 def _of_files(files: list[Path] | None, choice: Choice) -> list[Backend]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from strapgen.catalogue import Choice
 
 _Text = str | None
-#: The kernel of the velocity and position of a step.
+#: The kernel of the catalogue for the velocity and position of a step.
 VELOCITY_POSITION = "velocity-position"
 
 
@@ -171,7 +171,7 @@ def series(
 
     The algorithm velocity-position stands for the velocity and position change of a step, whose errors are sums of
     vectors and cross products of the rate w0 + w1 t + ... and of the specific force f0 + f1 t + ...; the position is
-    divided by h.
+    divided by h. A file with a step of velocity and position has such a series too.
 
     Example: strapgen series euler --method rk4 --increments 2 --motion constant
 
@@ -189,10 +189,10 @@ def series(
             f"--format {output.format} goes with --all; without it text, latex and json are allowed"
         )
     _check_plot(motion, versus, plot, output)
-    if algorithm == VELOCITY_POSITION:
-        _of_velocity(methods, motion, count, versus, output)
+    choices = methods.choices(algorithm, step=not _may_be_velocity(algorithm))
+    if choices[0].takes_velocity:
+        _of_velocity(choices, motion, count, versus, output)
         return
-    choices = methods.choices(algorithm)
     if len(choices) > 1 and (output.plot is not None or versus.versus is not None):
         raise InputError("--plot and --versus go with one method")
     most = 2 if count is None else count
@@ -210,19 +210,25 @@ def series(
     output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)
 
 
+def _may_be_velocity(algorithm: str) -> bool:
+    """Return whether an algorithm may be a step of velocity and position."""
+    from strapgen.catalogue.user import loading
+
+    return algorithm == VELOCITY_POSITION or algorithm.endswith(".py") or algorithm in loading.installed()
+
+
 def _of_velocity(
-    methods: SeveralMethods, motion: str, terms: int | None, versus: Versus, output: Output
+    choices: list[Choice], motion: str, terms: int | None, versus: Versus, output: Output
 ) -> None:
     """Deliver the series of velocity and position, which hold for any smooth motion and specific force."""
     if motion != "general" or versus.versus is not None or output.plot is not None:
         raise InputError(
-            f"series of {VELOCITY_POSITION} hold for any motion; --motion, --versus and --plot go with an attitude"
+            f"series of {choices[0].name} hold for any motion; --motion, --versus and --plot go with an attitude"
         )
     from strapgen.analysis import velocity_series
     from strapgen.reports.error_analysis.velocity_series import velocity_series_report
 
     most = 1 if terms is None else terms
-    choices = methods.choices(VELOCITY_POSITION, step=False)
     output.report(velocity_series_report([velocity_series.series(choice, most) for choice in choices]))
 
 

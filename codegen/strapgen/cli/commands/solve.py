@@ -22,8 +22,8 @@ _Text = str | None
 class SolutionOutput(Output):
     """Where the families go, and in which format."""
 
-    format: Annotated[_Text, format_option(("text", "json"))] = "text"
-    formats: ClassVar[tuple[str, ...]] = ("text", "json")
+    format: Annotated[_Text, format_option(("text", "json", "latex"))] = "text"
+    formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
 
 
 @grouped
@@ -51,9 +51,9 @@ def solve(
         option(
             "--on",
             metavar="MOTION=N,...",
-            help="Motions on which it is to have the order N, without =N that of --order: general (any smooth rate); "
-            "polynomial, of the degree that the increments determine; coning. The last two hold to products of two "
-            "rates.",
+            help="Motions on which it is to have the order N, without =N that of --order: general (any smooth motion); "
+            "polynomial, of the degree that the samples determine; coning, or sculling of a velocity. The last three "
+            "hold to products of two vectors. velocity or position: any smooth motion, and that change alone.",
             panel="Input",
         ),
     ] = "general",
@@ -74,7 +74,8 @@ def solve(
 ) -> None:
     """Solve the conditions on the unknown coefficients of an algorithm.
 
-    An algorithm declares them with KernelBuilder.parameter. You see the conditions, every family of coefficients that
+    An algorithm declares them with KernelBuilder.parameter. It is a step of attitude, on increments or on rates at
+    nodes, or one of velocity and position. You see the conditions, every family of coefficients that
     satisfies them, with its free parameters, and the leading error that it leaves. Linear conditions are solved
     exactly, polynomial ones by elimination and Groebner bases within stated limits. If there is no solution, the answer
     says why.
@@ -85,7 +86,7 @@ def solve(
     """
     output.check(algorithm, *method.files)
     orders = _orders(on, checks.whole("--order", order))
-    choice = method.choose(algorithm)
+    choice = method.choose(algorithm, step=False)
     from strapgen.analysis import solving
     from strapgen.reports.error_analysis.unknowns import solved_report
 

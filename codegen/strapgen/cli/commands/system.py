@@ -151,15 +151,16 @@ def _fitted(
     from strapgen.systems.budget import budget
     from strapgen.systems.fitting import fitted
     from strapgen.systems.wiring import read_system
-    from strapgen.targets import BUILT_IN, fixed_targets, system_targets
+    from strapgen.targets import BUILT_IN, system_targets
 
     checks.choice("target", target, system_targets())
     settings = fixed.settings(1)
     if BUILT_IN[target].fixed:
         settings = settings or Settings()
     elif settings is not None:
+        takers = [name for name in system_targets() if BUILT_IN[name].fixed]
         raise InputError(
-            f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
+            f"the options of fixed point go with --target {' or '.join(takers)}, not with {target}"
         )
     if cpu is not None:
         if not BUILT_IN[target].compiled:

@@ -97,8 +97,8 @@ def _families(method: str, output: Output) -> None:
     from strapgen.catalogue.methods import unknown_tableau
     from strapgen.reports.error_analysis.tableau_families import families_report
 
-    if output.format not in ("text", "json"):
-        raise InputError(f"--format {output.format} goes with --set; families are text or json")
+    if output.format not in ("text", "json", "latex"):
+        raise InputError(f"--format {output.format} goes with --set; families are text, json or latex")
     unknown = unknown_tableau.read(method)
     with waiting(f"solving the conditions of {method}"):
         solutions = {equations: unknown.solve(equations) for equations in unknown_tableau.EQUATIONS}

@@ -12,6 +12,7 @@ PAGE = 60.0
 _INDENT = 2.0
 #: Commands that take the width of nothing, and of several digits.
 _WIDTHS = {"left": 0.0, "right": 0.0, "quad": 2.0, "qquad": 4.0, "!": -0.3, ",": 0.35, ";": 0.6, " ": 0.6}
+_WIDTHS |= {"leq": 2.8, "geq": 2.8, "max": 3.6}
 
 
 def align_environment(rows: Iterable[str]) -> str:
@@ -83,6 +84,11 @@ def width(text: str) -> float:
 def unbroken(text: str) -> float:
     """Return the width of the widest part of a formula that no line break divides."""
     return max(map(width, parts(text)))
+
+
+def fits(text: str, room: float) -> bool:
+    """Return whether lines of a width hold all parts of a formula, its wide quotients with a slash."""
+    return unbroken(text) <= room or unbroken(_with_slashes(text, room)) + _INDENT <= room
 
 
 def sum_text(terms: Sequence[tuple[Fraction, str]]) -> str:
@@ -179,6 +185,9 @@ def _measured(text: str, place: int, end: str = "") -> tuple[float, int]:
             elif command in ("mathbf", "mathrm", "boldsymbol", "text", "mathit", "dot", "operatorname"):
                 argument, place = _argument(text, place)
                 total += argument * (1.2 if command in ("mathbf", "boldsymbol") else 1.0)
+            elif command == "begin" and text.startswith("{cases}", place):
+                cases, place = _cases(text, place + len("{cases}"))
+                total += cases
             elif command in ("sin", "cos", "tan", "log", "exp", "det"):
                 total += 3.0
             else:
@@ -195,6 +204,21 @@ def _measured(text: str, place: int, end: str = "") -> tuple[float, int]:
             )
             place += 1
     return total, place
+
+
+def _cases(text: str, place: int) -> tuple[float, int]:
+    r"""Return the width of the rows of \begin{cases} from a place on, and the place after \end{cases}."""
+    depth, rows, row = 0, [0.0], place
+    for match in re.compile(r"\\(begin|end)\{cases\}|\\\\").finditer(text, place):
+        if match[1] != "end" or depth:
+            depth += {"begin": 1, "end": -1}.get(match[1], 0)
+            if match[1] is None and not depth:
+                rows.append(width(text[row : match.start()]))
+                row = match.end()
+            continue
+        rows.append(width(text[row : match.start()]))
+        return max(rows) + 3.0, match.end()
+    return max(rows), len(text)
 
 
 def _argument(text: str, place: int) -> tuple[float, int]:

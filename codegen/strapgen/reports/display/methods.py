@@ -12,12 +12,16 @@ from strapgen.analysis.growth import Stability
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.samples import sample_names
+from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.window import Window
 from strapgen.reports.display.expressions import expression_latex
 from strapgen.reports.display.latex import PAGE, equations, sum_text, width
 
 #: The highest order whose conditions stand below a tableau: there are eight.
 _MOST_CONDITIONS = 4
+#: Decimals of the weights of a filter.
+_DECIMALS = 4
 
 
 def tableau_latex(tableau: Tableau) -> str:
@@ -25,11 +29,26 @@ def tableau_latex(tableau: Tableau) -> str:
     rows = [
         [_number(x) for x in (node, *row)] for node, row in zip(tableau.nodes, tableau.matrix, strict=True)
     ]
-    bottom = [["", *map(_number, row)] for row in (tableau.weights, tableau.embedded_weights) if row]
+    bottom = [[*map(_number, row)] for row in (tableau.weights, tableau.embedded_weights) if row]
     stages = len(tableau.nodes)
-    filled = [[*row, *[""] * (1 + stages - len(row))] for row in (*rows, *bottom)]
+    filled = [[*row, *[""] * (1 + stages - len(row))] for row in (*rows, *(["", *row] for row in bottom))]
     if sum(max(width(row[k]) for row in filled) + 2 for k in range(1 + stages)) > PAGE:
         return _by_stage(tableau)
+    return array_latex(rows, bottom)
+
+
+def array_latex(rows: Sequence[Sequence[str]], bottom: Sequence[Sequence[str]]) -> str:
+    """Return a tableau as an array with rules.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        For each stage its node and its row of the matrix, as LaTeX.
+    bottom : sequence of sequence of str
+        Rows of weights.
+    """
+    stages = len(rows)
+    filled = [[*row, *[""] * (1 + stages - len(row))] for row in (*rows, *(["", *row] for row in bottom))]
     lines = [" & ".join(row) for row in filled]
     lines[stages] = r"\hline " + lines[stages]
     body = " \\\\\n".join(lines)
@@ -74,6 +93,44 @@ def coning_latex(design: Design) -> str:
     return equations(
         [(r"\boldsymbol{\phi}", sum_text(terms)), (r"\delta\dot{\phi}", expression_latex(drift))]
     )
+
+
+def window_latex(window: Window) -> str:
+    r"""Return the Legendre coefficients of the rate that a window estimates; weights have four decimals.
+
+    The increments of the step are \mathbf{d}_{1} and on, those before it \mathbf{d}_{0} and back.
+    """
+    samples = [
+        rf"\mathbf{{d}}_{{{k}}}" for k in range(1 - window.previous, window.samples - window.previous + 1)
+    ]
+    return _rounded(
+        (rf"\mathbf{{c}}_{{{m}}}", _decimal_sum(zip(row, samples, strict=True)))
+        for m, row in enumerate(window.filters)
+    )
+
+
+def shaped_coning_latex(shape: ShapedConing) -> str:
+    """Return the rotation vector of a step by coefficients for a band or a spectrum; they have four decimals."""
+    names = [rf"\mathbf{{d}}_{{{k}}}" for k in range(1 - shape.previous, shape.samples + 1)]
+    older = _decimal_sum((c, names[-1 - s]) for s, c in reversed([*enumerate(shape.coefficients, 1)]))
+    total = " + ".join(names[shape.previous :])
+    return _rounded([(r"\boldsymbol{\phi}", rf"{total} + \left({older}\right) \times {names[-1]}")])
+
+
+def _rounded(rows: Iterable[tuple[str, str]]) -> str:
+    """Return equations that hold for numbers with four decimals."""
+    return equations(rows).replace(" &= ", r" &\approx ")
+
+
+def _decimal_sum(terms: Iterable[tuple[Fraction, str]]) -> str:
+    """Return a sum of vectors with weights of four decimals."""
+    text = ""
+    for weight, name in terms:
+        if rounded := round(float(weight), _DECIMALS):
+            size = "" if abs(rounded) == 1 else f"{abs(rounded):.{_DECIMALS}f} "
+            sign = ("-" if rounded < 0 else "") if not text else (" - " if rounded < 0 else " + ")
+            text += f"{sign}{size}{name}"
+    return text or "0"
 
 
 def stability_latex(stabilities: Sequence[Stability]) -> str:

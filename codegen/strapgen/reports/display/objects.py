@@ -12,10 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.analysis.error_analysis import ErrorAnalysis
+from strapgen.analysis.growth import Stability
 from strapgen.analysis.notation import LATEX, covariant_text
 from strapgen.analysis.series import PARTS, STEP, ErrorSeries
+from strapgen.analysis.solving import LeadingError, SolvedStep
+from strapgen.analysis.velocity_series import VelocitySeries
 from strapgen.catalogue.methods.coning_coefficients import Design
+from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
+from strapgen.catalogue.methods.window import Window
 from strapgen.experiments.algorithm import AttitudeAlgorithm
 from strapgen.experiments.comparison import Comparisons
 from strapgen.experiments.convergence import Convergence
@@ -23,9 +29,17 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.reports import comparison, convergence, formulas, runs
+from strapgen.reports.display import unknowns
 from strapgen.reports.display.expressions import expression_latex
 from strapgen.reports.display.latex import equations
-from strapgen.reports.display.methods import coning_latex, tableau_latex
+from strapgen.reports.display.methods import (
+    coning_latex,
+    shaped_coning_latex,
+    stability_latex,
+    tableau_latex,
+    window_latex,
+)
+from strapgen.reports.error_analysis.velocity_series import velocity_series_latex
 from strapgen.reports.plots import figures
 from strapgen.reports.plots import runs as run_plots
 from strapgen.reports.table import Column, TextTable
@@ -34,6 +48,7 @@ from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 from strapgen.support.exceptions import MissingExtraError
 from strapgen.support.files import write_file
+from strapgen.symbolic.families import Equation, Family, PolynomialSolution
 from strapgen.symbolic.kernel import Kernel
 
 #: Most lines of a formula in a notebook, and most lines of code.
@@ -65,6 +80,57 @@ def _(tableau: Tableau) -> str | None:
 @latex.register
 def _(design: Design) -> str | None:
     return coning_latex(design)
+
+
+@latex.register
+def _(window: Window) -> str | None:
+    return window_latex(window)
+
+
+@latex.register
+def _(shape: ShapedConing) -> str | None:
+    return shaped_coning_latex(shape)
+
+
+@latex.register
+def _(stability: Stability) -> str | None:
+    return stability_latex([stability])
+
+
+@latex.register
+def _(tableau: UnknownTableau) -> str | None:
+    return unknowns.unknown_tableau_latex(tableau)
+
+
+@latex.register
+def _(equation: Equation) -> str | None:
+    return unknowns.conditions_latex([equation])
+
+
+@latex.register
+def _(family: Family) -> str | None:
+    return unknowns.family_latex(family)
+
+
+@latex.register
+def _(solution: PolynomialSolution) -> str | None:
+    return unknowns.solution_latex(solution)
+
+
+@latex.register
+def _(solved: SolvedStep) -> str | None:
+    return unknowns.solved_latex(solved)
+
+
+@latex.register
+def _(error: LeadingError) -> str | None:
+    return unknowns.leading_latex(error)
+
+
+@latex.register
+def _(series: VelocitySeries) -> str | None:
+    text = velocity_series_latex(series)
+    return text if len(text.splitlines()) <= _LINES else None
 
 
 @latex.register

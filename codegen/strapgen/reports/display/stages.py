@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
@@ -61,9 +62,10 @@ def stages_latex(kernel: Kernel) -> str | None:
     """
     known = [quantity for signal in kernel.inputs for quantity in _inputs(signal)]
     rows = []
+    domain = sp.QQ.frac_field(*_symbols(kernel.unknowns)) if kernel.unknowns else sp.QQ
     for stage in (*kernel.stages, *kernel.outputs):
         quantity = _quantity(stage.signal, _letter(stage.signal.name, kernel))
-        text = None if quantity is None else _right_side(stage, quantity.kind, known)
+        text = None if quantity is None else _right_side(stage, quantity.kind, known, domain)
         if quantity is None or text is None:
             return None
         rows.append((quantity.letter, text))
@@ -112,15 +114,15 @@ def _letter_of(name: str) -> str:
     return letter if match[2] is None else f"{letter}_{{{match[2].replace('_', '/')}}}"
 
 
-def _right_side(stage: Stage, kind: str, known: Sequence[_Quantity]) -> str | None:
-    """Return the formula of a stage; None if it is no sum of products of two quantities."""
+def _right_side(stage: Stage, kind: str, known: Sequence[_Quantity], domain: Any) -> str | None:
+    """Return the formula of a stage; None if it is no sum of products of two quantities with numbers of a domain."""
     expressions = [sp.sympify(x) for x in stage.expressions]
     free = set().union(*(x.free_symbols for x in expressions))
     used = [quantity for quantity in known if free & set(quantity.elements)]
     if len(used) == 1 and used[0].kind == "vector" and (text := _exponential(kind, expressions, used[0])):
         return text
     symbols = [symbol for quantity in used for symbol in quantity.elements]
-    target = _terms(expressions, symbols)
+    target = _terms(expressions, symbols, domain)
     if target is None:
         return None
     pairs = {frozenset(k for k, power in enumerate(monomial) if power) for _, monomial in target}
@@ -129,12 +131,21 @@ def _right_side(stage: Stage, kind: str, known: Sequence[_Quantity]) -> str | No
     candidates = [
         (letters, terms)
         for letters, elements in _templates(kind, used, together)
-        if (terms := _terms(elements, symbols)) is not None
+        if (terms := _terms(elements, symbols, domain)) is not None
     ]
-    numbers = _solved(target, [terms for _, terms in candidates])
+    numbers = _solved(target, [terms for _, terms in candidates], domain)
     if numbers is None:
         return None
-    return sum_text([(c, letters) for c, (letters, _) in zip(numbers, candidates, strict=True) if c])
+    return sum_text([_term(c, letters) for c, (letters, _) in zip(numbers, candidates, strict=True) if c])
+
+
+def _term(number: sp.Expr, letters: str) -> tuple[Fraction, str]:
+    """Return a term of a sum as a number and a factor, which holds what is unknown."""
+    if number.is_Rational:
+        return Fraction(int(number.p), int(number.q)), letters
+    sign = -1 if number.could_extract_minus_sign() else 1
+    text = str(sp.latex(sign * number))
+    return Fraction(sign), rf"\left({text}\right) {letters}" if number.is_Add else f"{text} {letters}"
 
 
 def _exponential(kind: str, expressions: Sequence[sp.Expr], vector: _Quantity) -> str | None:
@@ -191,12 +202,12 @@ def _products(kind: str, first: _Quantity, second: _Quantity) -> Iterator[tuple[
         yield rf"{a} \cdot {b}", [rotations.dot(first.elements, second.elements)]
 
 
-def _terms(elements: Sequence[sp.Expr], symbols: Sequence[sp.Expr]) -> _Terms | None:
-    """Return expressions as coefficients by element and monomial; None if one is no polynomial with rational ones."""
+def _terms(elements: Sequence[sp.Expr], symbols: Sequence[sp.Expr], domain: Any) -> _Terms | None:
+    """Return expressions as coefficients by element and monomial; None if one is no polynomial over the domain."""
     terms: _Terms = {}
     try:
         for place, element in enumerate(elements):
-            polynomial = sp.Poly(element, *symbols, domain=sp.QQ) if symbols else None
+            polynomial = sp.Poly(element, *symbols, domain=domain) if symbols else None
             pairs = polynomial.terms() if polynomial else [((), sp.Rational(element))]
             terms |= {(place, monomial): c for monomial, c in pairs if c}
     except (sp.PolynomialError, sp.CoercionFailed, TypeError, ValueError):
@@ -204,19 +215,18 @@ def _terms(elements: Sequence[sp.Expr], symbols: Sequence[sp.Expr]) -> _Terms | 
     return terms
 
 
-def _solved(target: _Terms, candidates: Sequence[_Terms]) -> list[Fraction] | None:
+def _solved(target: _Terms, candidates: Sequence[_Terms], domain: Any) -> list[sp.Expr] | None:
     """Return the numbers by which candidates add up to a target, 0 where one is not needed; None if there are none."""
     places = list(dict.fromkeys([*target, *(place for terms in candidates for place in terms)]))
     columns = [*candidates, target]
-    rows = [[sp.QQ.from_sympy(sp.sympify(terms.get(place, 0))) for terms in columns] for place in places]
+    rows = [[domain.from_sympy(sp.sympify(terms.get(place, 0))) for terms in columns] for place in places]
     if not rows:
-        return [Fraction(0)] * len(candidates)
-    reduced, pivots = DomainMatrix(rows, (len(rows), len(columns)), sp.QQ).rref()
+        return [sp.S.Zero] * len(candidates)
+    reduced, pivots = DomainMatrix(rows, (len(rows), len(columns)), domain).rref()
     if len(candidates) in pivots:
         return None
     dense = reduced.to_list()
-    numbers = [Fraction(0)] * len(candidates)
+    numbers = [sp.S.Zero] * len(candidates)
     for row, pivot in enumerate(pivots):
-        value = dense[row][-1]
-        numbers[pivot] = Fraction(int(value.numerator), int(value.denominator))
+        numbers[pivot] = domain.to_sympy(dense[row][-1])
     return numbers

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import sympy as sp
 
 from strapgen.analysis.ratios import STEP_ANGLE, Claim, Ratio, columns
-from strapgen.reports.display.latex import align_environment
+from strapgen.reports.display.expressions import expression_latex
+from strapgen.reports.display.latex import PAGE, equations, unbroken
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 
@@ -36,15 +37,22 @@ def _no_ratio(comparison: Ratio) -> str:
 
 
 def ratio_latex(comparison: Ratio) -> str:
-    """Return a comparison as LaTeX: lines of an align environment of the package amsmath."""
+    """Return a comparison as one align environment; a ratio that no line holds as a numerator and a denominator."""
     rows = []
     for name, terms in zip((comparison.first, comparison.second), comparison.terms, strict=True):
-        for row in columns(terms):
+        rates = [*columns(terms)]
+        for axis, row in zip("xyz" if len(rates) == 3 else ("",), rates, strict=True):
             total = sp.Add(*(x * comparison.symbol**power for power, x in row.items()))
-            rows.append(rf"  \text{{{name}}} &= {sp.latex(total)}")
+            left = rf"\text{{{name}}}" + (f"_{{{axis}}}" if axis else "")
+            rows.append((left, expression_latex(total)))
     if comparison.expression is not None:
-        rows.append(rf"  \text{{ratio}} &= {sp.latex(comparison.expression)}")
-    return f"% {comparison.quantity}, {comparison.motion} motion\n{align_environment(rows)}"
+        text = sp.latex(comparison.expression)
+        if unbroken(text) <= PAGE / 2:
+            rows.append((r"\text{ratio}", text))
+        else:
+            rows.append((r"\text{ratio}", "N / D"))
+            rows += zip(("N", "D"), map(expression_latex, sp.fraction(comparison.expression)), strict=True)
+    return f"% {comparison.quantity}, {comparison.motion} motion\n{equations(rows)}"
 
 
 def ratio_report(comparison: Ratio) -> Report:

@@ -6,6 +6,7 @@ from typing import Any
 
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
+from strapgen.reports.display.unknowns import solution_latex, unknown_tableau_latex
 from strapgen.reports.error_analysis.unknowns import family_lines, solution_data, text_of
 from strapgen.reports.report import Report
 from strapgen.symbolic.families import Equation, PolynomialSolution
@@ -28,7 +29,13 @@ def families_report(unknown: UnknownTableau, solutions: dict[str, PolynomialSolu
         For each of `unknown_tableau.EQUATIONS`.
     """
     leading = [unknown.leading(family) for family in solutions["general"].families]
-    return Report(lambda: _text(unknown, solutions, leading), lambda: _data(unknown, solutions, leading))
+
+    def latex() -> str:
+        return f"{unknown_tableau_latex(unknown)}\n\n{solution_latex(solutions['general'])}"
+
+    return Report(
+        lambda: _text(unknown, solutions, leading), lambda: _data(unknown, solutions, leading), latex=latex
+    )
 
 
 def _data(

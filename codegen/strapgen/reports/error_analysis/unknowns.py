@@ -8,6 +8,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.analysis.solving import LeadingError, SolvedStep
+from strapgen.reports.display.unknowns import solved_latex
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution, shown
@@ -83,7 +84,7 @@ def solved_report(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None = Non
     def data() -> dict[str, Any]:
         return _solved_data(solved) | ({} if chosen is None else {"chosen": _texts(chosen)})
 
-    return Report(lambda: _solved_text(solved, chosen), data)
+    return Report(lambda: _solved_text(solved, chosen), data, latex=lambda: solved_latex(solved))
 
 
 def _solved_data(solved: SolvedStep) -> dict[str, Any]:

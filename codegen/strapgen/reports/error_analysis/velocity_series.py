@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from strapgen.analysis.notation import LATEX, TEXT, covariant_text, with_forces
-from strapgen.analysis.velocity_series import PARTS, VelocitySeries
+from strapgen.analysis.velocity_series import VelocitySeries
 from strapgen.reports.display.latex import equations
 from strapgen.reports.report import Report
 
@@ -24,31 +24,32 @@ def velocity_series_report(several: Sequence[VelocitySeries]) -> Report:
     return Report(
         lambda: "\n\n".join(map(_text, several)),
         data,
-        latex=lambda: "\n\n".join(map(_latex, several)),
+        latex=lambda: "\n\n".join(map(velocity_series_latex, several)),
     )
 
 
 def _text(series: VelocitySeries) -> str:
     lines = [f"{series.kernel}, any motion: what one step of length h loses, computed less true"]
     if series.order is None:
-        return "\n".join([*lines, f"nothing in the velocity, to the power {series.known} of h"])
+        return "\n".join([*lines, f"nothing in the {series.parts[0]}, to the power {series.known} of h"])
     lines += [
-        f"order {series.order} in the velocity; terms to the power {series.known} of h were looked at",
+        f"order {series.order} in the {series.parts[0]}; terms to the power {series.known} of h were looked at",
         "w0, w1, ... : the rate and its derivatives; f0, f1, ... : the specific force and its derivatives",
     ]
     notation = with_forces(TEXT, series.known)
-    for part in PARTS:
+    for part in series.parts:
         title = "velocity" if part == "velocity" else "position/h"
         for power, one in series.coefficients(part).items():
             lines += ["", f"h^{power}  {title:10}  {covariant_text(one, notation=notation)}"]
     return "\n".join(lines)
 
 
-def _latex(series: VelocitySeries) -> str:
+def velocity_series_latex(series: VelocitySeries) -> str:
+    """Return the errors of a step as one align environment."""
     notation = with_forces(LATEX, series.known, r"\mathbf{{f}}_{{{}}}".format)
     rows = [
         (rf"h^{{{power}}}\!:\ {_SYMBOLS[part]}", covariant_text(one, notation=notation))
-        for part in PARTS
+        for part in series.parts
         for power, one in series.coefficients(part).items()
     ]
     return equations(rows)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.support.brief import short_repr
+
 Array = NDArray[np.float64]
 
 
@@ -56,6 +58,8 @@ class TriadErrors:
     damping: Array = field(default_factory=lambda: np.full(3, 0.5**0.5))
     delay: Array = field(default_factory=zeros)
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Sampling:
@@ -76,6 +80,8 @@ class Sampling:
     lost: float = 0.0
     lost_as: str = "late"
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class WarmUp:
@@ -91,6 +97,8 @@ class WarmUp:
 
     rate: Array = field(default_factory=zeros)
     tau: Array = field(default_factory=lambda: np.ones(3))
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +119,8 @@ class Heating:
     tau: float = 150.0
     unbalance: float = 0.0
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class OutputNoise:
@@ -126,6 +136,8 @@ class OutputNoise:
 
     decay: float = 0.0
     rms: Array = field(default_factory=zeros)
+
+    __repr__ = short_repr
 
 
 #: Causes of errors by name, in the order of the signal: what of `InstrumentErrors` each of them has.
@@ -175,6 +187,8 @@ class InstrumentErrors:
     output_noise: OutputNoise = OutputNoise()
     drawn: bool = False
     seed: int = 1
+
+    __repr__ = short_repr
 
     def without(self, *causes: str) -> InstrumentErrors:
         """Return the errors without some causes, names of `CAUSES`; the random numbers of the others stay the same.

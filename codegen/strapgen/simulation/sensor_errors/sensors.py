@@ -17,6 +17,7 @@ from strapgen.backends import evaluator
 from strapgen.simulation.sensor_errors.instruments import InstrumentErrors, TriadErrors
 from strapgen.simulation.sensor_errors.response import Lag, SampleTimes, bounded_noise
 from strapgen.simulation.sensor_errors.streams import Streams
+from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
@@ -46,6 +47,11 @@ class MeasurementUnit:
     >>> unit(np.full((2, 3), 0.5))[0][:, 0] - 0.5
     array([1.e-05, 1.e-05])
     """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.errors.title or 'sensors with errors'}, a sample every {self._interval:g} s"
 
     def __init__(self, errors: InstrumentErrors, interval: float, run: int = 0) -> None:
         self._interval = interval

@@ -5,12 +5,14 @@ The code has no undefined or implementation-defined behaviour, and returns an er
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.sources import Function, Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c_fixed.statements import StatementPrinter
 from strapgen.targets.c_fixed.words import WORDS, memory_type
-from strapgen.targets.names import C, function_name, printed
+from strapgen.targets.names import C, Language, function_name, printed
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
 
 
@@ -30,32 +32,70 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         Two files with the function ``<name>`` on one sample, and two with ``<name>_array`` on many; a step has
         ``<name>_propagate`` there too, the loop over runs and steps.
     """
-    interface = fixed.interface
     name = function_name(fixed.program, f"_w{fixed.word}")
+    return sources_of(fixed, target, name, _files, C, runs_of(name))
+
+
+def sources_of(
+    fixed: FixedProgram,
+    target: str,
+    name: str,
+    files: Callable[[FixedProgram, str, str], dict[str, str]],
+    language: Language,
+    runs: tuple[str, str],
+) -> Sources:
+    """Print a program in a language whose function on arrays has the interface of C.
+
+    Parameters
+    ----------
+    fixed : FixedProgram
+    target, name : str
+        Names of the target and of the function.
+    files : callable
+        ``files(fixed, name, target)`` returns the text of the files of a program with its printed names.
+    language : Language
+        Its rules for names.
+    runs : tuple of str
+        Names of the files with the loops.
+
+    Returns
+    -------
+    Sources
+    """
+    interface = fixed.interface
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
-    _, files = printed(fixed, lambda named, _: _files(named, name, target), C, scalars)
+    _, texts = printed(fixed, lambda named, _: files(named, name, target), language, scalars)
     function = Function(
         name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
     )
     return Sources(
         fixed.program.kernel,
         target,
-        files,
+        texts,
         function,
         fixed.operations,
         fixed.temporaries,
         fixed.program.companions,
         interface,
         fixed.program.recursion,
-        runs=runs_of(name),
+        runs=runs,
     )
 
 
 def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
+    printer = StatementPrinter(fixed, WORDS[fixed.word].within(name), name)
+    values = values_of(fixed, name, target, printer) | {
+        "guard": f"{name}_h".upper(),
+        "definitions": definitions.of_fixed(fixed, name),
+    }
+    return render_c("c_fixed", name, **values)
+
+
+def values_of(fixed: FixedProgram, name: str, target: str, printer: StatementPrinter) -> dict[str, object]:
+    """Return what the templates of fixed point are filled with in every language, the interface of C among it."""
     interface, word = fixed.interface, WORDS[fixed.word].within(name)
-    printer = StatementPrinter(fixed, word, name)
     signals = [(a.signal, f"const {memory_type(a)}") for a in interface.inputs]
     signals += [(a.signal, memory_type(a)) for a in interface.outputs]
     feedback_words = len(interface.residuals)
@@ -69,12 +109,11 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
         calls.insert(place, f"residuals + {feedback_words} * k")
     command = contract.command(fixed, target)
     memory = {signal.name: printer.memory(signal.name) for signal, _ in signals}
-    values = {
+    return {
         "fixed": fixed,
         "target": target,
         "program": fixed.program,
         "interface": interface,
-        "guard": f"{name}_h".upper(),
         "word": word,
         "state": interface.inputs[0].signal,
         "samples": interface.inputs[-1].signal,
@@ -101,8 +140,6 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
         "uses": printer.uses,
         "command": command,
         "contract": contract_lines.of_fixed(fixed, name, command, memory),
-        "definitions": definitions.of_fixed(fixed, name),
         "normalizing": contract.upkeep_text(fixed.program, interface, target),
         "guarded": tuple(value for value in fixed.body if value.guarded),
     }
-    return render_c("c_fixed", name, **values)

@@ -1,9 +1,13 @@
-"""Prints the values of a fixed-point program as C statements, each with its format, range and error bound."""
+"""Prints the values of a fixed-point program as statements, each with its format, range and error bound.
+
+The text is C; other languages change how they declare, convert and refuse.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerMaximum,
@@ -60,10 +64,11 @@ class StatementPrinter:
             for number, element in enumerate(argument.signal.elements):
                 source = f"{self.memory(argument.signal.name)}[{number}]"
                 if element in used:
-                    loads.append(f"const {kind} {element} = {source};")
+                    loads.append(self.loaded(kind, element, source, argument))
                     source = element
                 if not whole:
-                    checks.append(self._call("out", source, limit))
+                    number_ = source if element in used else self.read(kind, source, argument)
+                    checks.append(self._call("out", number_, limit))
         body = [line for value in self.fixed.body for line in self.statements(value)]
         stores = [
             f"{self.memory(argument.signal.name)}[{number}] = {self._stored(name)};"
@@ -75,12 +80,54 @@ class StatementPrinter:
         return {"loads": loads, "checks": checks, "body": body, "stores": stores}
 
     def _stored(self, name: str) -> str:
-        return name if self.word.fast == self.word.type else f"({self.word.type}){name}"
+        return name if self.word.fast == self.word.type else self.cast(self.word.type, name)
 
     def _call(self, helper: str, *arguments: str) -> str:
         """Return a call of one of the file's own functions."""
         self.uses.add(helper)
-        return f"{self.name}_{helper}({', '.join(arguments)})"
+        return f"{self.helper(helper)}({', '.join(arguments)})"
+
+    # What differs between languages
+
+    def helper(self, name: str) -> str:
+        """Return the name of one of the file's own functions."""
+        return f"{self.name}_{name}"
+
+    def cast(self, kind: str, text: str) -> str:
+        """Return a name, an element or an expression in parentheses as a number of another type."""
+        return f"({kind}){text}"
+
+    def read(self, kind: str, source: str, argument: Argument) -> str:
+        """Return an element of an argument as a number of a type; C converts it by itself."""
+        return source
+
+    def loaded(self, kind: str, name: str, source: str, argument: Argument) -> str:
+        """Return the declaration of an element of an argument."""
+        return f"const {kind} {name} = {self.read(kind, source, argument)};"
+
+    def start(self, kind: str, name: str, constant: bool = True) -> str:
+        """Return how the declaration of a value starts."""
+        return f"{'const ' * constant}{kind} {name} ="
+
+    def unset(self, kind: str, name: str) -> str:
+        """Return the declaration of a value that a branch sets."""
+        return f"{kind} {name};"
+
+    def refusal(self) -> str:
+        """Return the statement that refuses a value on the way."""
+        return "return 2;"
+
+    def as_wide(self, name: str) -> str:
+        """Return a value where a wide number is needed; C converts it by itself."""
+        return name
+
+    def _declared(self, kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
+        """Return a declaration, its value on a line of its own where the first line would be too long."""
+        indent, start = " " * 8, self.start(kind, name, constant)
+        statement = fill_expression(f"{start} {text};", indent, 92)
+        if len(statement.partition("\n")[0]) > 92:
+            statement = f"{start}\n" + fill_expression(f"{indent}{text};", indent, 96)
+        return _noted(statement, note) if note else statement
 
     def statements(self, value: Value) -> list[str]:
         """Return the statements that compute a value."""
@@ -91,15 +138,15 @@ class StatementPrinter:
             case IntegerSum() as total:
                 lines += self._sum(value, total, kind, note)
             case IntegerQuotient(numerator, denominator):
-                text = self._call("div", self.scaled(numerator), denominator)
-                lines.append(_declared(kind, name, self.narrow(text, value), note))
+                text = self._call("div", self.scaled(numerator), self.as_wide(denominator))
+                lines.append(self._declared(kind, name, self.narrow(text, value), note))
             case IntegerRoot(argument):
                 text = self._call("rt", self.scaled(argument))
-                lines.append(_declared(kind, name, text, note))
+                lines.append(self._declared(kind, name, text, note))
             case IntegerMaximum((first, *others)):
-                lines.append(_declared(kind, name, self.narrowed(first, value), note, constant=False))
+                lines.append(self._declared(kind, name, self.narrowed(first, value), note, constant=False))
                 for other in others:
-                    lines.append(f"if ({self.scaled(other)} > {name}) {{")
+                    lines.append(_branch("if", self.scaled(other), ">", self.as_wide(name)))
                     lines.append(_assigned(name, self.narrowed(other, value)))
                     lines.append("}")
             case IntegerSelection(cases, otherwise):
@@ -122,10 +169,10 @@ class StatementPrinter:
         note: str,
     ) -> list[str]:
         """Return a chain of conditions, the first that holds before all others."""
-        lines = [_noted(f"{kind} {value.name};", note)]
+        lines = [_noted(self.unset(kind, value.name), note)]
         for number, (left, right, result) in enumerate(cases):
             word = "if" if not number else "} else if"
-            lines.append(f"{word} ({self.scaled(left)} >= {self.scaled(right)}) {{")
+            lines.append(_branch(word, self.scaled(left), ">=", self.scaled(right)))
             lines.append(_assigned(value.name, self.narrowed(result, value)))
         lines.append("} else {")
         lines.append(_assigned(value.name, self.narrowed(otherwise, value)))
@@ -135,8 +182,12 @@ class StatementPrinter:
         limits = self.constant(value.low), self.constant(value.high)
         condition = f"if (({name} < {limits[0]}) || ({name} > {limits[1]})) {{"
         if len(condition) > 90:
-            condition = condition.replace(" || ", "\n        || ")
-        return [condition, "    return 2;", "}"]
+            first, second = condition.split(" || ")
+            indent = " " * 12
+            condition = (
+                f"{fill_expression(first, indent, 95)}\n        {fill_expression(f'|| {second}', indent, 87)}"
+            )
+        return [condition, f"    {self.refusal()}", "}"]
 
     def narrow(self, text: str, value: Value, shift: int = 0) -> str:
         """Return an expression of a wide number, shifted down, as one of the value's type."""
@@ -158,7 +209,7 @@ class StatementPrinter:
             terms = (*definition.coarse, *definition.fine)
             if definition.in_words and all(map(self._is_word, terms)):
                 text = self._joined([self.word_term(term) for term in terms])
-                return [_declared(kind, name, text or "0", note)]
+                return [self._declared(kind, name, text or "0", note)]
             return self._result(value, kind, self._joined([self.term(term) for term in terms]) or "0", note)
         feedback, lines, shift = definition.residual, [], definition.shift
         if feedback is None:
@@ -166,26 +217,27 @@ class StatementPrinter:
             total = fine + half
         else:
             place = f"residuals[{self.places[feedback.name]}]"
-            fed_back = self._scaled_text(f"({wide}){place}", feedback.shift)
+            fed_back = self._scaled_text(self.cast(wide, place), feedback.shift)
             before = self._shifted(fine, definition.drop) if definition.drop else fine
-            lines.append(_declared(wide, f"{name}_sum", f"{before} + {fed_back}"))
-            left = (
-                f"({self.word.magnitude}){name}_sum << {-feedback.shift}" if feedback.shift else f"{name}_sum"
-            )
+            lines.append(self._declared(wide, f"{name}_sum", f"{before} + {fed_back}"))
+            left = f"{name}_sum"
+            if feedback.shift:
+                left = f"{self.cast(self.word.magnitude, left)} << {-feedback.shift}"
             word = self.word.residual
+            text = self.cast(word, f"({left})")
             if self.checks:  # a call that a later check refuses leaves it as it was
-                lines.append(f"const {word} next_{feedback.name} = ({word})({left});")
+                lines.append(self._declared(word, f"next_{feedback.name}", text))
             else:
-                lines.append(f"{place} = ({word})({left});")
+                lines.append(f"{place} = {text};")
             total = f"{name}_sum"
         if definition.in_words and all(map(self._is_word, definition.coarse)):
             words = [self.word_term(term) for term in definition.coarse]
             rounded = f"+{self._call('fit', total, str(shift))}"
             text = self._joined([*words[:1], rounded, *words[1:]])
-            return [*lines, _declared(kind, name, text, note)]
+            return [*lines, self._declared(kind, name, text, note)]
         coarse = [self.term(term) for term in definition.coarse]
         if not coarse and not value.guarded and not value.saturated:
-            return [*lines, _declared(kind, name, self.narrow(total, value, shift), note)]
+            return [*lines, self._declared(kind, name, self.narrow(total, value, shift), note)]
         rounded = f"+{self._shifted(total, shift)}"
         return lines + self._result(value, kind, self._joined([*coarse[:1], rounded, *coarse[1:]]), note)
 
@@ -194,13 +246,13 @@ class StatementPrinter:
         if value.guarded and not value.wide:
             name = f"{value.name}_raw"
             return [
-                _declared(self.word.wide, name, text),
+                self._declared(self.word.wide, name, text),
                 *self._guard(name, value),
-                _declared(kind, value.name, self.narrow(name, value), note),
+                self._declared(kind, value.name, self.narrow(name, value), note),
             ]
         if value.saturated:
-            return [_declared(kind, value.name, self._call("sat", text), note)]
-        return [_declared(kind, value.name, self.narrow(text, value), note)]
+            return [self._declared(kind, value.name, self._call("sat", text), note)]
+        return [self._declared(kind, value.name, self.narrow(text, value), note)]
 
     def _is_word(self, term: Term) -> bool:
         """Tell whether a term is a word, or a small multiple of one, so that it is computed in words."""
@@ -247,7 +299,7 @@ class StatementPrinter:
         else:
             (text,) = factors
             is_wide = text in self.wide_names or text.startswith("(")
-            text = text if is_wide else f"({wide}){text}"
+            text = text if is_wide else self.cast(wide, text)
         if term.shift < 0 and term.factor < 0:  # what is shifted down is the signed product
             return f"+{self._scaled_text(f'-{text}', term.shift)}"
         return sign + self._scaled_text(text, term.shift)
@@ -256,7 +308,7 @@ class StatementPrinter:
         """Return a value times the magnitude of a constant as a sum of shifted terms, in brackets."""
         (name,) = term.names
         terms = [
-            f"{'+' if digit > 0 else '-'}({self.word.wide}){name}"
+            f"{'+' if digit > 0 else '-'}{self.cast(self.word.wide, name)}"
             + (f" * {self.constant(1 << power, wide=True)}" if power else "")
             for digit, power in signed_digits(abs(term.factor))
         ]
@@ -280,9 +332,8 @@ class StatementPrinter:
                 scaled.value << scaled.shift if scaled.shift > 0 else scaled.value, wide=True
             )
         name = scaled.value
-        return self._scaled_text(
-            name if name in self.wide_names else f"({self.word.wide}){name}", scaled.shift
-        )
+        text = name if name in self.wide_names else self.cast(self.word.wide, name)
+        return self._scaled_text(text, scaled.shift)
 
     def constant(self, value: int, wide: bool = False) -> str:
         """Return an integer as a constant expression, with the type of a wide number if `wide` is true."""
@@ -291,13 +342,13 @@ class StatementPrinter:
         if value >= 1 << 4 and not value & (value - 1):
             return self._power_of_two(value.bit_length() - 1)
         if value < 1 << 15:
-            return f"({self.word.wide}){value}" if wide and self.word.bits == 64 else str(value)
+            return self.cast(self.word.wide, str(value)) if wide and self.word.bits == 64 else str(value)
         if value < 1 << 31:
             return f"INT32_C({value})"
         if value < 1 << 63:
             return f"INT64_C({value})"
         high, low = divmod(value, 1 << 62)
-        text = f"({self.word.wide}){self.constant(high)} * (INT64_C(1) << 62)"
+        text = f"{self.cast(self.word.wide, self.constant(high))} * (INT64_C(1) << 62)"
         return f"({text} + INT64_C({low}))" if low else f"({text})"
 
     def _power_of_two(self, exponent: int) -> str:
@@ -307,7 +358,7 @@ class StatementPrinter:
             return f"(INT32_C(1) << {exponent})"
         if exponent < 63:
             return f"(INT64_C(1) << {exponent})"
-        return f"(({self.word.wide})1 << {exponent})"
+        return f"({self.cast(self.word.wide, '1')} << {exponent})"
 
 
 def _exactly(term: Term) -> str:
@@ -320,18 +371,15 @@ def _exactly(term: Term) -> str:
     return f" /* {contract.exact_text(abs(term.coefficient.value))} in Q{term.coefficient.fraction} */"
 
 
+def _branch(word: str, left: str, sign: str, right: str) -> str:
+    """Return the head of a branch that compares two numbers."""
+    text = f"{word} ({left} {sign} {right}) {{"
+    return text if len(text) <= 95 else f"{word} ({left}\n        {sign} {right}) {{"
+
+
 def _assigned(name: str, text: str) -> str:
     """Return an assignment inside a block."""
     return fill_expression(f"    {name} = {text};", " " * 12, 95)
-
-
-def _declared(kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
-    """Return a declaration, its value on a line of its own where the first line would be too long."""
-    indent, start = " " * 8, f"{'const ' * constant}{kind} {name} ="
-    statement = fill_expression(f"{start} {text};", indent, 92)
-    if len(statement.partition("\n")[0]) > 92:
-        statement = f"{start}\n" + fill_expression(f"{indent}{text};", indent, 96)
-    return _noted(statement, note) if note else statement
 
 
 def _noted(statement: str, note: str) -> str:

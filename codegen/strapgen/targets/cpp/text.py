@@ -36,6 +36,8 @@ def _constant(definition: Macro, real: str) -> str:
         value = f" = {definition.value}"
     line = f"inline constexpr {kind} {definition.name.lower()}{value};"
     comment = f"/* {definition.meaning} */"
+    if len(line) > 99 and not definition.size:
+        line = line.replace(" = ", " =\n    ")
     return (
         f"{line} {comment}" if len(line) + len(comment) < 99 else f"{comment}\n{fill_arguments(line, '    ')}"
     )
