@@ -277,6 +277,7 @@ LONG_COMMANDS = (
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",
     "strapgen redundancy ",
+    "strapgen report euler ",
     "strapgen series euler ",
     "strapgen series examples/three_samples.py --constant ",
     "strapgen simulate ",

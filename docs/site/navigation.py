@@ -45,7 +45,9 @@ SECTIONS = (
         "docs/paths/firmware.md",
         "You need C for a processor, with bounds that you can sign and tests that come with it.",
         (
-            *_docs("fixed-point", "design", "generated-code", "microcontrollers", "evidence", "misra"),
+            *_docs(
+                "fixed-point", "design", "generated-code", "report", "microcontrollers", "evidence", "misra"
+            ),
             *_docs(
                 "check-foreign-code", "recorded-data", "sensor-errors", "redundancy", "calibration", "speed"
             ),

@@ -24,6 +24,7 @@ from strapgen.cli.commands import (
     listing,
     rate_table,
     redundancy,
+    report,
     series,
     simulate,
     solve,
@@ -83,6 +84,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
         "cost": cost.cost,
         "frontier": frontier.frontier,
         "design": design.design,
+        "report": report.report,
     },
     "Reproduce": {
         "tables": tables.tables,

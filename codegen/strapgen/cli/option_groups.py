@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import shlex
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from functools import wraps
 from inspect import Parameter, Signature
@@ -102,3 +103,32 @@ def _insert(options: dict[str, Parameter], more: list[Parameter], before: str) -
     place = names.index(before) if before else len(names)
     items = list(options.items())
     return dict([*items[:place], *((option.name, option) for option in more), *items[place:]])
+
+
+def command_line(command: str, names: Iterable[str], stated: Mapping[str, str], *groups: Any) -> str:
+    """Return the command line with all options that are not the default.
+
+    Parameters
+    ----------
+    command : str
+        Name of the command.
+    names : iterable of str
+        Its arguments.
+    stated : mapping of str to str
+        Options that belong to no group, with their values.
+    groups : object
+        The groups of options that the command has.
+    """
+    words = ["strapgen", command, *names, *(word for pair in stated.items() for word in pair)]
+    for group in groups:
+        hints = get_type_hints(type(group), include_extras=True)
+        for field in dataclasses.fields(group):
+            value = getattr(group, field.name)
+            if value == field.default or value is None:
+                continue
+            name = (
+                hints[field.name].__metadata__[0].default
+            )  # in an annotation Typer has the first name there
+            values = value if isinstance(value, list) else [value]
+            words += [word for each in values for word in ((name,) if each is True else (name, str(each)))]
+    return shlex.join(words)

@@ -3,43 +3,18 @@
 from __future__ import annotations
 
 import logging
-import platform
-from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
 
 import typer
-
-import strapgen
-
-_SHAPES_OUTPUT = ("sympy", "numpy", "jinja2", "cffi", "typer", "rich")
 
 
 def _show(chosen: bool) -> None:
     if not chosen:
         return
-    lines = [f"strapgen {strapgen.__version__}", f"python {platform.python_version()}"]
-    for name in _SHAPES_OUTPUT:
-        try:
-            lines.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            lines.append(f"{name} is not installed")
-    lines.append(f"C compiler {_compiler()}")
-    typer.echo("\n".join(lines))
+    from strapgen.toolchain.versions import versions
+
+    typer.echo("\n".join(f"{name} {version}" for name, version in versions().items()))
     raise typer.Exit
-
-
-def _compiler() -> str:
-    import subprocess
-
-    from strapgen.support.exceptions import CompilerError
-    from strapgen.toolchain import compiler
-
-    try:
-        path = compiler.compiler()
-    except CompilerError:
-        return "is not installed"
-    said = subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout
-    return said.splitlines()[0] if said else path
 
 
 def _log_stages(context: typer.Context) -> None:

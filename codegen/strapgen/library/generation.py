@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
@@ -42,3 +43,30 @@ class Request:
     def program(self) -> Program:
         """Return the program with its name."""
         return self.naming.of(generated_sources.program(self.choice))
+
+
+def generated_data(choice: Choice, sources: Sources, target: str, files: Sequence[str]) -> dict[str, Any]:
+    """Return generated sources as plain JSON data.
+
+    Parameters
+    ----------
+    choice : Choice
+    sources : Sources
+    target : str
+        Name of the target, as it was asked for.
+    files : sequence of str
+        Where they were written.
+    """
+    operations = sources.operations
+    data = {
+        "kernel": sources.kernel,
+        "target": target,
+        "files": list(files),
+        "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
+        "temporaries": sources.temporaries,
+    }
+    if sources.rounding is not None:
+        data["error_bounds"] = sources.rounding.as_data()
+    if sources.fixed is None:
+        return data
+    return data | generated_sources.fixed_program(choice, sources.fixed.settings).as_data()

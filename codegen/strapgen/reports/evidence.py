@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -50,6 +51,58 @@ def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> st
     versions = dict.fromkeys(f"{verdict.tool} {verdict.version}".strip() for verdict in verdicts)
     parts += [_VERSIONS, "\n".join(f"- {version}" for version in sorted(versions))]
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+@dataclass(frozen=True)
+class EvidencePage:
+    """What a page of evidence says of its kernels.
+
+    Parameters
+    ----------
+    results : dict of str to dict of str to str
+        By the name of the function, then by the claim: a result and its tools, as in "proved, Gappa".
+    digests : dict of str to str
+        Digest of each kernel's files.
+    versions : tuple of str
+        The tools, with their versions.
+    """
+
+    results: dict[str, dict[str, str]]
+    digests: dict[str, str]
+    versions: tuple[str, ...]
+
+
+def read_page(page: str) -> EvidencePage:
+    """Return what the text of `evidence_page` says.
+
+    Parameters
+    ----------
+    page : str
+
+    Examples
+    --------
+    >>> proof = Verdict("a_w32", "no overflow: AVR", "z3", "4.16", "proved", 0.1)
+    >>> read_page(evidence_page([proof], {"a_w32": "0123"})).results
+    {'a_w32': {'no overflow: AVR': 'proved, z3'}}
+    """
+    results: dict[str, dict[str, str]] = {}
+    digests: dict[str, str] = {}
+    for section in page.split("\n## ")[1:]:
+        title, _, text = section.partition("\n")
+        rows = [re.split(r" *\| *", line.strip("| ")) for line in text.splitlines() if line.startswith("| ")]
+        if not rows or rows[0][0] != "kernel":
+            continue
+        if rows[0][1] == "digest":
+            digests |= dict(rows[2:])
+            continue
+        promise = f"{title[0].lower()}{title[1:]}"
+        for name, *cells in rows[2:]:
+            for case, cell in zip(rows[0][1:], cells, strict=True):
+                if cell != "-":
+                    results.setdefault(name, {})[f"{promise}: {case}"] = cell
+    tools = page.partition(f"\n{_VERSIONS}")[2]
+    versions = tuple(line.removeprefix("- ") for line in tools.splitlines() if line.startswith("- "))
+    return EvidencePage(results, digests, versions)
 
 
 def without_versions(page: str) -> str:

@@ -14,6 +14,8 @@ from strapgen.simulation.recording import History
 from strapgen.simulation.runs import Run
 
 if TYPE_CHECKING:
+    from strapgen.backends import Backend
+    from strapgen.catalogue import Choice
     from strapgen.ir.signals import Signal
     from strapgen.simulation.courses import Course
     from strapgen.simulation.system_runs import SystemCourse
@@ -48,6 +50,17 @@ _MATRIX_COLUMNS = [
     column for spec in (".9f", ".9f", ".4e", ".4e") for column in _three("", ("", "", ""), spec)
 ]
 _TIME_COLUMN = Column("time, s", spec=".4f", least=10)
+
+
+def step_facts(backend: Backend, choice: Choice) -> dict[str, Any]:
+    """Return what a result states of the step that ran."""
+    facts: dict[str, Any] = {"algorithm": choice.name, "method": choice.method_name}
+    facts |= {"rates_at": list(backend.nodes)} if backend.nodes else {"increments": backend.increments}
+    if backend.previous:
+        facts["previous"] = backend.previous
+    if backend.ahead:
+        facts["ahead"] = backend.ahead
+    return facts | {"backend": backend.name}
 
 
 def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,7 +17,6 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.catalogue import Choice
     from strapgen.ir.float_interface import RoundingBounds
     from strapgen.ir.sources import Sources
     from strapgen.library.generation import Request
@@ -77,7 +76,12 @@ def generate(
     written = [[paths[name] for name in group] for group in groups]
     rows = zip(results, written, strict=True)
     if format == "json":
-        data = [_data(task.choice, sources, task.target, place) for (task, sources), place in rows]
+        from strapgen.library.generation import generated_data
+
+        data = [
+            generated_data(task.choice, sources, task.target, [*map(str, place)])
+            for (task, sources), place in rows
+        ]
         print_json(data if len(data) > 1 else data[0])
     else:
         typer.echo("\n".join(_text(sources, task.target, place) for (task, sources), place in rows))
@@ -184,24 +188,6 @@ def _check_alone(
     ):
         if value is not None:
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
-
-
-def _data(choice: Choice, sources: Sources, target: str, written: list[Path]) -> dict[str, Any]:
-    from strapgen.library import generated_sources
-
-    operations = sources.operations
-    data = {
-        "kernel": sources.kernel,
-        "target": target,
-        "files": [str(path) for path in written],
-        "operations": {kind: operations[kind] for kind in ("add", "multiply", "divide", "sqrt")},
-        "temporaries": sources.temporaries,
-    }
-    if sources.rounding is not None:
-        data["error_bounds"] = sources.rounding.as_data()
-    if sources.fixed is None:
-        return data
-    return data | generated_sources.fixed_program(choice, sources.fixed.settings).as_data()
 
 
 def _text(sources: Sources, target: str, written: list[Path]) -> str:

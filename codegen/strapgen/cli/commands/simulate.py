@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
@@ -110,16 +110,6 @@ def _refuse_many(steps: float, step: float, record: _Text) -> None:
 _Build = Callable[[float, Callable[[], float]], "Backend"]
 
 
-def _facts(backend: Backend, choice: Choice) -> dict[str, Any]:
-    facts: dict[str, Any] = {"algorithm": choice.name, "method": choice.method_name}
-    facts |= {"rates_at": list(backend.nodes)} if backend.nodes else {"increments": backend.increments}
-    if backend.previous:
-        facts["previous"] = backend.previous
-    if backend.ahead:
-        facts["ahead"] = backend.ahead
-    return facts | {"backend": backend.name}
-
-
 def _on_motion(
     build: _Build,
     choice: Choice,
@@ -130,7 +120,7 @@ def _on_motion(
     """Simulate, and deliver the run."""
     from strapgen.cli.progress import waiting
     from strapgen.reports import plots
-    from strapgen.reports.runs import RunLayout, run_report
+    from strapgen.reports.runs import RunLayout, run_report, step_facts
     from strapgen.simulation import runs
 
     pulse, step, duration = source.pulse, source.step or "", source.duration or ""
@@ -155,7 +145,7 @@ def _on_motion(
         run = runs.simulate(
             backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse, start
         )
-    facts = _facts(backend, choice) | {
+    facts = step_facts(backend, choice) | {
         "motion": profile.name,
         "step_s": float(checks.number("step", step)),
         "duration_s": float(checks.number("duration", duration)),
@@ -185,7 +175,7 @@ def _on_recording(
     """Propagate recorded data, and deliver the attitude."""
     from strapgen.cli.progress import waiting
     from strapgen.reports import plots
-    from strapgen.reports.runs import history_report
+    from strapgen.reports.runs import history_report, step_facts
     from strapgen.simulation import recording, whole_recordings
 
     pulse = source.pulse
@@ -201,7 +191,7 @@ def _on_recording(
         else:
             history = recording.propagate(backend, data, *options)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
-    facts = _facts(backend, choice) | {"source": str(source.file)} | source.facts
+    facts = step_facts(backend, choice) | {"source": str(source.file)} | source.facts
     replace(output, format=output.format or "csv").report(
         history_report(
             history,

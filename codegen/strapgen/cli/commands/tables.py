@@ -74,7 +74,7 @@ def tables(
     from strapgen.reports.thesis.tables import thesis_tables_report
     from strapgen.support import checks
 
-    names = _runnable() if backend is None else tuple(backends("--backend", backend, ()))
+    names = runnable() if backend is None else tuple(backends("--backend", backend, ()))
     settings = fixed.settings(2)
     if settings is not None and not any(BACKENDS[name].fixed for name in names):
         raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
@@ -105,7 +105,7 @@ def _predict(output: Output) -> None:
     )
 
 
-def _runnable() -> tuple[str, ...]:
+def runnable() -> tuple[str, ...]:
     """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
     from strapgen.experiments.thesis_tables import DEFAULT_BACKENDS
     from strapgen.support.exceptions import CompilerError

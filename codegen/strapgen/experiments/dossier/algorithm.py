@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapgen import pipeline
-from strapgen.backends import DEFAULT_BACKENDS, backend
+from strapgen.backends import DEFAULT_BACKENDS, Backend, backend
 from strapgen.catalogue import Choice
 from strapgen.experiments.comparison import Comparisons, compare
 from strapgen.experiments.convergence import Convergence, LadderCase, measured
@@ -19,18 +20,20 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
-from strapgen.simulation.motions import GENERAL
+from strapgen.simulation.motions import GENERAL, Motion
 from strapgen.simulation.runs import Run, simulate
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.kernel import Kernel
 from strapgen.targets.registry import TARGETS
+
+Array = NDArray[np.float64]
 
 #: The back end that the others are compared with: it shows all rounding.
 REFERENCE = "exact"
 #: The steps in s of the ladder on which the order is measured, and the length of its runs in s: those of the command.
 LADDER, LADDER_DURATION = ("1/2", "1/4", "1/8", "1/16", "1/32", "1/64", "1/128"), "2"
 #: The targets whose code is shown.
-SHOWN = ("numpy", "c", "c-float", "c-fixed", "fixed-model")
+SHOWN = ("numpy", "c", "c-float", "c-fixed")
 
 
 @dataclass(frozen=True)
@@ -40,20 +43,29 @@ class StepRuns:
     Parameters
     ----------
     schedule : Schedule
+    backend : Backend
+        What ran.
+    profile : Motion
+        The motion.
     run : Run
         Scale, skew and drift along the motion, in double.
     comparison : Comparisons
         Back ends beside exact arithmetic on the same increments.
     refused : dict of str to str
         What back ends say whose numbers do not hold the run, by their names.
+    settings : Settings
+        Those of back ends in fixed point.
     ladder : Convergence
         Its errors on a ladder of steps, with the order that they show.
     """
 
     schedule: Schedule
+    backend: Backend
+    profile: Motion
     run: Run
     comparison: Comparisons
     refused: dict[str, str]
+    settings: Settings
     ladder: Convergence
 
 
@@ -156,26 +168,42 @@ def _runs(
     choice: Choice, conditions: Conditions, settings: Settings | None, backends: Sequence[str]
 ) -> StepRuns:
     profile, schedule = conditions.profile(), conditions.schedule(choice)
+    formats = run_settings(settings)
     step, steps = schedule.step, schedule.steps
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        run = simulate(backend(choice), profile, step, schedule.duration, record=schedule.record)
+        stepper = backend(choice)
+        run = simulate(stepper, profile, step, schedule.duration, record=schedule.record)
         increments = profile.increments(
             step, steps, choice.increments_per_step, choice.previous, choice.ahead
         )
         truth = profile.attitude(np.arange(1 + steps) * float(step))
-        refused: dict[str, str] = {}
-        rows = Comparisons()
+        rows, refused = _compared(choice, backends, increments, truth, formats)
+    ladder = measured(LadderCase(choice, "exact", "coning", GENERAL, LADDER, LADDER_DURATION))
+    return StepRuns(schedule, stepper, profile, run, rows, refused, formats, ladder)
+
+
+def _compared(
+    choice: Choice, backends: Sequence[str], increments: Array, truth: Array, settings: Settings
+) -> tuple[Comparisons, dict[str, str]]:
+    """Compare back ends with exact arithmetic; where one of them refuses the run, each alone, with its refusal."""
+
+    def rows(names: Sequence[str]) -> Comparisons:
+        return compare(
+            choice,
+            backends=names,
+            increments=increments,
+            reference=REFERENCE,
+            truth=truth,
+            settings=settings,
+        )
+
+    try:
+        return rows(backends), {}
+    except InputError:
+        held, refused = Comparisons(), {}
         for name in backends:
             try:
-                rows += compare(
-                    choice,
-                    backends=[name],
-                    increments=increments,
-                    reference=REFERENCE,
-                    truth=truth,
-                    settings=run_settings(settings),
-                )
+                held += rows([name])
             except InputError as error:
                 refused[name] = str(error)
-    ladder = measured(LadderCase(choice, "exact", "coning", GENERAL, LADDER, LADDER_DURATION))
-    return StepRuns(schedule, run, rows, refused, ladder)
+        return held, refused

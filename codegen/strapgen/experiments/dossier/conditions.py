@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -51,6 +52,12 @@ class Conditions:
         """Return the run in words."""
         parameters = "".join(f", {key}={value}" for key, value in self.settings.items())
         return f"{self.motion}{parameters}; {self.duration} s at {self.sample_hz} Hz"
+
+    @property
+    def options(self) -> str:
+        """The options of the command line that state the motion."""
+        parameters = [f"{key}={value}" for key, value in self.settings.items()]
+        return shlex.join(["--motion", self.motion, *(["--set", *parameters] if parameters else [])])
 
     def schedule(self, choice: Choice) -> Schedule:
         """Return the step of an algorithm, and how many of them it runs.
