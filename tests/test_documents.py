@@ -224,6 +224,7 @@ def test_the_glossary_is_sorted_and_other_pages_refer_to_it():
 #: Pages that take seconds: many kernels, or the integer model.
 LONG_PAGES = (
     *(
+        "calibration",
         "canonical-form",
         "compensation",
         "coning",
@@ -269,7 +270,9 @@ LONG_COMMANDS = (
     "strapgen converge euler --method rk1,rk2,rk4,butcher6",
     "strapgen derive dcm --method butcher6",
     "strapgen evidence ",
+    "strapgen generate --all --target ",
     "strapgen generate dcm ",
+    "strapgen generate error-state ",
     "strapgen generate separate ",
     "strapgen generate euler --method rk4 --",
     "strapgen rate-table ",
@@ -283,6 +286,7 @@ LONG_COMMANDS = (
     "strapgen strapdown dcm ",
     "strapgen study ",
     "strapgen system ",
+    "strapgen tableau examples/kutta4.toml --set c2=1/3 c3=2/3 --format ",
     "strapgen tables",
     "strapgen two-speed dcm --target c-fixed",
     "strapgen verify ",

@@ -18,10 +18,14 @@ def fill(text: str, indent: str, width: int = 99) -> str:
 def fill_expression(text: str, indent: str, width: int = 99) -> str:
     """Wrap an expression before the signs of sums and choices, every line after the first with `indent`.
 
-    What is still too long is wrapped at products and comparisons, then between arguments, then behind a parenthesis.
+    What is still too long is wrapped at products and comparisons, then between arguments, then behind a parenthesis,
+    and at last before shifts, values and comments, and inside of casts.
     """
     pieces = [text]
-    for place in (r" (?=[+?:-] )", r" (?=(?:\.?[*/]|>=|[|]{2}) )", r"(?<=[,;]) ", r"(?<=[\w)]\()(?=\S)"):
+    for place in (
+        *(r" (?=[+?:-] )", r" (?=(?:\.?[*/]|>=|[|]{1,2}) )", r"(?<=[,;]) ", r"(?<=[\w)]\()(?=\S)"),
+        *(r" (?=(?:<<|>>|=|/[*]) )", r"(?<=>\()(?=\S)"),
+    ):
         pieces = [
             part
             for piece in pieces
@@ -35,6 +39,16 @@ def fill_expression(text: str, indent: str, width: int = 99) -> str:
 def fill_arguments(text: str, indent: str, width: int = 99) -> str:
     """Wrap a declaration or a call after its commas, every line after the first with `indent`."""
     return _filled(re.split(r"(?<=,) ", text), indent, width)
+
+
+def fill_lines(text: str, width: int = 99) -> str:
+    """Wrap the lines of a text that are too long, each as an expression."""
+    return "\n".join(
+        line
+        if len(line) <= width
+        else fill_expression(line, " " * (len(line) - len(line.lstrip()) + 4), width)
+        for line in text.split("\n")
+    )
 
 
 def fill_definition(name: str, value: str, meaning: str, width: int = 99) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.support import resources
 from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
-from strapgen.targets.lines import fill, fill_arguments, fill_definition
+from strapgen.targets.lines import fill, fill_arguments, fill_definition, fill_lines
 from strapgen.targets.run_text import run_paragraphs
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
     shared.filters.update(
         fill=fill,
         arguments=fill_arguments,
+        lines=fill_lines,
         range=range_text,
         elements=elements_text,
         operations=operations_text,

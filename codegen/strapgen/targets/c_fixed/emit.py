@@ -115,6 +115,7 @@ def values_of(fixed: FixedProgram, name: str, target: str, printer: StatementPri
         "program": fixed.program,
         "interface": interface,
         "word": word,
+        "cast": printer.cast,
         "state": interface.inputs[0].signal,
         "samples": interface.inputs[-1].signal,
         "residuals": feedback_words,

@@ -93,8 +93,8 @@ class StatementPrinter:
         """Return the name of one of the file's own functions."""
         return f"{self.name}_{name}"
 
-    def cast(self, kind: str, text: str) -> str:
-        """Return a name, an element or an expression in parentheses as a number of another type."""
+    def cast(self, kind: str, text: str = "") -> str:
+        """Return a name, a number or an expression in parentheses in another type; without it what stands before."""
         return f"({kind}){text}"
 
     def read(self, kind: str, source: str, argument: Argument) -> str:

@@ -16,9 +16,10 @@ from strapgen.targets.rendering import render
 class CppStatementPrinter(StatementPrinter):
     """Prints statements of C++: those of C with named conversions."""
 
-    def cast(self, kind: str, text: str) -> str:
-        """Return a name, an element or an expression in parentheses as a number of another type."""
-        return f"static_cast<{kind}>({text[1:-1] if text.startswith('(') else text})"
+    def cast(self, kind: str, text: str = "") -> str:
+        """Return a name, a number or an expression in parentheses in another type; without it what stands before."""
+        inside = text[1:-1] if text.startswith("(") else text
+        return f"static_cast<{kind}>" + (f"({inside})" if text else "")
 
     def unset(self, kind: str, name: str) -> str:
         """Return the declaration of a value that a branch sets: a constant expression needs a first value."""

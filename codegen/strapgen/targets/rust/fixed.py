@@ -29,7 +29,7 @@ class RustStatementPrinter(StatementPrinter):
         """Return the name of one of the module's own functions."""
         return name
 
-    def cast(self, kind: str, text: str) -> str:
+    def cast(self, kind: str, text: str = "") -> str:
         """Return a name, an element or an expression in parentheses as a number of another type."""
         return f"{kind}::from({text})" if kind == self.word.wide else f"({text} as {kind})"
 
