@@ -20,8 +20,6 @@ from strapgen.reports.comparison import ComparedKernel, comparison_report
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.targets.registry import BUILT_IN
 
-FIXED_NAMES = ("c-fixed32", "c-fixed16", "fixed-model")
-
 
 @pytest.fixture
 def increments(rng):
@@ -41,7 +39,7 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
         assert row.ns_per_step > 0
         entry = BACKENDS[row.backend]
         assert (row.bytes is not None) == (entry.target in BUILT_IN and BUILT_IN[entry.target].compiled)
-        assert (row.bound_rad is None) == (row.backend not in FIXED_NAMES)
+        assert (row.bound_rad is None) == (not BACKENDS[row.backend].fixed)
         angles, bounds = row.history.angles_rad, row.history.bounds_rad
         assert angles.shape == (1 + len(increments),) and angles.max() == row.max_abs_rad
         assert bounds[-1:] == (() if row.bound_rad is None else ((len(increments), row.bound_rad),))
@@ -51,7 +49,7 @@ def test_every_back_end_against_every_kind_of_reference(algorithm, reference, in
         assert row.drift_deg <= math.degrees(row.max_abs_rad) * math.sqrt(3) * (1 + 1e-9)
         if row.backend == reference:
             assert row.max_abs_rad <= 1e-15 and row.max_ulp == 0
-        if row.backend in FIXED_NAMES and reference != "c-float":
+        if BACKENDS[row.backend].fixed and reference != "c-float":
             assert 0 < row.max_abs_rad <= row.bound_rad
     by_name = {row.backend: row for row in rows}
     model, in_c = by_name["fixed-model"], by_name["c-fixed32"]

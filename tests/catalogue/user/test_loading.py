@@ -160,6 +160,7 @@ def algorithm():
     build.output(Signal.matrix("next", "next"), state * (1 + twice[0]))
     return build.kernel("mine", "Mine", "this test", companions=Companions(None, None, None, (Fraction(0),) * 9))
 """
+FROM_INCREMENTS = STEP[STEP.index('Signal("increments"') :]
 
 WRONG = {
     "algorithm 1": (
@@ -279,8 +280,8 @@ WRONG = {
     ),
     "no nodes": ('Signal("increments"', 'Signal("turns"', "its companions need as many different nodes"),
     "a decimal node": (
-        'Signal("increments"',
-        'Companions = functools.partial(Companions, nodes=(0.5,)); Signal("turns"',
+        FROM_INCREMENTS,
+        FROM_INCREMENTS.replace('"increments"', '"turns"').replace(",) * 9)", ",) * 9, nodes=(0.5,))"),
         "its nodes are (0.5,); whole numbers and fractions.Fraction are needed",
     ),
     "output": (
