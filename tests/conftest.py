@@ -25,6 +25,7 @@ from strapgen.catalogue import ALGORITHMS
 from strapgen.evidence.subjects import Subject
 from strapgen.ir.fixed_settings import Settings
 from strapgen.reports.plots import figures
+from strapgen.support import processes
 from strapgen.support.exceptions import CompilerError
 from strapgen.targets import BUILT_IN
 from strapgen.toolchain import compiler, octave, shared_libraries
@@ -50,9 +51,14 @@ CAYLEY_KLEIN = ("numpy", "c")
 #: there, and of the bits of all kernels in tests/targets/test_matlab.py, says the rest.
 IN_OCTAVE = Path(__file__).parent / "backends"
 
+#: Objects made since the last search for garbage at which a session searches again, by generation: each search goes
+#: through what the tests before have derived.
+GARBAGE = (1_000_000, 10, 10)
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let properties that say no number of examples of their own take a quarter of them, except in the long tests."""
+    processes._GARBAGE = GARBAGE  # for commands that run in process too
     config.addinivalue_line(
         "markers", "every_combination: the long tests run every combination of its parameters"
     )
@@ -154,10 +160,16 @@ def _leave_out(config: pytest.Config, items: list[pytest.Item], left: list[pytes
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Leave the thousands of objects that stay for the whole session out of the search for garbage."""
+    """Leave the objects that stay for the whole session out of the search for garbage, and search seldom."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(50_000, 20, 20)
+    processes.prepare_for_derivations()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Leave what the session derived out of the last search for garbage: it ends with the process."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)
