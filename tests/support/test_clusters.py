@@ -148,9 +148,7 @@ def test_studies_are_completed_whatever_is_killed(tmp_path, machines, capsys):
         words = [*STUDIES[study], "--scheduler", machines.address, "--results", str(results)]
         first = client(words)
         deadline = time.monotonic() + 90
-        while time.monotonic() < deadline and (
-            not results.exists() or results.read_bytes().count(b"\n") < 2
-        ):
+        while time.monotonic() < deadline and (not results.exists() or results.read_bytes().count(b"\n") < 2):
             time.sleep(0.02)
         assert results.read_bytes().count(b"\n") >= 2, study  # it is on its way
         if killed == "client":
