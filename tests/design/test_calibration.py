@@ -1,5 +1,6 @@
 """Calibration: ranks and uncertainties as printed, the variance of what is compensated, and least squares of noise."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from strapgen.design.calibration import (
 from strapgen.design.calibration_file import read
 from strapgen.support.exceptions import InputError
 
+calibrated = cache(calibrated)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 #: sqrt(diag((a'a)^-1)) of 20 and of 24 positions, to five digits: D0, B_xx = B_xy, ...; A0, rows of M, N.
 RATES = {

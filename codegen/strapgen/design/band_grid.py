@@ -16,6 +16,7 @@ from operator import mul
 from typing import Any
 
 from mpmath.ctx_mp import MPContext
+from mpmath.libmp import mpf_shift, round_nearest, to_int
 
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.window_conditions import PI
@@ -35,7 +36,7 @@ def integer(value: Any) -> int:
     """Return the integer for a number: a fraction, a whole number or one of `REAL`."""
     if isinstance(value, Fraction):
         return (value.numerator << BITS) // value.denominator
-    return int(REAL.nint(REAL.ldexp(value, BITS)))
+    return int(to_int(mpf_shift(REAL.convert(value)._mpf_, BITS), round_nearest))
 
 
 def real(value: int) -> Any:

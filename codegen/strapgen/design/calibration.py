@@ -65,9 +65,15 @@ def error_derivatives(quantity: str) -> dict[str, sp.Matrix]:
 
 def at_rest(quantity: str) -> tuple[str, ...]:
     """Return the names of the coefficients of a quantity that a unit at rest can show, in the order of the model."""
-    still = dict.fromkeys(RATE, 0)
-    columns = error_derivatives(quantity)
-    return tuple(name for name, column in columns.items() if any(column.subs(still)))
+    return tuple(_columns_at_rest(quantity))
+
+
+@cache
+def _columns_at_rest(quantity: str) -> dict[str, sp.Matrix]:
+    """Return the derivatives that do not vanish at rest, by coefficient, as functions of the specific force."""
+    still = dict.fromkeys(RATE, sp.S.Zero)
+    columns = {name: column.xreplace(still) for name, column in error_derivatives(quantity).items()}
+    return {name: column for name, column in columns.items() if any(column)}
 
 
 @dataclass(frozen=True)
@@ -86,12 +92,10 @@ class Scheme:
 
     def design(self, quantity: str) -> sp.Matrix:
         """Return the matrix a of a quantity: three rows for each position, a column for each coefficient."""
-        columns = error_derivatives(quantity)
+        whole = sp.Matrix.hstack(*_columns_at_rest(quantity).values())
         rows = []
         for position in self.positions:
-            values = {**dict.fromkeys(RATE, 0), **dict(zip(ACCELERATION, position, strict=True))}
-            part = [columns[name].subs(values) for name in at_rest(quantity)]
-            rows.append(sp.Matrix.hstack(*part))
+            rows.append(whole.xreplace(dict(zip(ACCELERATION, map(sp.sympify, position), strict=True))))
         return sp.Matrix.vstack(*rows)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -34,7 +35,7 @@ _AXES = 3
 
 
 class SteadyAlgorithm(Protocol):
-    """What runs: an attitude step, or another algorithm that takes some samples at a time."""
+    """What runs: an attitude step, or another algorithm that takes some samples at a time; it has a hash."""
 
     increments: int
     previous: int
@@ -218,21 +219,40 @@ def _identity(runs: SteadyRuns) -> dict[str, Any]:
 def mean_square(runs: SteadyRuns) -> dict[str, Any]:
     """Return the mean square of some runs as plain JSON data, see `MeanSquare`."""
     algorithm = runs.algorithm
-    step = backend(algorithm, backend=runs.backend) if isinstance(algorithm, Choice) else algorithm.runner()
+    step = _runner(algorithm, runs.backend)
     count, beside = algorithm.increments, algorithm.previous + algorithm.ahead
     block = max(1, _DRAWN // (runs.runs * count * _AXES))
     drawn = _Gyro(runs, beside)
     states: Any = None
-    true: Any = None
-    for first in range(0, runs.steps, block):
-        steps = min(block, runs.steps - first)
-        rows = drawn.rows(steps * count)
-        states = _ends(step, _windows(rows, count, beside), states)
-        turning = np.zeros((1, steps * count + beside, _AXES))
-        turning[..., 2] = runs.errors.turn
-        true = _ends(step, _windows(turning, count, beside), true)
-    angles = np.square(drift_between(step.matrices(states), step.matrices(true))).sum(axis=-1)
+    for steps in _blocks(runs.steps, block):
+        states = _ends(step, _windows(drawn.rows(steps * count), count, beside), states)
+    true = _undisturbed(algorithm, runs.backend, runs.errors.turn, runs.steps, block)
+    angles = np.square(drift_between(step.matrices(states), true)).sum(axis=-1)
     return asdict(MeanSquare(runs.runs, float(angles.sum()), float(np.square(angles).sum())))
+
+
+@lru_cache(maxsize=4)
+def _undisturbed(algorithm: Any, backend_name: str, turn: float, steps: int, block: int) -> Array:
+    """Return the attitude at the end of a run without errors as a matrix, the same for all parts of a study."""
+    step = _runner(algorithm, backend_name)
+    count, beside = algorithm.increments, algorithm.previous + algorithm.ahead
+    states: Any = None
+    for some in _blocks(steps, block):
+        turning = np.zeros((1, some * count + beside, _AXES))
+        turning[..., 2] = turn
+        states = _ends(step, _windows(turning, count, beside), states)
+    matrices: Array = step.matrices(states)
+    return matrices
+
+
+def _runner(algorithm: Any, backend_name: str) -> Any:
+    """Return what has `propagate` and `matrices`."""
+    return backend(algorithm, backend=backend_name) if isinstance(algorithm, Choice) else algorithm.runner()
+
+
+def _blocks(steps: int, block: int) -> list[int]:
+    """Return the numbers of steps that are run at a time."""
+    return [min(block, steps - first) for first in range(0, steps, block)]
 
 
 class _Gyro:

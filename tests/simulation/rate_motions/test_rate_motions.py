@@ -102,11 +102,14 @@ def test_bounds_of_taylor_coefficients_hold_over_the_interval(expression):
     operations, (place, *_) = operations_of("this", [expression] * 3)
     order, (low, high) = 6, (1.0, 1.25)
     bounds = Jets(order, bounds=True).evaluated(operations, iv.mpf([low, high]))[place].coefficients
+    derivatives = [expression]
+    for _ in range(order):
+        derivatives.append(sp.diff(derivatives[-1], T))
     with mp.workdps(DIGITS):
         for time in (low, 1.1, high):
             exact = [
-                sp.diff(expression, T, k).subs(T, sp.Rational(time)) / sp.factorial(k)
-                for k in range(order + 1)
+                derivative.subs(T, sp.Rational(time)) / sp.factorial(k)
+                for k, derivative in enumerate(derivatives)
             ]
             jet = Jets(order, bounds=False).evaluated(operations, mp.mpf(time))[place].coefficients
             for bound, coefficient, value in zip(bounds, jet, exact, strict=True):
@@ -164,11 +167,11 @@ def test_functions_of_a_file_run_in_many_digits_down_to_their_own_rounding():
 
 
 def test_a_step_with_samples_ahead_runs_in_many_digits_as_in_double():
-    choice = strapgen.choose("euler", "window-7-7", 1)
+    choice = strapgen.choose("euler", "window-3-3", 1)
     for name in ("own_rate.py", "own_motion.py"):
         users = read_motion(EXAMPLE.with_name(name), 1)
         double, digits = (
-            strapgen.converge(choice, users, [1, "1/2"], 1, name) for name in ("numpy", "exact")
+            strapgen.converge(choice, users, ["1/2", "1/4"], 1, name) for name in ("numpy", "exact")
         )
         for one, other in zip(double.rungs, digits.rungs, strict=True):
             assert one.error_rad == pytest.approx(other.error_rad, rel=1e-3)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 from strapgen.experiments.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
 from strapgen.experiments.selection import causes
 from strapgen.experiments.selection.algorithm import Algorithm
-from strapgen.experiments.selection.brief import DesignBrief
+from strapgen.experiments.selection.brief import DesignBrief, GyroBrief
 from strapgen.experiments.selection.candidates import Contender
 from strapgen.experiments.selection.choosing import algorithm_of
 from strapgen.experiments.selection.environment import Line
@@ -90,6 +91,8 @@ class Vibration(Motion):
     parameters: dict[str, float] = field(default_factory=dict)
     rates: Any = None
     measured: Any = None
+    #: Attitudes that were integrated, by shape and times: several algorithms are recorded at the same ones.
+    known: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False, compare=False)
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Any:
         """Return the increments that the gyro measures, see `Motion.samples`."""
@@ -98,16 +101,17 @@ class Vibration(Motion):
 
     def attitude(self, time: Any) -> Any:
         """Return the true attitude, see `Motion.attitude`."""
-        return self._truth(time)[1]
+        times = np.asarray(time, float)
+        key = times.shape, times.tobytes()
+        if key not in self.known:
+            highest = float(self.rates.frequencies.max()) / (2 * math.pi)
+            substeps = max(16, math.ceil(_SUBSTEPS * highest * KNOT))
+            self.known[key] = ReferenceAttitude(self.rates.rate, substeps)(times)
+        return self.known[key].copy()
 
     def rate(self, time: Any) -> Any:
         """Return the body rate, see `Motion.rate`."""
         return self.rates.rate(time)
-
-    def _truth(self, time: Any) -> Any:
-        highest = float(self.rates.frequencies.max()) / (2 * math.pi)
-        substeps = max(16, math.ceil(_SUBSTEPS * highest * KNOT))
-        return self.rates.rate(time), ReferenceAttitude(self.rates.rate, substeps)(time)
 
 
 def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
@@ -118,6 +122,12 @@ def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
     lines : sequence of Line
     brief : DesignBrief
     """
+    return _vibration(tuple(lines), brief.gyro)
+
+
+@lru_cache(maxsize=2)
+def _vibration(lines: tuple[Line, ...], gyro: GyroBrief) -> Vibration:
+    """Return the motion of lines, seen by a gyro, once for all algorithms of a brief."""
     omega = 2 * np.pi * np.array([line.frequency_hz for line in lines])
     still = np.zeros_like(omega)
     sizes = np.array([[line.theta_x, line.theta_y] for line in lines]).T
@@ -127,9 +137,9 @@ def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
     # The angle X sin(wt) has the rate X w cos(wt).
     rates = CosineSum(np.array([*sizes, still]) * omega, np.tile(omega, (_AXES, 1)), phases)
     measured = rates
-    if brief.gyro.bandwidth_hz is not None and brief.gyro.damping is not None:
-        ratio = omega / (2 * np.pi * float(brief.gyro.bandwidth_hz))
-        gain = 1 / (1 - ratio**2 + 2j * float(brief.gyro.damping) * ratio)
+    if gyro.bandwidth_hz is not None and gyro.damping is not None:
+        ratio = omega / (2 * np.pi * float(gyro.bandwidth_hz))
+        gain = 1 / (1 - ratio**2 + 2j * float(gyro.damping) * ratio)
         measured = replace(rates, amplitudes=rates.amplitudes * np.abs(gain), phases=phases + np.angle(gain))
     return Vibration(rates=rates, measured=measured)
 

@@ -82,7 +82,7 @@ wires = {{ rotation_vector = "vector.rotation_vector" }}
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TwoSpeedLoops:
     """An attitude in two speeds, for a brief: see `algorithm.Algorithm`.
 
@@ -291,12 +291,14 @@ class TwoSpeedLoops:
         start = np.eye(3) if self.state == "dcm" else np.array([0.0, 0.0, 0.0, 1.0])
         attitude = np.broadcast_to(start, shape) if initial is None else initial
         records = [attitude]
+        # The fast loop begins anew with every slow cycle: it runs through all of them side by side.
+        total = coning = np.zeros_like(increments[:, :, 0])
+        previous = increments[:, :, 0]
+        for k in range(1, self.increments + 1):
+            total, coning, previous = fast(total, coning, previous, increments[:, :, k])
+        vectors = vector(total, coning)
         for cycle in range(increments.shape[1]):
-            total = coning = np.zeros((len(increments), 3))
-            previous = increments[:, cycle, 0]
-            for k in range(1, self.increments + 1):
-                total, coning, previous = fast(total, coning, previous, increments[:, cycle, k])
-            attitude = update(attitude, vector(total, coning))
+            attitude = update(attitude, vectors[:, cycle])
             if (cycle + 1) % record_every == 0:
                 records.append(attitude)
         return np.stack(records, axis=1)

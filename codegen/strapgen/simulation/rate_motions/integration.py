@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
+from operator import mul
 from typing import Any
 
 from mpmath import iv, mp
@@ -43,7 +45,7 @@ class Piece:
     angle : list of mpf
         Integral of the rate from time 0 to the middle, in rad.
     transition : list of list of list of mpf
-        Taylor coefficients of the attitude about the middle, from no rotation there.
+        For each element the Taylor coefficients of the attitude about the middle, from no rotation there.
     attitude : list of list of mpf
         Attitude at the middle.
     angle_error, error : float
@@ -64,7 +66,12 @@ class Piece:
 
     def angle_at(self, time: Any) -> list[Any]:
         """Return the integral of the rate from time 0 to a time in the piece."""
-        return [a + b for a, b in zip(self.angle, _integral(self.rate, time - self.middle), strict=True)]
+        x = time - self.middle
+        return [a + x * mp.polyval(row, x) for a, row in zip(self.angle, self._integral, strict=True)]
+
+    @cached_property
+    def _integral(self) -> list[list[Any]]:
+        return _integrated(self.rate)
 
     def rate_at(self, time: Any) -> list[Any]:
         """Return the rate at a time in the piece."""
@@ -127,19 +134,24 @@ class Integrated:
         """Return a piece that continues those before it; None if its error is too large."""
         try:
             bounds = Jets(RATE_DEGREE + 1, True).evaluated(self._operations, _interval(middle, half))
+            rest = math.hypot(*(float(bounds[place].coefficients[-1]) for place in self._places)) * SLACK
+            missed = 2 * half * (mp.mpf(rest) * half ** (RATE_DEGREE + 1))
+            if not missed <= ANGLE_TOLERANCE:
+                return None
             jets = Jets(RATE_DEGREE, False).evaluated(self._operations, middle)
         except (UnboundedError, OverflowError):
             return None
-        rest = math.hypot(*(float(bounds[place].coefficients[-1]) for place in self._places)) * SLACK
         rate = [[mp.mpf(c) for c in jets[place].coefficients] for place in self._places]
-        left_out = mp.mpf(rest) * half ** (RATE_DEGREE + 1)
         lengths = [mp.sqrt(sum(row[k] ** 2 for row in rate)) for k in range(RATE_DEGREE + 1)]
-        missed, series = 2 * half * left_out, _remainder(lengths, half)
-        if not (missed <= ANGLE_TOLERANCE and series <= ATTITUDE_TOLERANCE):
+        series = _remainder(lengths, half)
+        if not series <= ATTITUDE_TOLERANCE:
             return None
-        transition = _transition(rate)
+        transition = _transition(rate, half)
         edge = -direction * half  # where it meets the piece before it
-        turned, gained = _series_at(transition, edge), _integral(rate, edge)
+        turned, gained = (
+            _series_at(transition, edge),
+            [edge * mp.polyval(row, edge) for row in _integrated(rate)],
+        )
         if before:
             angle, attitude = before[-1].angle_at(middle + edge), before[-1].attitude_at(middle + edge)
         else:
@@ -174,7 +186,7 @@ def _remainder(lengths: list[Any], half: Any) -> Any:
     majorant, angle, power = [mp.mpf(1)], mp.mpf(0), mp.mpf(1)
     for k in range(ATTITUDE_DEGREE):
         known = range(max(0, k - RATE_DEGREE), k + 1)
-        majorant.append(sum(majorant[j] * lengths[k - j] for j in known) / (k + 1))
+        majorant.append(mp.fdot((majorant[j], lengths[k - j]) for j in known) / (k + 1))
     for j, length in enumerate(lengths):
         angle += length * half ** (j + 1) / (j + 1)
     total = mp.mpf(0)
@@ -185,41 +197,42 @@ def _remainder(lengths: list[Any], half: Any) -> Any:
     return max(mp.exp(angle) - total, mp.mpf(0)) + mp.exp(angle) * mp.mpf(10) ** (5 - DIGITS)
 
 
-def _transition(rate: list[list[Any]]) -> list[list[list[Any]]]:
-    """Return the Taylor coefficients of the attitude about the middle of a piece."""
-    terms = [_identity()]
-    vectors = [[row[k] for row in rate] for k in range(RATE_DEGREE + 1)]
+def _transition(rate: list[list[Any]], half: Any) -> list[list[list[Any]]]:
+    """Return the Taylor coefficients of each element of the attitude about the middle of a piece.
+
+    They are computed in integers, in units of 2^-bits of what each adds at the end of the piece, whose half is a power
+    of two.
+    """
+    bits, exponent = mp.prec, mp.frexp(half)[1] - 1
+    scaled = [[int(mp.ldexp(c, bits + exponent * (k + 1))) for k, c in enumerate(row)] for row in rate]
+    opposite = [[-c for c in row] for row in scaled]
+    rows = [[[int(i == axis) << bits] for axis in range(3)] for i in range(3)]
     for k in range(ATTITUDE_DEGREE):
-        known = range(max(0, k - RATE_DEGREE), k + 1)
-        terms.append(
-            [
-                [
-                    mp.fdot(_cross([(terms[j][i], vectors[k - j]) for j in known], axis)) / (k + 1)
-                    for axis in range(3)
-                ]
-                for i in range(3)
-            ]
-        )
-    return terms
+        first, last = max(0, k - RATE_DEGREE), k + 1
+        for row in rows:
+            known = [column[first:last] for column in row]
+            for axis, column in enumerate(row):
+                # A row times the skew matrix of the rate.
+                after, next_after = (axis + 1) % 3, (axis + 2) % 3
+                total = sum(map(mul, known[after], scaled[next_after][k - first :: -1]))
+                total += sum(map(mul, known[next_after], opposite[after][k - first :: -1]))
+                column.append((total >> bits) // (k + 1))
+    return [
+        [[mp.ldexp(c, -bits - exponent * k) for k, c in enumerate(column)] for column in row] for row in rows
+    ]
 
 
-def _integral(rate: list[list[Any]], x: Any) -> list[Any]:
-    """Return the integral of a polynomial rate from the middle of its piece over a time."""
-    return [x * mp.polyval([c / (k + 1) for k, c in enumerate(row)][::-1], x) for row in rate]
+def _integrated(rate: list[list[Any]]) -> list[list[Any]]:
+    """Return the coefficients of the integral of a polynomial rate, without the factor of time, the highest first."""
+    return [[c / (k + 1) for k, c in enumerate(row)][::-1] for row in rate]
 
 
-def _series_at(terms: list[list[list[Any]]], x: Any) -> list[list[Any]]:
-    """Return the sum of a Taylor series of matrices."""
-    total = [[mp.mpf(0)] * 3 for _ in range(3)]
-    for term in reversed(terms):
-        total = [[a * x + b for a, b in zip(r, s, strict=True)] for r, s in zip(total, term, strict=True)]
-    return total
-
-
-def _cross(pairs: list[tuple[Any, Any]], axis: int) -> list[tuple[Any, Any]]:
-    """Return the products whose sum is an element of a sum of cross products: a row times the skew matrix of a rate."""
-    after, next_after = (axis + 1) % 3, (axis + 2) % 3
-    return [(a[after], b[next_after]) for a, b in pairs] + [(-a[next_after], b[after]) for a, b in pairs]
+def _series_at(series: list[list[list[Any]]], x: Any) -> list[list[Any]]:
+    """Return a matrix of Taylor series at a time from where they begin."""
+    powers = [mp.mpf(1)]
+    for _ in range(ATTITUDE_DEGREE):
+        powers.append(powers[-1] * x)
+    return [[mp.fdot(column, powers) for column in row] for row in series]
 
 
 def _product(left: list[list[Any]], right: list[list[Any]]) -> list[list[Any]]:

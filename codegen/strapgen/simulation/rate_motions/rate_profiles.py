@@ -91,11 +91,16 @@ class CosineSum:
 
     def _waves(self, time: Any, wave: Callable[[Array], Array], amplitudes: Array) -> Array:
         times = np.asarray(time, float)[..., None]
-        total = np.zeros((*times.shape[:-1], 3))
+        moving = np.flatnonzero(amplitudes.any(axis=1))
+        sums = np.zeros((*times.shape[:-1], len(moving)))
         for amplitude, frequency, phase in zip(
-            amplitudes.T, self.frequencies.T, self.phases.T, strict=True
+            amplitudes[moving].T, self.frequencies[moving].T, self.phases[moving].T, strict=True
         ):  # one after the other, so that the arrays stay small
-            total += amplitude * wave(times * frequency + phase)
+            sums += amplitude * wave(times * frequency + phase)
+        if len(moving) == len(amplitudes):
+            return sums
+        total = np.zeros((*times.shape[:-1], 3))
+        total[..., moving] = sums
         return total
 
     def filtered(self, cutoff: float) -> CosineSum:
