@@ -6,8 +6,10 @@ A module of tests takes it all with ``from shared_results import shared_results`
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from copy import deepcopy
 from fractions import Fraction
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +17,10 @@ import pytest
 
 from strapgen.analysis import accumulation, constant_rate, error_analysis, growth, overview, ratios, series
 from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
+from strapgen.design import coning
 from strapgen.experiments import predicted_tables, thesis_statements, thesis_tables
 from strapgen.ir.fixed_settings import Settings
+from strapgen.reports import window
 from strapgen.reports.plots import figures
 
 #: Modules that analyse, and the pure functions of a choice, a motion and a number of terms that they call.
@@ -27,6 +31,26 @@ ONCE = {
     "growth": cache(growth.growth),
     "series": cache(series.series),
 }
+
+
+def _once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Let a function of one argument return what it returned before; arguments that have no hash it computes again."""
+    known: dict[Any, Any] = {}
+
+    @wraps(function)
+    def call(argument: Any) -> Any:
+        try:
+            there = argument in known
+        except TypeError:
+            return function(argument)
+        if not there:
+            known[argument] = function(argument)
+        return known[argument]
+
+    return call
+
+
+_design, _window_data = _once(coning.design), cache(window.window_data)
 _draw, _entries = figures.image, thesis_tables.entries
 _predicted, _claims = predicted_tables.predicted, ratios.claims
 _statements, _solve = thesis_statements.statements, cache(UnknownTableau.solve)
@@ -34,7 +58,8 @@ _statements, _solve = thesis_statements.statements, cache(UnknownTableau.solve)
 
 @cache
 def _predicted_once() -> tuple[predicted_tables.PredictedEntry, ...]:
-    return tuple(_predicted())
+    """Predict the last table; tests/experiments predicts all."""
+    return tuple(_predicted(thesis_tables.TABLES[-1:]))
 
 
 @cache
@@ -86,5 +111,7 @@ def shared_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(predicted_tables, "predicted", _predicted_once)
     monkeypatch.setattr(ratios, "claims", _claims_once)
     monkeypatch.setattr(thesis_statements, "statements", _statements_once)
+    monkeypatch.setattr(coning, "design", _design)
+    monkeypatch.setattr(window, "window_data", lambda family: deepcopy(_window_data(family)))
     monkeypatch.setattr(UnknownTableau, "solve", lambda self, equations="general": _solve(self, equations))
     monkeypatch.setattr(figures, "image", _image)

@@ -1275,12 +1275,10 @@ def test_stability(strapgen_says, tmp_path):
 def test_tables_predicted(strapgen_says):
     data = json.loads(strapgen_says("tables --predict --format json --plot predicted.svg"))
     assert ">predicted<" in Path("predicted.svg").read_text()
-    assert len(data["entries"]) == 30
+    assert len(data["entries"]) == 6
     assert all(abs(entry["deviation"]) < 0.01 and entry["agrees"] for entry in data["entries"])
     assert data["ratios"][0]["ratio"] == "9*x**2/80 + 1/4"
-    said = strapgen_says("tables --predict")
-    for table in TABLES:
-        assert f"Table {table.number}" in said
+    assert f"Table {TABLES[-1].number}" in strapgen_says("tables --predict")
 
 
 @pytest.mark.long
