@@ -287,7 +287,7 @@ LONG_COMMANDS = (
     "strapgen strapdown dcm ",
     "strapgen study ",
     "strapgen system ",
-    "strapgen tableau examples/kutta4.toml --set c2=1/3 c3=2/3 --format ",
+    "strapgen tableau examples/kutta4.toml",
     "strapgen tables",
     "strapgen two-speed dcm --target c-fixed",
     "strapgen verify ",
