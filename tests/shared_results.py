@@ -17,9 +17,10 @@ import pytest
 
 from strapgen.analysis import accumulation, constant_rate, error_analysis, growth, overview, ratios, series
 from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
-from strapgen.design import coning
+from strapgen.design import coning, family
 from strapgen.experiments import predicted_tables, thesis_statements, thesis_tables
 from strapgen.ir.fixed_settings import Settings
+from strapgen.reports import coning as coning_reports
 from strapgen.reports import window
 from strapgen.reports.plots import figures
 
@@ -50,7 +51,8 @@ def _once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return call
 
 
-_design, _window_data = _once(coning.design), cache(window.window_data)
+_coefficients, _filters, _window_data = _once(coning.design), _once(family.design), cache(window.window_data)
+_figures = _once(coning_reports.ShapedDrift.figures)
 _draw, _entries = figures.image, thesis_tables.entries
 _predicted, _claims = predicted_tables.predicted, ratios.claims
 _statements, _solve = thesis_statements.statements, cache(UnknownTableau.solve)
@@ -111,7 +113,9 @@ def shared_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(predicted_tables, "predicted", _predicted_once)
     monkeypatch.setattr(ratios, "claims", _claims_once)
     monkeypatch.setattr(thesis_statements, "statements", _statements_once)
-    monkeypatch.setattr(coning, "design", _design)
-    monkeypatch.setattr(window, "window_data", lambda family: deepcopy(_window_data(family)))
+    monkeypatch.setattr(coning, "design", _coefficients)
+    monkeypatch.setattr(family, "design", _filters)
+    monkeypatch.setattr(coning_reports.ShapedDrift, "figures", lambda drift: dict(_figures(drift)))
+    monkeypatch.setattr(window, "window_data", lambda filters: deepcopy(_window_data(filters)))
     monkeypatch.setattr(UnknownTableau, "solve", lambda self, equations="general": _solve(self, equations))
     monkeypatch.setattr(figures, "image", _image)
