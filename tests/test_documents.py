@@ -20,8 +20,10 @@ import typer.main
 from shared_results import shared_results  # noqa: F401
 
 import strapgen
+from strapgen.catalogue import METHODS
 from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.methods import tableaux
+from strapgen.catalogue.methods.windows import named_window
 from strapgen.cli import app, main
 from strapgen.toolchain import octave
 
@@ -306,7 +308,7 @@ LESS = {
     "--word 12,16,20,24,28,32": "--word 12,32",
     "rk4,butcher5,fehlberg5,dormand-prince5,butcher6,taylor6,magnus4 --plot": "rk4,butcher5,magnus4 --plot",
     "strapgen evidence euler --method rk4": "strapgen evidence euler --method rk4 --tool z3",
-    "--last 60": "--last 6",
+    "own_rate.py --step 0.125 --duration 10": "own_rate.py --step 0.125 --duration 1",
 }
 #: Pages whose commands need a file that the page shows, and commands that other tests run: tests/cli the second.
 OWN_FILES = ("own-algorithms",)
@@ -347,14 +349,28 @@ def test_a_command_of_a_page(command, workplace, capsys):
         pytest.skip(f"{compiler[1]} is not on this machine")
     if "octave" in command and (reason := octave.missing()):
         pytest.skip(reason)
+    run(with_less(command), capsys)
+
+
+def with_less(command: str) -> str:
     for part, less in LESS.items():
         command = command.replace(part, less)
-    run(command, capsys)
+    return command
 
 
 def test_what_the_pages_ask_much_of_stands_on_them():
-    commands = "\n".join(page_commands())
+    commands = "\n".join([*page_commands(), *shown_commands(DOCS["own-algorithms"])])
     assert [part for part in LESS if part not in commands] == []
+    named = {
+        name.partition(":")[0]
+        for command in commands.splitlines()
+        for option, value in pairwise(shlex.split(command))
+        if option == "--method"
+        for name in value.split(",")
+    }
+    assert "cooper-verner8" in named
+    files = {name for name in named if name.endswith(".py")}
+    assert {name for name in named - files if name not in METHODS and not named_window(name)} == set()
 
 
 def test_the_page_on_the_command_line_shows_every_command():
@@ -440,7 +456,7 @@ def test_the_commands_on_own_algorithms(shown_files, capsys):
     shown = {"tableau", "generate", "converge", "check", "compare", "simulate", "series"}
     assert {shlex.split(command)[1] for command in commands} == shown
     for command in commands:
-        run(command, capsys)
+        run(with_less(command), capsys)
 
 
 # The page on fixed point
