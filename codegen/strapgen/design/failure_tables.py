@@ -126,9 +126,8 @@ def _different(fails: Array) -> tuple[Array, Array]:
     """Return the different statuses of points in their order, a row each, and the number of that of every point."""
     place = np.zeros(fails.shape[1], int)
     first = place[:1]
-    for byte in np.packbits(
-        fails, axis=0
-    ):  # a status has many equations, whose comparison takes longer than a number's
+    # As numbers, a byte at a time: to compare two rows of many equations takes longer.
+    for byte in np.packbits(fails.astype(bool), axis=0):
         _, first, place = np.unique(256 * place + byte, return_index=True, return_inverse=True)
     return fails.T[first], place.reshape(-1)
 
