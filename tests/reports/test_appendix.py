@@ -48,7 +48,7 @@ LONG = (
     "series dcm --method rk1 --motion constant --format latex",
     "series velocity-position --format latex",
     "series dcm --versus euler --format latex",
-    "series dcm --method rk3 --motion coning --versus euler --terms 1 --format latex",
+    "series dcm --method rk3 --motion coning --versus euler --format latex",
     "statements --format latex",
     "series euler --all --method rk1,rk4 --format latex",
     "vibration dcm --method rk4 --step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
