@@ -173,7 +173,7 @@ def check(contenders: list[Contender]) -> None:
 def measured(options: argparse.Namespace, folder: Path) -> dict[str, list[Contender]]:
     """Generate, check and time every case."""
     cases: dict[str, list[Contender]] = {}
-    for title in TITLES:
+    for title in options.cases:
         algorithm, samples = title.split("-")
         cases[title] = []
         for name in options.generators:
@@ -320,6 +320,7 @@ def main() -> None:
     parser.add_argument(
         "--generators", nargs="*", choices=GENERATORS, default=list(GENERATORS), metavar="NAME"
     )
+    parser.add_argument("--cases", nargs="*", choices=TITLES, default=list(TITLES), metavar="NAME")
     parser.add_argument("--out", type=Path, default=HERE / "RESULTS.md")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -64,13 +64,15 @@ def measured(algorithm: str, column: str, cpu: str) -> Cost | None:
     return cost.cost(sources(algorithm, column), cpu)
 
 
-def rows(cpu: str) -> Iterator[tuple[str, str]]:
+def rows(cpu: str, algorithms: Sequence[str] = ("euler", "dcm")) -> Iterator[tuple[str, str]]:
     """Yield the row of a processor in each table that has it, after the table's title."""
     costs = {
         algorithm: {column: measured(algorithm, column, cpu) for column in COLUMNS}
-        for algorithm in ("euler", "dcm")
+        for algorithm in algorithms
     }
     for title, (algorithm, what) in TABLES.items():
+        if algorithm not in costs:
+            continue
         shown = {
             name: one for name, one in costs[algorithm].items() if name != BY_HAND or algorithm == "euler"
         }

@@ -471,6 +471,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--kind", choices=KINDS, action="append", help="only faults of this kind")
     parser.add_argument("--command", choices=COMMANDS, action="append", help="only this command")
+    parser.add_argument("--trials", type=int, help="no more than so many trials")
     parser.add_argument("--trial", help="only the trial of this seed, as a complaint names it")
     options = parser.parse_args()
     until = time.monotonic() + options.seconds
@@ -479,7 +480,7 @@ def main() -> None:
         chosen = options.command or [*COMMANDS]
         for name in chosen:
             trials.refer(name)
-        planned = plan(options.seed, options.kind or [*KINDS], chosen)
+        planned = plan(options.seed, options.kind or [*KINDS], chosen)[: options.trials]
 
         def run(trial: tuple[str, str, str]) -> None:
             kind, name, seed = trial

@@ -182,6 +182,7 @@ def test_a_user_s_script_is_typed(tmp_path):
         "-m",
         "mypy",
         "--strict",
+        "--no-incremental",
         "--python-executable",
         str(python),
         "right.py",

@@ -747,7 +747,7 @@ def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
     [
         *(
             pytest.param(c, marks=pytest.mark.long)
-            for c in ("derive eulr", "simulate", "simulate euler --increments-csv nan.csv")
+            for c in ("derive eulr", "simulate euler --increments-csv nan.csv")
         ),
         f"simulate dcm --motion constant --set x_deg_s=1e300 {TIMES}",
         pytest.param("simulate dcm --rates-csv large.csv --rate-unit rad/s", marks=pytest.mark.long),

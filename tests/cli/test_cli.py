@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -116,6 +117,14 @@ COSTLY = (
 )
 
 
+#: Parts of examples that ask for much of the same, and what they run with.
+LESS = {
+    "frontier": ("--method coning-least-squares,", "--method coning-least-squares:3+3,"),
+    "converge": ("--method rk1,rk2,rk4,butcher6", "--method rk1,rk4"),
+    "study word-length": ("--word 12,16,20,24,32", "--word 12,32"),
+}
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "command", [pytest.param(c, marks=pytest.mark.long if c in COSTLY else ()) for c in COMMANDS]
@@ -132,7 +141,7 @@ def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
         program, *words = shlex.split(example)
         assert (program, " ".join(words).startswith(command)) == ("strapgen", True)
         if example not in on_pages:  # tests/test_documents.py runs those
-            strapgen_says("", *words)
+            strapgen_says(" ".join(map(shlex.quote, words)).replace(*LESS.get(command, ("", ""))))
 
 
 @pytest.mark.parametrize("command", ["list", "tableau", "derive", "generate", "simulate", "tables"])
@@ -939,6 +948,16 @@ def test_frontier(strapgen_says, tmp_path):
     assert strapgen_says(f"{command} --format csv").count("\n") == 3
 
 
+def at_work(process: int) -> int:
+    """Return how many processes that a process has started used half a second of the processor, more than a start."""
+    count = 0
+    for child in Path(f"/proc/{process}/task/{process}/children").read_text().split():
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            times = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[11:13]
+            count += sum(map(int, times)) >= os.sysconf("SC_CLK_TCK") / 2
+    return count
+
+
 @pytest.mark.long
 def test_an_interrupt_stops_a_study_at_once(tmp_path):
     # Cases that take minutes each, in two processes.
@@ -963,7 +982,10 @@ def test_an_interrupt_stops_a_study_at_once(tmp_path):
         # A suite that was started in the background ignores interrupts, and so would what it starts.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
-        time.sleep(6)
+        for _ in range(2000):  # as long as the machine needs
+            if process.poll() is not None or at_work(process.pid) == 2:
+                break
+            time.sleep(0.05)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         try:
@@ -987,7 +1009,7 @@ TABLE_KEYS = ["table", "backend", "algorithm", "order", "drift_deg", "normalised
     [
         pytest.param(b, marks=() if b in ("numpy", "c", "c-fixed32") else pytest.mark.long)
         for b, entry in BACKENDS.items()
-        if not entry.slow
+        if not entry.slow and not b.startswith(("cpp-", "rust-"))  # cpp and rust say that those have theirs
     ],
 )
 def test_tables_json(backend, strapgen_says):
@@ -1114,13 +1136,7 @@ print("loaded", *sorted({{"sympy", "jinja2"}} & sys.modules.keys()))
 @pytest.mark.long
 @pytest.mark.parametrize(
     "command",
-    [
-        "list",
-        *(
-            pytest.param(c, marks=pytest.mark.long)
-            for c in (f"simulate dcm {CONING} --record 0.125 --format csv", "derive dcm")
-        ),
-    ],
+    ["list", f"simulate dcm {CONING} --record 0.125 --format csv"],
 )
 def test_reader_that_leaves_is_no_error(command):
     program = shlex.join([sys.executable, "-m", "strapgen", *shlex.split(command)])
@@ -1130,7 +1146,7 @@ def test_reader_that_leaves_is_no_error(command):
 
 
 def test_reader_that_is_gone_before_is_no_error():
-    program = [sys.executable, "-m", "strapgen", "tableau", "rk1"]
+    program = [sys.executable, "-m", "strapgen", "list", "motions"]
     with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()
         assert process.stderr.read() == ""
@@ -1140,13 +1156,7 @@ def test_reader_that_is_gone_before_is_no_error():
 @pytest.mark.long
 @pytest.mark.parametrize(
     "command",
-    [
-        "tableau rk1",
-        *(
-            pytest.param(c, marks=pytest.mark.long)
-            for c in ("list", f"simulate dcm {CONING}", "tables --table 5 --backend numpy --format json")
-        ),
-    ],
+    ["list", f"simulate dcm {CONING}"],
 )
 def test_full_disk(command):
     if not Path("/dev/full").exists():
@@ -1261,12 +1271,10 @@ def test_stability(strapgen_says, tmp_path):
 def test_tables_predicted(strapgen_says):
     data = json.loads(strapgen_says("tables --predict --format json --plot predicted.svg"))
     assert ">predicted<" in Path("predicted.svg").read_text()
-    assert len(data["entries"]) == 30
+    assert len(data["entries"]) == 6
     assert all(abs(entry["deviation"]) < 0.01 and entry["agrees"] for entry in data["entries"])
     assert data["ratios"][0]["ratio"] == "9*x**2/80 + 1/4"
-    said = strapgen_says("tables --predict")
-    for table in TABLES:
-        assert f"Table {table.number}" in said
+    assert f"Table {TABLES[-1].number}" in strapgen_says("tables --predict")
 
 
 @pytest.mark.long

@@ -7,7 +7,7 @@ import pytest
 
 import strapgen
 from strapgen.catalogue.kernels.redundancy.geometry import HEXAD
-from strapgen.design.failure_tables import failure_directions, failure_table, failure_tables
+from strapgen.design.failure_tables import _different, failure_directions, failure_table, failure_tables
 from strapgen.support.exceptions import InputError
 
 
@@ -60,3 +60,14 @@ def test_every_failure_along_its_direction_is_declared_and_not_selected():
 def test_without_equations_there_is_no_table():
     with pytest.raises(InputError, match="no parity equation is left"):
         failure_table(HEXAD, (0, 1, 2))
+
+
+def test_statuses_are_told_apart_in_their_order(rng):
+    """As rows of booleans are, of any number of equations."""
+    for equations in (1, 8, 15, 20):
+        fails = rng.random((equations, 3000)) < 0.2
+        fails[-2:] = rng.random((min(equations, 2), 3000)) < 0.9
+        statuses, place = _different(fails)
+        expected, inverse = np.unique(fails.T, axis=0, return_inverse=True)
+        np.testing.assert_array_equal(statuses, expected)
+        np.testing.assert_array_equal(place, inverse.reshape(-1))

@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from shared_results import shared_results  # noqa: F401
 
 from strapgen.cli import main
 

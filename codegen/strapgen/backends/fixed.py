@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.backends.evaluators import Array, Evaluator
-from strapgen.backends.fixed_numbers import Memory, fresh_feedback, integers, numbers
+from strapgen.backends.fixed_numbers import Memory, array_type, fresh_feedback, integers, numbers
 from strapgen.backends.protocol import Backend
 from strapgen.backends.step_sources import StepSources
 from strapgen.ir.fixed_interface import Argument, Interface
@@ -133,7 +133,7 @@ class CFixedEvaluator(FixedEvaluator):
 
     def pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
-        return self.module.ffi.from_buffer(f"{array.dtype.name}_t[]", array)
+        return self.module.ffi.from_buffer(array_type(array.dtype), array)
 
     def address(self) -> int:
         """Return the address of the function on one sample."""

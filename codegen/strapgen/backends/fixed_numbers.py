@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -66,3 +67,9 @@ class Memory:
     state: Array
     feedback: Array
     first: int = 0
+
+
+@cache
+def array_type(kind: np.dtype[Any]) -> str:
+    """Return the C type of an array of integers, whose name takes numpy longer to find than a short step takes."""
+    return f"{kind.name}_t[]"
