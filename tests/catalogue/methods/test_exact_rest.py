@@ -6,13 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from derived import turns
 from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen import choose, derive
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.support.exceptions import InputError
-from strapgen.symbolic.kernel import evaluate_stages
 
 #: Motion and its parameters, with the drift in deg/h at 100 Hz over 60 s of 8 samples and 3 before, and of 5 and 3,
 #: which others computed from the formulas.
@@ -35,23 +35,11 @@ ROUND_OFF = 1e-8
 BETTER = [("cone", 5, 5), ("cone", 15, 5)]
 
 
-def turns(choice, samples):
-    """Return the rotations of steps on samples in rad, as a step from zero rotation has them.
-
-    The exact formulas are computed on arrays, one element for each step; code of them would say no more.
-    """
-    kernel = derive(choice)
-    state, increments = kernel.inputs
-    values = dict(zip(state.elements, (0.0, 0.0, 0.0, 1.0), strict=True))
-    values |= dict(zip(increments.elements, samples.reshape(len(samples), -1).T, strict=True))
-    known = evaluate_stages(
-        (*kernel.stages, *kernel.outputs), values, float, lambda e, a: a[0] ** float(e.exp)
-    )
-    return Rotation.from_quat(np.stack([known[name] for name in kernel.outputs[0].signal.elements], -1))
-
-
 def drift(choice, motion, duration):
-    """Return the largest angle from the true attitude in deg/h, divided by the duration in s."""
+    """Return the largest angle from the true attitude in deg/h, divided by the duration in s.
+
+    The exact formulas are computed on all steps at once; code of them would say no more.
+    """
     step = Fraction(choice.increments, 100)
     count = int(duration / step)
     samples = motion.increments(step, count, choice.increments, choice.previous)
