@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from derived import kernel
 
-from strapgen.catalogue import KERNELS, MOST_INCREMENTS, VECTORS, Choice, choose
+from strapgen.catalogue import KERNELS, VECTORS, Choice, choose
 from strapgen.ir.signals import Signal
 
 #: Signals that have no frame, with the reason.
@@ -58,7 +58,7 @@ SHORT = [
 ]
 LONG = [
     *(choose(name) for name in KERNELS),
-    *(choose(name, increments=count, previous=1) for name in VECTORS for count in (2, MOST_INCREMENTS // 2)),
+    *(choose(name, increments=count, previous=1) for name in VECTORS for count in (2, 3)),
 ]
 
 
