@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping
 from functools import cache
 
 import mpmath
+import numpy as np
 import sympy as sp
+from scipy.spatial.transform import Rotation
 
 from strapgen import catalogue
 from strapgen.backends import BACKENDS, fitted
@@ -17,7 +19,7 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
-from strapgen.symbolic.kernel import Kernel
+from strapgen.symbolic.kernel import Kernel, evaluate_stages
 
 #: Kernels of the standard catalogue that fixed point can be made of without ranges from a user: all but the models of
 #: motions, whose rates have none, as tests/library proves.
@@ -79,6 +81,22 @@ def precisely(kernel: Kernel, values: Mapping[str, mpmath.mpf]) -> dict[str, mpm
     for arguments, elements, function in _functions(kernel):
         known |= dict(zip(elements, map(mpmath.mpf, function(*map(known.get, arguments))), strict=True))
     return known
+
+
+def on_arrays(kernel: Kernel, inputs: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return all elements of a kernel, its formulas computed on arrays in double: no code is made of them."""
+    stages = (*kernel.stages, *kernel.outputs)
+    return evaluate_stages(stages, inputs, float, lambda power, arguments: arguments[0] ** float(power.exp))
+
+
+def turns(choice: Choice, samples: np.ndarray) -> Rotation:
+    """Return the rotations over steps of Euler parameters on samples (N, K, 3) in rad."""
+    step = kernel(choice)
+    state, increments = step.inputs
+    values = dict(zip(state.elements, (0.0, 0.0, 0.0, 1.0), strict=True))
+    values |= dict(zip(increments.elements, samples.reshape(len(samples), -1).T, strict=True))
+    known = on_arrays(step, values)
+    return Rotation.from_quat(np.stack([known[name] for name in step.outputs[0].signal.elements], -1))
 
 
 def generated(program: Program, backend_name: str) -> Sources:

@@ -113,8 +113,7 @@ def test_coning_adds_up_along_its_axis(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", ["rk2", "rk4"])
-@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+@pytest.mark.parametrize(("algorithm", "method"), [("dcm", "rk4"), ("euler", "rk2")])
 def test_drift_over_hours_is_the_secular_rate(algorithm, method, simulated):
     """A long run on the thesis's motion: what grows is the closed form, its swing the bounded part."""
     profile = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)

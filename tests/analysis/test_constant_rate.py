@@ -114,13 +114,13 @@ def test_a_run_of_1440_steps(algorithm, order, rate, every, simulated):
 @pytest.mark.long
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
-def test_a_run_of_1440_steps_in_many_digits(algorithm, order):
-    """Rounding hides nothing: every one of the nine errors agrees to 1e-30 of the largest."""
+def test_a_run_in_many_digits(algorithm, order):
+    """Rounding hides nothing: every one of the nine errors agrees to 1e-25 of the largest."""
     choice = choose(algorithm, f"rk{order}", 2)
     profile = motion("constant", **RATES["any axis"])
-    expected = errors_after(choice, profile, STEP, 180)
+    expected = errors_after(choice, profile, STEP, 25)
     with mpmath.workdps(exact.DIGITS):
-        *_, (computed, true) = exact_attitudes(choice, profile)(STEP, 1440)
+        *_, (computed, true) = exact_attitudes(choice, profile)(STEP, 200)
         for part, wanted in zip(
             parts_of()(computed, true), (expected.scale, expected.skew, expected.drift), strict=True
         ):

@@ -15,6 +15,7 @@ from strapgen.analysis.one_step import errors, step
 from strapgen.backends import exact
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
 from strapgen.symbolic.covariants import Frame
+from strapgen.symbolic.kernel import Kernel
 
 CASES = [
     ("rk1", 2, 0),
@@ -64,11 +65,19 @@ def rate(number: int) -> list[list[sp.Rational]]:
     ]
 
 
+def in_digits(kernel: Kernel, *inputs: list) -> list:
+    """Return the last output of a kernel in the digits of mpmath."""
+    elements = [element for signal in kernel.inputs for element in signal.elements]
+    numbers = dict(zip(elements, (x for values in inputs for x in values), strict=True))
+    outputs = kernel.expand(numbers, lambda number: mpmath.mpf(number.p) / number.q)
+    return [mpmath.mpmathify(x) for x in outputs[kernel.outputs[-1].signal.name]]
+
+
 def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> list:
     """Return the error matrix of one step of length h in the digits of mpmath."""
-    program = derived.program(choice)
-    companions = program.companions
-    count = program.inputs[1].shape[0] - companions.previous
+    kernel = derived.kernel(choice)
+    companions = kernel.companions
+    count = kernel.inputs[1].shape[0] - companions.previous
 
     def angle(t):
         return [
@@ -81,10 +90,11 @@ def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> l
 
     times = [exact.number(h) * k / count for k in range(-companions.previous, count + 1)]
     angles = [angle(t) for t in times]
+    state = [exact.number(x) for x in companions.identity]
     taken = [b - a for pair in pairwise(angles) for a, b in zip(*pair, strict=True)]
-    state = exact.states(program, [taken], [exact.number(x) for x in companions.identity])[-1]
+    state = in_digits(kernel, state, taken)
     if companions.attitude:
-        state = exact.Interpreter(derived.program(choose(companions.attitude)))(state)
+        state = in_digits(derived.kernel(choose(companions.attitude)), state)
     computed = mpmath.matrix([state[3 * i : 3 * i + 3] for i in range(3)])
 
     # The true matrix by its own Taylor series, term after term, to 40 terms.

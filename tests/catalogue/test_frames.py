@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from derived import kernel
 
-from strapgen.catalogue import KERNELS, MOST_INCREMENTS, VECTORS, Choice, choose
+from strapgen.catalogue import KERNELS, VECTORS, Choice, choose
 from strapgen.ir.signals import Signal
 
 #: Signals that have no frame, with the reason.
@@ -42,23 +42,12 @@ WORDS = {
     "reference axes": "n",
     "body to reference": "b to n",
 }
-#: Kernels that differ in the order of a series alone; the first and the last stand for all.
-_FAMILIES = {(recipe.module, recipe.function): [] for recipe in KERNELS.values()}
-for _name, _recipe in KERNELS.items():
-    _FAMILIES[_recipe.module, _recipe.function].append(_name)
-SHORT = [
-    *(
-        choose(name)
-        for names in _FAMILIES.values()
-        for name in dict.fromkeys((names[0], names[1 % len(names)]))
-    ),
+EVERY = [
+    *(choose(name) for name in KERNELS),
+    *(choose(name, increments=count, previous=1) for name in VECTORS for count in (2, 3)),
     *(choose(name) for name in VECTORS),
     choose("euler"),
     choose("dcm", "rk4", rates=True),
-]
-LONG = [
-    *(choose(name) for name in KERNELS),
-    *(choose(name, increments=count, previous=1) for name in VECTORS for count in (2, MOST_INCREMENTS // 2)),
 ]
 
 
@@ -88,13 +77,8 @@ def faults(choice: Choice) -> list[str]:
 
 @pytest.mark.long
 def test_every_vector_states_its_frame_and_a_state_keeps_it():
-    assert [fault for choice in SHORT for fault in faults(choice)] == []
-
-
-@pytest.mark.long
-def test_every_vector_of_all_kernels_states_its_frame_and_a_state_keeps_it():
-    assert [fault for choice in LONG for fault in faults(choice)] == []
-    present = {signal.name for choice in LONG for signal in kernel(choice).signals}
+    assert [fault for choice in EVERY for fault in faults(choice)] == []
+    present = {signal.name for choice in EVERY for signal in kernel(choice).signals}
     assert set(WITHOUT) <= present
 
 

@@ -261,10 +261,16 @@ def test_equal_operations_are_computed_once(choice):
     assert [node for node, count in operations.items() if count > 1] == []
 
 
-@pytest.mark.parametrize("method", STANDARD_METHODS)
-def test_euler_and_cayley_klein_are_one_arithmetic(method):
+@pytest.mark.parametrize(
+    ("method", "count"),
+    [
+        *((method, 2) for method in STANDARD_METHODS),
+        *(pytest.param(*step, marks=pytest.mark.long) for step in (("rk2", 4), ("rk4", 3), ("rk3", None))),
+    ],
+)
+def test_euler_and_cayley_klein_are_one_arithmetic(method, count):
     # a1 = e4, a2 = e1, a3 = e2, a4 = e3: the labels s, x, y, z say which is which.
-    euler, cayley_klein = program(Choice("euler", method, 2)), program(Choice("cayley-klein", method, 2))
+    euler, cayley_klein = (program(Choice(name, method, count)) for name in ("euler", "cayley-klein"))
     assert body(euler, "e") == body(cayley_klein, "a")
     # ... and the same elements come out.
     held = [

@@ -5,12 +5,13 @@ from __future__ import annotations
 from fractions import Fraction
 from random import Random
 
+import derived
 import mpmath
 import pytest
 import sympy as sp
-from derived import precisely
 
-from strapgen import derive, lower
+from strapgen import derive
+from strapgen.catalogue import Choice, choose
 from strapgen.ir.program import Constant, walk
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder
@@ -28,9 +29,13 @@ IRRATIONAL = {
 }
 
 
-def kernel(name: str) -> Kernel:
+def chosen(name: str) -> Choice:
     algorithm, method, increments, rates = IRRATIONAL[name]
-    return derive(algorithm, method, increments, rates=rates)
+    return choose(algorithm, method, increments, rates)
+
+
+def kernel(name: str) -> Kernel:
+    return derived.kernel(chosen(name))
 
 
 def one(expression: sp.Expr) -> sp.Expr:
@@ -48,7 +53,7 @@ def test_a_rationalized_kernel_is_the_kernel_to_70_digits(name):
     names = [element for signal in exact.inputs for element in signal.elements]
     with mpmath.workdps(100):
         values = {n: mpmath.mpf(random.randint(-999, 999)) / 1000 for n in names}
-        found = [precisely(made, values) for made in (exact, rounded)]
+        found = [derived.precisely(made, values) for made in (exact, rounded)]
         for name in exact.outputs[0].signal.elements:
             # Some hundreds of constants below 100 in size, each off by 1e-80 of itself.
             assert abs(found[0][name] - found[1][name]) < mpmath.mpf(10) ** -70
@@ -63,19 +68,19 @@ def test_no_irrational_number_is_left_and_a_note_says_so(name):
             assert not expression.has(sp.Float)
     (note,) = set(rounded.notes) - set(kernel(name).notes)
     assert note.startswith(f"Irrational constants are rounded to {DIGITS} digits")
-    assert note in lower(kernel(name)).notes
+    assert note in derived.program(chosen(name)).notes
 
 
 @pytest.mark.parametrize("name", IRRATIONAL)
 def test_programs_hold_fractions_near_the_constants(name):
-    program = lower(kernel(name))
+    program = derived.program(chosen(name))
     constants = [n.value for a in program.body for n in walk(a.value) if isinstance(n, Constant)]
     assert constants and all(isinstance(value, Fraction) for value in constants)
 
 
-@pytest.mark.parametrize("chosen", [("euler", "rk4", 2), ("dcm", "magnus6", 4), ("dcm", "butcher6", 3)])
-def test_a_rational_kernel_is_left_as_it_is(chosen):
-    made = derive(*chosen)
+@pytest.mark.parametrize("words", [("euler", "rk4", 2), ("dcm", "magnus6", 4), ("dcm", "butcher6", 3)])
+def test_a_rational_kernel_is_left_as_it_is(words):
+    made = derive(*words)
     assert rationalized(made) is made
 
 

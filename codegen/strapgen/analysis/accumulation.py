@@ -9,6 +9,7 @@ and it prevents scale and skew from accumulating.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -286,6 +287,7 @@ def antiderivative(matrix: sp.Matrix, error: ErrorRate) -> sp.Matrix:
     return mean.reshape(*matrix.shape) * TIME + swing.reshape(*matrix.shape)
 
 
+@lru_cache(256)
 def _fourier(expression: sp.Expr, b: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
     """Return the mean of a polynomial in cos(b t) and sin(b t), and the integral from 0 to t of its waves."""
     z = sp.Symbol("z")

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import sympy as sp
@@ -219,11 +220,28 @@ def split(error: Sequence[Any]) -> dict[str, list[Any]]:
     dict of str to list of Expr
         "scale", "skew" and "drift", three elements each.
     """
+    return {
+        name: [sp.Add(*(share * error[place] for place, share in form)) for form in forms]
+        for name, forms in _forms_of_error().items()
+    }
+
+
+@cache
+def _forms_of_error() -> dict[str, list[list[tuple[int, sp.Rational]]]]:
+    """Return the parts of an error matrix as sums of its elements: the place and the share of each."""
     kernel = _error_matrix()
+    ring, *elements = sp.ring("e:9", sp.QQ)
     computed, true = (signal.elements for signal in kernel.inputs)
-    values = dict(zip(computed, (element + int(k % 4 == 0) for k, element in enumerate(error)), strict=True))
-    values |= zip(true, (sp.Integer(int(k % 4 == 0)) for k in range(9)), strict=True)
-    return kernel.expand(values)
+    identity = [ring(int(k % 4 == 0)) for k in range(9)]
+    values = dict(zip(computed, (e + one for e, one in zip(elements, identity, strict=True)), strict=True))
+    parts = kernel.expand(values | dict(zip(true, identity, strict=True)))
+    return {
+        name: [
+            [(place.index(1), sp.Rational(x.numerator, x.denominator)) for place, x in form.terms()]
+            for form in forms
+        ]
+        for name, forms in parts.items()
+    }
 
 
 def _error_matrix() -> Kernel:

@@ -20,7 +20,14 @@ from sympy.polys.orderings import grevlex, lex
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.families import Equation, Family, PolynomialSolution, simple, with_roots
 from strapgen.symbolic.power_series import field
-from strapgen.symbolic.ring_quotients import cancelled, linear_coefficient, quotient_of, substituted, without
+from strapgen.symbolic.ring_quotients import (
+    cancelled,
+    linear_coefficient,
+    may_divide,
+    quotient_of,
+    substituted,
+    without,
+)
 
 #: Most cases that are looked at, most terms of an equation, and most unknowns.
 MOST_CASES, MOST_TERMS, MOST_UNKNOWNS = 400, 5000, 40
@@ -196,7 +203,7 @@ class _CaseSearch:
             if polynomial.is_ground:
                 raise _ImpossibleError(f"{label} {self.contradiction(case, polynomial)}")
             for factor in case.nonzero:
-                while True:
+                while may_divide(factor, polynomial):
                     quotient, rest = divmod(polynomial, factor)
                     if rest:
                         break

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
@@ -59,9 +60,15 @@ class Powers:
     def __mul__(self, other: Any) -> Powers:
         if isinstance(other, SeriesRoot):
             return NotImplemented
+        if not isinstance(other, Powers):
+            return self._scaled(self.ring(other))
+        if len(other.parts) == 1 and 0 in other.parts:
+            return self._scaled(other.parts[0])
+        if len(self.parts) == 1 and 0 in self.parts:
+            return other._scaled(self.parts[0])
         total: dict[int, Any] = {}
         for n, a in self.parts.items():
-            for m, b in self._of(other).parts.items():
+            for m, b in other.parts.items():
                 if n + m > self.top:
                     break
                 total[n + m] = total[n + m] + a * b if n + m in total else a * b
@@ -69,9 +76,14 @@ class Powers:
 
     __radd__, __rmul__ = __add__, __mul__
 
+    def _scaled(self, factor: Any) -> Powers:
+        """Return the product with a polynomial."""
+        if factor.is_ground:
+            factor = factor.LC  # a number
+        return Powers(self.ring, {power: part * factor for power, part in self.parts.items()}, self.top)
+
     def __neg__(self) -> Powers:
-        negative: Powers = self * self.ring(-1)
-        return negative
+        return Powers(self.ring, {power: -part for power, part in self.parts.items()}, self.top)
 
     def __sub__(self, other: Any) -> Powers:
         return self + -self._of(other)
@@ -126,15 +138,7 @@ class Powers:
         ArithmeticError
             If it begins with anything else.
         """
-        start = self.ring.domain.to_sympy(self._number())
-        if start.free_symbols:
-            raise ArithmeticError(f"a series that begins with the unknown {start} has no series as its root")
-        try:
-            factor = self.ring.domain.from_sympy(sp.sqrt(start)) if start > 0 else None
-        except CoercionFailed:
-            factor = None
-        if not factor:
-            raise ArithmeticError(f"a series that begins with {start} has no series as its root")
+        factor = _root_of(self.ring.domain, self._number())
         rest = self * (self.ring.domain.one / (factor * factor)) - 1
         coefficients = [sp.binomial(sp.Rational(1, 2), k) for k in range(self.top + 1)]
         root: Powers = self.composed(coefficients, rest) * factor
@@ -155,6 +159,21 @@ class Powers:
         if not self.start.is_ground:
             raise ArithmeticError("a series that begins with a polynomial has neither inverse nor root")
         return self.start.LC if self.start else self.ring.domain.zero
+
+
+@lru_cache(256)
+def _root_of(domain: Any, number: Any) -> Any:
+    """Return the square root of a number of a field."""
+    start = domain.to_sympy(number)
+    if start.free_symbols:
+        raise ArithmeticError(f"a series that begins with the unknown {start} has no series as its root")
+    try:
+        factor = domain.from_sympy(sp.sqrt(start)) if start > 0 else None
+    except CoercionFailed:
+        factor = None
+    if not factor:
+        raise ArithmeticError(f"a series that begins with {start} has no series as its root")
+    return factor
 
 
 class SeriesRoot:

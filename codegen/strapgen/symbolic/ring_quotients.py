@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import le
 from typing import Any
 
 
@@ -49,3 +50,14 @@ def cancelled(top: Any, bottom: Any) -> tuple[Any, Any]:
     """Return a quotient without what its numerator and denominator share."""
     common = top.gcd(bottom)
     return top.exquo(common), bottom.exquo(common)
+
+
+def may_divide(divisor: Any, polynomial: Any) -> bool:
+    """Tell whether the first and the last monomial of a divisor divide those of a polynomial, as they have to.
+
+    Both are of a ring in lexical order; a division that cannot be without a rest need not be tried.
+    """
+    return all(
+        all(map(le, one, other))
+        for one, other in ((divisor.LM, polynomial.LM), (min(divisor), min(polynomial)))
+    )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import sympy as sp
 
@@ -81,11 +82,17 @@ def tangent(element: sp.Symbol, expression: sp.Expr, changes: Mapping[sp.Symbol,
     if expression.is_Pow and expression.exp == -sp.S.Half:  # no new root: a power of the element
         return -(element**3) / 2 * tangent(element, expression.base, changes)
     terms = [
-        sp.diff(expression, symbol) * changes[symbol]
+        _slope(expression, symbol) * changes[symbol]
         for symbol in sorted(expression.free_symbols, key=str)
         if changes.get(symbol, 0) != 0
     ]
     return sp.Add(*terms)
+
+
+@lru_cache(10_000)
+def _slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Return a partial derivative: the changes along all inputs of a kernel have it in common."""
+    return sp.diff(expression, symbol)
 
 
 def _named(element: str, ending: str) -> str:

@@ -92,14 +92,35 @@ def run_in_fixed_point(name, carry, moving, resting):
         float(evaluator.numbers(a, array).ravel()[0])
         for a, array in zip(evaluator.interface.inputs[1:], inputs[1:], strict=True)
     )
-    feedback, exact = evaluator.fresh(1), 0.0
+    cycle, (deviation, torques), after = looped(evaluator, inputs)
+    exact = 0.0
     for turning, cycles in ((1, moving), (0, resting)):
-        inputs[1] = inputs[1] * turning
+        torques *= turning
         for _ in range(cycles):
-            (inputs[0], _), feedback = evaluator.run(inputs, feedback)
+            cycle()
+            deviation[:] = after
             exact += decay * (turning * gain * 2 * (d * rate) ** 2 - exact)
-    result = float(evaluator.numbers(evaluator.interface.outputs[0], inputs[0]).ravel()[0])
+    result = float(evaluator.numbers(evaluator.interface.outputs[0], after).ravel()[0])
     return result, exact, evaluator
+
+
+def looped(evaluator, inputs):
+    """Return a call of the C function on arrays that stay where they are, its first two inputs, and its first output.
+
+    `Evaluator.run` takes ten times as long as the function itself, which counts in a run of 84,000 cycles.
+    """
+    words = [array.astype(kind) for array, kind in zip(inputs, evaluator.input_types, strict=True)]
+    feedback = np.array(evaluator.fresh(1), evaluator.feedback_type)
+    outputs = [np.empty((1, a.signal.size), evaluator.word_type) for a in evaluator.interface.outputs]
+    arrays = [*words, *([feedback] if evaluator.interface.residuals else []), *outputs]
+    status, pointers = evaluator.module.ffi.new("int *"), [*map(evaluator.pointer, arrays)]
+    function = getattr(evaluator.module.lib, f"{evaluator.function.name}_array")
+
+    def cycle():
+        function(1, status, *pointers)
+        assert not status[0]
+
+    return cycle, words[:2], outputs[0]
 
 
 def allowed(evaluator, carry):

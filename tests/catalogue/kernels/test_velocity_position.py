@@ -152,9 +152,12 @@ SETTINGS = {
     word: Settings(word=word, largest_angle=Fraction(1, 16), ranges={"velocity_increments": Fraction(1, 2)})
     for word in (16, 32)
 }
-TARGETS = [("rk4", 32), pytest.param("rk4", 16, marks=pytest.mark.long)]
-TARGETS += [
-    pytest.param(m, w, marks=pytest.mark.long) for m in ("window-3-3", "coning-combined") for w in (16, 32)
+TARGETS = [
+    ("rk4", 32),
+    *(
+        pytest.param(*more, marks=pytest.mark.long)
+        for more in (("rk4", 16), ("window-3-3", 32), ("coning-combined", 16))
+    ),
 ]
 
 

@@ -256,6 +256,7 @@ def order_in_series(tableau: Tableau, top: int, degree: int, representation: str
     identity = sp.polys.matrices.DomainMatrix.eye(size, domain)
     zero = identity - identity
 
+    @cache
     def of(value: object) -> object:
         return domain.from_sympy(sp.sympify(value))
 
@@ -271,7 +272,7 @@ def order_in_series(tableau: Tableau, top: int, degree: int, representation: str
         for a, slope in zip(row, slopes, strict=True):
             if a != 0:
                 point = [x + y * of(a) for x, y in zip(point, slope, strict=True)]
-        here = [A[k] * of(sp.sympify(node) ** k) for k in range(degree + 1)]
+        here = [A[k] * of(node) ** k for k in range(degree + 1)]
         slopes.append(
             [zero]
             + [sum((here[k] * point[n - k] for k in range(min(n, degree) + 1)), zero) for n in range(top)]
