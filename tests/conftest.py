@@ -184,7 +184,7 @@ def small_images() -> Iterator[None]:
 def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
     """Compile without optimization what is not about it: without contraction it leaves every bit as it is.
 
-    The tests of the C text itself compile as a user does, and long ones look for undefined behaviour at every level.
+    The tests of the C text itself compile as a user does, and long ones look for undefined behaviour.
     """
     less = "-O0" if pytestconfig.getoption("markexpr") in ("not long", "long") else "-O3"
     with pytest.MonkeyPatch.context() as patch:

@@ -63,10 +63,12 @@ def check_integers_of_c(
     choices: Iterable[Choice], target: str, settings: Settings, rng: np.random.Generator
 ) -> None:
     """Check that kernels return on a target the integers and the residuals of C, or refuse the same samples."""
-    pairs = [
-        [of_sources(generated_sources.sources(choice, name, settings)) for name in (target, "c-fixed")]
+    both = [
+        [generated_sources.sources(choice, name, settings) for name in (target, "c-fixed")]
         for choice in choices
     ]
+    compiler.compile_together(sources for pair in both for sources in pair)
+    pairs = [[of_sources(sources) for sources in pair] for pair in both]
     accepted = 0
     for evaluators in pairs:
         ranges = [(a.low, a.high, a.signal.size) for a in evaluators[0].interface.inputs]

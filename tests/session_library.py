@@ -1,6 +1,6 @@
-"""One library of C for all tests of a session: its processes compile together what the tests build, before they begin.
+"""One library for all tests of a session: its processes compile together what the tests build, before they begin.
 
-A compiled module costs more for the compiler's start, Python's headers and the linker than for the kernel in it.
+A compiled module costs more for the compiler's start, its headers and the linker than for the kernel in it.
 tests/data/modules.jsonl lists the kernels that quick tests build, a line each, and modules-long.jsonl those of long
 tests. The lists are no more than forecasts: a module that one lacks is built alone when a test needs it, and one too
 many costs a few hundredths of a second. ``make test-modules`` writes them anew.
@@ -29,8 +29,10 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support import cache
-from strapgen.support.exceptions import InputError
+from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.targets import TARGETS
 from strapgen.toolchain import compiler
+from strapgen.toolchain.shared_libraries import COMPILERS
 
 #: The kernels that tests build, quick ones and long ones: kernel, target, and what fixed point is made for.
 FORECASTS = {
@@ -63,7 +65,7 @@ def choice_by_name(kernel: str) -> Choice | None:
 
 
 def line(sources: Sources) -> str | None:
-    """Return the line of the forecast for C sources; None if the catalogue does not lead to the same text."""
+    """Return the line of the forecast for sources; None if the catalogue does not lead to the same text."""
     choice = choice_by_name(sources.kernel)
     settings = sources.fixed.settings if sources.fixed else None
     if choice is None:
@@ -148,9 +150,21 @@ def place(factory: pytest.TempPathFactory, name: str, fill: Callable[[Path], Non
     return folder
 
 
+@memoized
+def _has_compiler(target: str) -> bool:
+    """Tell whether there is a compiler of another language than C, without which tests are skipped; C is needed."""
+    other = COMPILERS.get(TARGETS[target].language)
+    try:
+        return other is None or bool(other.path())
+    except CompilerError:
+        return False
+
+
 def provide(forecast: Path) -> None:
     """Compile what a forecast lists, together with the other processes of the session."""
-    entries = [json.loads(text) for text in forecast.read_text().splitlines()]
+    entries = [
+        entry for entry in map(json.loads, forecast.read_text().splitlines()) if _has_compiler(entry[1])
+    ]
     state = cache.digest([cache.generator_digest(), forecast.read_bytes(), *compiler._flags])
     folder = cache.root() / "session-library" / state
 
@@ -170,14 +184,14 @@ def provide(forecast: Path) -> None:
     ordered = sorted(kernels, key=lambda name: (-len(kernels[name]), name))
     _share(folder, {f"generate-{name}": lambda n=kernels[name]: generate(n) for name in ordered})
 
-    # The nth variant of every kernel goes into the nth layer, in which no name occurs twice.
-    layers: dict[int, list[int]] = {}
+    # The nth variant of every kernel goes into the nth layer of its language, in which no name occurs twice.
+    layers: dict[tuple[str, int], list[int]] = {}
     variants: dict[tuple[str, str, int], int] = {}
     for number, (kernel, target, settings) in enumerate(entries):
         stated = settings_of(settings)
         name = (kernel, target, stated.word if stated else 0)
         variants[name] = variants.get(name, -1) + 1
-        layers.setdefault(variants[name], []).append(number)
+        layers.setdefault((TARGETS[target].language, variants[name]), []).append(number)
     groups = [
         numbers[start : start + _TOGETHER]
         for numbers in layers.values()

@@ -93,14 +93,14 @@ def test_a_copy_refuses_what_the_back_end_refuses(increments):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("algorithm", ["euler", FILE])
-def test_a_pool_of_processes_runs_a_back_end(algorithm, rng):
-    backend = strapgen.backend(algorithm, backend="c")
-    runs = [rng.normal(scale=0.02, size=(50, 2, 3)) for _ in range(4)]
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
-        histories = list(pool.map(backend.propagate, runs))
-    for run, history in zip(runs, histories, strict=True):
-        np.testing.assert_array_equal(history, backend.propagate(run))
+def test_a_pool_of_processes_runs_back_ends(rng):
+    backends = [strapgen.backend(algorithm, backend="c") for algorithm in ("euler", FILE)]
+    runs = [rng.normal(scale=0.02, size=(50, 2, 3)) for _ in range(2)]
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        histories = [list(pool.map(backend.propagate, runs)) for backend in backends]
+    for backend, several in zip(backends, histories, strict=True):
+        for run, history in zip(runs, several, strict=True):
+            np.testing.assert_array_equal(history, backend.propagate(run))
 
 
 @pytest.mark.long

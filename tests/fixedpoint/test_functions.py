@@ -9,7 +9,7 @@ from fractions import Fraction
 from functools import cache
 from itertools import cycle, product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
@@ -494,6 +494,14 @@ def test_nearest_rotation_refuses_the_same_input_in_c_and_model():
 # The generated C
 
 
+class Written(NamedTuple):
+    """The C of all kernels in words of a length."""
+
+    folder: Path
+    word: int
+    every: dict[str, Any]
+
+
 def sources(name: str, word: int) -> Any:
     if name in CASES:
         return emit(fixed(name, word), "c-fixed")
@@ -502,23 +510,23 @@ def sources(name: str, word: int) -> Any:
     return generate(programs()[name], "c-fixed", Settings(word=word))
 
 
-def written(folder: Path, word: int) -> dict[str, Any]:
-    """Write the C of all kernels in words of a length, and all.inc, which is one text of it; return the sources."""
+@pytest.fixture(scope="module", params=C_WORDS)
+def written(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """The C of all kernels in words of a length, in a folder with all.inc, which is one text of it."""
+    folder, word = tmp_path_factory.mktemp("written"), request.param
     every = {name: sources(name, word) for name in (*CASES, *MOTIONS, "dcm-orthonormalize-optimal")}
     texts = {file: text for one in every.values() for file, text in one.step_files.items()}
     assert len(texts) == 2 * len(every)
     for file, text in texts.items():
         (folder / file).write_text(text)
     (folder / "all.inc").write_text("".join(f'#include "{file}"\n' for file in texts if file.endswith(".c")))
-    return every
+    return Written(folder, word, every)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("word", C_WORDS)
-def test_c_compiles_without_a_warning(word, tmp_path):
+def test_c_compiles_without_a_warning(written):
     gcc = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
-    written(tmp_path, word)
-    command = [gcc, *STRICT, "-c", "-o", "/dev/null", "-x", "c", str(tmp_path / "all.inc")]
+    command = [gcc, *STRICT, "-c", "-o", "/dev/null", "-x", "c", str(written.folder / "all.inc")]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -563,14 +571,14 @@ def driver(made: Any, word: int) -> str:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("word", C_WORDS)
-def test_c_has_no_undefined_behaviour(word, tmp_path):
+def test_c_has_no_undefined_behaviour(written, tmp_path):
+    """Without optimization the sanitizers see every operation of the source."""
     gcc = shutil.which("gcc") or pytest.skip("gcc is not on this machine")
-    every = written(tmp_path, word)
+    folder, word, every = written
     calls = "".join(f"    run_{made.function.name}();\n" for made in every.values())
     main = ['#include <stdio.h>\n#include "all.inc"\n', *(driver(made, word) for made in every.values())]
     (tmp_path / "main.c").write_text("".join([*main, f"int main(void)\n{{\n{calls}    return 0;\n}}\n"]))
-    flags = ["-std=c99", "-O1", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"]
+    flags = ["-std=c99", "-O0", "-fsanitize=undefined,address", "-fno-sanitize-recover=all", f"-I{folder}"]
     program = tmp_path / "main"
     subprocess.run([gcc, *flags, "-o", str(program), str(tmp_path / "main.c")], check=True)
     done = subprocess.run([str(program)], capture_output=True, text=True)

@@ -115,17 +115,21 @@ def c_agrees_with_the_model(in_c, model, word, rng):
         assert computed == ([output[row : row + 1] for output in outputs], left[row : row + 1])
 
 
+#: Random inputs: what a rounding by 16 places does with one value in 65,536 happens to each element some times.
+MANY = 250_000
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "settings", [Settings(16), Settings(32), Settings(32, rounding="truncation", carry="full")]
 )
 @pytest.mark.parametrize("choice", [EULER, Choice("dcm", "rk4", 2)], ids=lambda choice: choice.kernel)
-def test_a_million_random_inputs(choice, settings, rng):
+def test_a_quarter_of_a_million_random_inputs(choice, settings, rng):
     in_c, model = pair(choice, settings)
-    inputs = corners_and_random(model, 1_000_000, rng)
-    residuals = rng.integers(0, 2**settings.word, size=(1_000_000, len(model.interface.residuals)))
+    inputs = corners_and_random(model, MANY, rng)
+    residuals = rng.integers(0, 2**settings.word, size=(MANY, len(model.interface.residuals)))
     (computed,), kept = in_c.run(inputs, residuals)
-    for rows in np.array_split(np.arange(len(residuals)), 100):  # so few that they stay near the processor
+    for rows in np.array_split(np.arange(MANY), MANY // 10_000):  # so few that they stay near the processor
         (wanted,), left = model.run([array[rows] for array in inputs], residuals[rows])
         np.testing.assert_array_equal(computed[rows], wanted)
         np.testing.assert_array_equal(kept[rows], left)
@@ -258,11 +262,13 @@ def test_strict_compilers_are_silent(word, methods, tmp_path):
             (tmp_path / name).write_text(text)
             files += [name] * name.endswith(".c")
     (tmp_path / "all.inc").write_text("".join(f'#include "{name}"\n' for name in files))
-    for command in (
+    commands = [
         ["cc", *STRICT, "-fsyntax-only", *files],  # each by itself
-        ["cc", *STRICT, "-O2", "-c", "-o", "all.o", "-x", "c", "all.inc"],
         ["c++", "-x", "c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "all.inc"],
-    ):
+    ]
+    if word == 64:  # shorter words are compiled with optimization where their semantics are looked at
+        commands.append(["cc", *STRICT, "-O2", "-c", "-o", "all.o", "-x", "c", "all.inc"])
+    for command in commands:
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         assert not done.returncode, done.stderr
 
@@ -290,7 +296,7 @@ def test_the_header_states_format_unit_range_and_error():
     assert "--max-rate-deg-s 400 --step 0.01 --rounding nearest --carry full --drift-allowance 1/16" in text
 
 
-# Sanitizers and other semantics of overflow
+# Sanitizers
 
 _HARNESS = """
 static int run_{name}(void)
@@ -321,15 +327,11 @@ static int run_{name}(void)
 }}
 """
 
-#: Code without optimization is checked where the source has an operation, and compiles in a quarter of the time.
+#: Sanitizers check code without optimization at every operation of the source. Where they find no overflow, code that
+#: wraps around or traps computes the same, and an optimizer has nothing to build on.
 BUILDS = {
     "plain": [*STRICT, "-O2"],
     "sanitized": ["-O0", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"],
-}
-MORE_BUILDS = {
-    "sanitized and optimized": ["-O2", "-fsanitize=undefined,address", "-fno-sanitize-recover=all"],
-    "wrapping": ["-O2", "-fwrapv"],
-    "trapping": ["-O2", "-ftrapv"],
 }
 
 
@@ -385,16 +387,12 @@ def built(folder: Path, every, flags: list[str]) -> Path:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("word", "methods", "builds"),
-    [(16, (None, "rk3"), BUILDS | MORE_BUILDS), (32, (None, "rk4", "rk3"), BUILDS | MORE_BUILDS)],
-    ids=lambda value: str(len(value)) if isinstance(value, dict) else None,
-)
-def test_no_undefined_behaviour_under_any_semantics(word, methods, builds, tmp_path, rng):
+@pytest.mark.parametrize(("word", "methods"), [(16, (None, "rk3")), (32, (None, "rk4"))])
+def test_no_undefined_behaviour(word, methods, tmp_path, rng):
     settings = Settings(word, Fraction(1, 60), carry="full")
     every = {choice: quantized(choice, settings) for choice in choices_of(*methods)}
     sources = {choice: generate(fixed, "c-fixed") for choice, fixed in every.items()}
-    programs = {name: built(tmp_path / name, sources.values(), flags) for name, flags in builds.items()}
+    programs = {name: built(tmp_path / name, sources.values(), flags) for name, flags in BUILDS.items()}
 
     @each("choice", every)
     def agree(choice, rng):

@@ -113,15 +113,18 @@ def _eigenvalues(matrix: Matrix, box: _Box) -> tuple[float, float]:
         for gen, (low, high) in zip(ring.gens(), box, strict=True)
     ]
     size = len(matrix)
-    terms = [[element.compose(*moved, ctx=ring).to_dict() for element in row] for row in matrix]
+    upper = {(i, j): matrix[i][j].compose(*moved, ctx=ring) for i in range(size) for j in range(i, size)}
+    places = [[(min(i, j), max(i, j)) for j in range(size)] for i in range(size)]
 
     def part(*powers: int) -> Any:
-        return fmpq_mat(size, size, [element.get(powers, fmpq(0)) for row in terms for element in row])
+        return fmpq_mat(size, size, [upper[place][powers] for row in places for place in row])
 
-    rest = max(
-        sum((abs(c) for element in row for powers, c in element.items() if sum(powers) > 1), fmpq(0))
-        for row in terms
-    )
+    linear = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+    rests = {
+        place: sum(map(abs, element.coeffs()), fmpq(0)) - sum(abs(element[powers]) for powers in linear)
+        for place, element in upper.items()
+    }
+    rest = max(sum((rests[place] for place in row), fmpq(0)) for row in places)
     middle, slopes = part(0, 0, 0), [part(1, 0, 0), part(0, 1, 0), part(0, 0, 1)]
     corners = [
         sum((sign * slope for sign, slope in zip(signs, slopes, strict=True)), middle)

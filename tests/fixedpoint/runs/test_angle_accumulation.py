@@ -65,7 +65,7 @@ def assert_holds(errors: np.ndarray, bounds: np.ndarray, carry: str) -> None:
         ("dcm", "none", 600, 0),
         *(
             pytest.param(
-                algorithm, carry, 4_000 if algorithm == "euler" else 1800, every, marks=pytest.mark.long
+                algorithm, carry, 2_000 if algorithm == "euler" else 1200, every, marks=pytest.mark.long
             )
             for algorithm, carry, every in (
                 *(("euler", carry, every) for carry in LARGEST_RATIO for every in (0, 100)),
