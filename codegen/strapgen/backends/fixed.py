@@ -10,6 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,12 @@ class FixedEvaluator(Evaluator):
         return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
 
 
+@cache
+def _declared(dtype: Any) -> str:
+    """Return the C type of an array of integers."""
+    return f"{dtype.name}_t[]"
+
+
 class CFixedEvaluator(FixedEvaluator):
     """A generated C function on integers."""
 
@@ -133,7 +140,7 @@ class CFixedEvaluator(FixedEvaluator):
 
     def pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
-        return self.module.ffi.from_buffer(f"{array.dtype.name}_t[]", array)
+        return self.module.ffi.from_buffer(_declared(array.dtype), array)
 
     def address(self) -> int:
         """Return the address of the function on one sample."""
