@@ -97,7 +97,8 @@ def test_both_modes_pass_the_pole(azimuth):
 @pytest.mark.parametrize("inclination", GREAT_CIRCLES)
 @pytest.mark.parametrize("azimuth", ["wander", "free"])
 def test_the_equations_hold_to_the_last_digit(azimuth, inclination):
-    # The classical Runge-Kutta method at 10 s, 1 mrad of the circle, on the kernels' rates, so that only the equations are left to be wrong.
+    # The classical Runge-Kutta method at 10 s, 1 mrad of the circle, on the kernels' rates, so that only the equations
+    # are left to be wrong.
     names = "earth-rate", f"{azimuth}-rate-sphere", "gravity-sphere"
     earth_rate, transport, gravity = (kernel(name)[0] for name in names)
     constants, coriolis = EARTH.constants, kernel("coriolis-gravity")[0]
@@ -327,8 +328,8 @@ def hour_of(flight: Flight, seconds: int, cycle: float, azimuth: str) -> tuple[n
 @pytest.mark.parametrize(("azimuth", "seconds", "cycle"), [("wander", 900, 0.1), ("free", 900, 0.2)])
 def test_the_chain_is_off_by_what_the_series_predicts(azimuth, seconds, cycle):
     # Turns of up to 70 deg/s, speeds of 200 to 460 m/s, climbs of 1 km; the vertical channel is not held, and
-    # multiplies what it is off by 5 in a quarter of an hour. What the prediction leaves out is of third order in the cycle:
-    # a hundredth of the largest error at 10 Hz, twice that at 5 Hz.
+    # multiplies what it is off by 5 in a quarter of an hour. What the prediction leaves out is of third order in the
+    # cycle: a hundredth of the largest error at 10 Hz, twice that at 5 Hz.
     errors, predicted = hour_of(Flight(5), seconds, cycle, azimuth)
     largest = np.abs(predicted).max(axis=0)
     assert np.all(np.abs(errors - predicted).max(axis=0) < 0.1 * cycle * largest)
