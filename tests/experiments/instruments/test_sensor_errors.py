@@ -120,8 +120,10 @@ CAUSES = {
 @pytest.mark.long
 @pytest.mark.parametrize("name", CAUSES)
 def test_every_prediction_is_met_by_a_monte_carlo(name):
+    # Of a thousand samples one is lost: enough of them are in twice the steps.
+    steps = 720 if name == "zero" else 360
     study = SensorStudy(
-        strapgen.backend("euler", method="rk4", increments=2), path_of(CONING, 720, 6), CAUSES[name]
+        strapgen.backend("euler", method="rk4", increments=2), path_of(CONING, steps, 6), CAUSES[name]
     )
     (row,) = study.rows(1200)
     measured, predicted = row.deviation[1:], row.predicted[1:]
