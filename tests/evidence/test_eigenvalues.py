@@ -61,3 +61,13 @@ def test_numbers_above_eigenvalues_are_above_them():
     matrix = flint.fmpq_mat([[0, 3], [3, 0]])
     assert 3 < eigenvalues._above(matrix) < 3 + 1e-6
     assert eigenvalues._above(flint.fmpq_mat(3, 3)) > 0
+
+
+def test_what_is_curved_in_a_box_counts():
+    """About the middle of the box, x^2 is 1/4 + (2 u + u^2)/4 for u from -1 to 1: the last term is a quarter."""
+    x = PLANE.gens()[0]
+    zero, box = PLANE.constant(0), ((Fraction(0), Fraction(1)),) * 3
+    for matrix in ([[x**2]], [[zero, x**2], [x**2, zero]]):
+        middle, above = eigenvalues._eigenvalues(matrix, box)
+        assert middle == pytest.approx(1 / 4)
+        assert 1 <= above < 1 + 1e-6
