@@ -298,8 +298,8 @@ LONG_COMMANDS = (
     "strapgen two-speed euler ",
     "strapgen vibration ",
 )
-#: Parts of commands that ask for much of the same, and what they run with: fewer methods, samples of a method, words,
-#: methods that no other command has, or workers; one tool, since `make evidence` runs them all.
+#: Parts of commands that ask for much of the same, and what they run with: fewer methods, samples, words, algorithms or
+#: workers, a shorter run; one tool, since `make evidence` runs them all.
 LESS = {
     "--method coning-compressed,magnus4,rk4,taylor2": "--method coning-compressed:2,magnus4:2,rk4:2,taylor2",
     "guidance.toml --method coning-combined,rk4": "guidance.toml --method coning-combined:3,rk4:2",
@@ -312,6 +312,7 @@ LESS = {
     "strapgen evidence euler --method rk4": "strapgen evidence euler --method rk4 --tool z3",
     "--beside rk4,magnus4,coning-compressed": "--beside rk4:2,magnus4:2,coning-compressed:2",
     "--beside rk4,magnus4 --out": "--beside rk4:2,magnus4:2 --out",
+    "--algorithm euler,two-speed --carry full": "--algorithm two-speed --carry full",
     "own_rate.py --step 0.125 --duration 10": "own_rate.py --step 0.125 --duration 1",
 }
 #: Pages whose commands need a file that the page shows, and commands that other tests run: tests/cli the second.
