@@ -50,9 +50,9 @@ CAYLEY_KLEIN = ("numpy", "c")
 #: Where all tests run in Octave too, which takes a program a thousand times as long as C: what holds of the behaviour
 #: there, and of the bits of all kernels in tests/targets/test_matlab.py, says the rest.
 IN_OCTAVE = Path(__file__).parent / "backends"
-#: Where no test runs in C++ and Rust: tests/targets holds every kernel there to the bits and the integers of the C, on
-#: which these tests run, and the back ends themselves behave as tests/backends says.
-NOT_IN_OTHER_LANGUAGES = Path(__file__).parent / "catalogue"
+#: Where no test runs in C++ and Rust, folders and files: tests/targets holds every kernel there to the bits and the
+#: integers of the C, on which these tests run, and the back ends themselves behave as tests/backends says.
+NOT_IN_OTHER_LANGUAGES = ("catalogue", "experiments", "simulation", "test_claims.py", "test_constant_rate.py")
 
 #: Objects made since the last search for garbage at which a session searches again, by generation: each search goes
 #: through what the tests before have derived.
@@ -148,7 +148,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         elsewhere = (
             IN_OCTAVE not in item.path.parents
             if program is octave.command
-            else program is not None and NOT_IN_OTHER_LANGUAGES in item.path.parents
+            else program is not None and not {*NOT_IN_OTHER_LANGUAGES}.isdisjoint(item.path.parts)
         )
         if elsewhere or (
             values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN
