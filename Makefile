@@ -16,7 +16,7 @@ help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
 	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
-	@echo "make test-modules  list anew which kernels the tests compile"
+	@echo "make test-modules  list anew which compiled kernels the tests load"
 	@echo "make mutants   put 378 written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
 	@echo "make check     generated code in step, ruff, mypy, spelling and prose"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
@@ -101,7 +101,7 @@ test: $(TOOLS)
 test-long: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
-# With an empty cache, so that every module is built and noted.
+# What is listed already is compiled together; what the tests load is listed.
 test-modules: $(TOOLS)
 	for which in "not long" long; do \
 	  folder=$$(mktemp -d) && STRAPGEN_CACHE_DIR=$$folder/cache $(BIN)/python -m pytest -n auto --dist worksteal \

@@ -76,7 +76,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--record-modules",
         metavar="FILE",
         type=Path,
-        help="append a line to FILE for every kernel that tests compile, and compile each when it is needed",
+        help="append a line to FILE for every compiled kernel that tests load",
     )
     parser.addoption(
         "--site",
@@ -210,7 +210,7 @@ def compiled(optimization: None, request: pytest.FixtureRequest) -> Iterator[Non
         file = request.config.getoption("record_modules")
         if file is not None:
             stack.enter_context(session_library.recorded(file.absolute()))
-        elif len(request.session.items) >= session_library.FEWEST_TESTS:
+        if len(request.session.items) >= session_library.FEWEST_TESTS:
             which = request.config.getoption("markexpr")
             session_library.provide(
                 session_library.FORECASTS.get(which, session_library.FORECASTS["not long"])

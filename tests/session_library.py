@@ -208,16 +208,15 @@ def provide(forecast: Path) -> None:
 
 @contextmanager
 def recorded(path: Path) -> Iterator[None]:
-    """Append a line for all that is built in the session's cache to a file."""
-    build, root = compiler._build, cache.root()
+    """Append a line to a file for all compiled code that tests load from the session's cache."""
+    load, root = compiler._compiled, cache.root()
 
-    def noted(many: list[Sources], name: str, key: str) -> Path:
-        if cache.root() == root and cache.lookup("builds", key) is None:
-            for text in filter(None, map(line, many)):
-                with path.open("a") as file:
-                    file.write(text + "\n")
-        return build(many, name, key)
+    def noted(sources: Sources) -> Any:
+        if cache.root() == root and (text := line(sources)) is not None:
+            with path.open("a") as file:
+                file.write(text + "\n")
+        return load(sources)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiler, "_build", noted)
+        patch.setattr(compiler, "_compiled", noted)
         yield
