@@ -54,9 +54,9 @@ IN_OCTAVE = Path(__file__).parent / "backends"
 #: integers of the C, on which these tests run, and the back ends themselves behave as tests/backends says.
 NOT_IN_OTHER_LANGUAGES = ("catalogue", "experiments", "simulation", "test_claims.py", "test_constant_rate.py")
 
-#: Objects made since the last search for garbage at which a session searches again, by generation: each search goes
-#: through what the tests before have derived.
-GARBAGE = (1_000_000, 10, 10)
+#: Objects made since the last search for garbage at which a session searches again, by generation. A search takes a
+#: second for a million objects, most of which stay; the processes of a session share what its tests make.
+GARBAGE = (6_000_000, 10, 10)
 
 
 def pytest_configure(config: pytest.Config) -> None:
