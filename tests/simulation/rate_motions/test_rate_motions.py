@@ -17,7 +17,7 @@ from strapgen.analysis.series import series
 from strapgen.backends.exact import interpreter
 from strapgen.cli import main
 from strapgen.simulation.rate_motions.expressions import operations_of, time_symbol
-from strapgen.simulation.rate_motions.integration import DIGITS, Integrated
+from strapgen.simulation.rate_motions.integration import DIGITS, RATE_DEGREE, Integrated
 from strapgen.simulation.rate_motions.jets import Jets, UnboundedError
 from strapgen.simulation.users_motions import read_motion
 from strapgen.support.exceptions import InputError
@@ -78,6 +78,18 @@ def test_increments_have_forty_digits_and_the_attitude_is_within_its_bound():
             true = truth([time], *values)
             computed = [x for row in piece.attitude_at(time) for x in row]
             assert max(abs(x - y) for x, y in zip(computed, true, strict=True)) <= piece.error < 1e-22
+
+
+def test_what_the_polynomial_of_a_rate_leaves_out_is_within_the_bound():
+    """A power of the time leaves out one term, which is known: of a longer piece it would be above the tolerance."""
+    power = RATE_DEGREE + 1
+    integrated = Integrated("power", *operations_of("power", [2**60 * T**power, sp.Integer(0), sp.Integer(0)]))
+    with mp.workdps(DIGITS):
+        piece = integrated.piece(mp.mpf(0))
+        true = mp.mpf(2) ** 60 * piece.middle ** (power + 1) / (power + 1)
+        assert abs(piece.angle_at(piece.middle)[0] - true) <= piece.angle_error < 1e-39
+        longer = mp.mpf(2) ** 60 * (2 * piece.half) ** (power + 1) / (power + 1)
+        assert longer > piece.angle_error
 
 
 def test_time_runs_backwards_too():
