@@ -83,7 +83,9 @@ def test_increments_have_forty_digits_and_the_attitude_is_within_its_bound():
 def test_what_the_polynomial_of_a_rate_leaves_out_is_within_the_bound():
     """A power of the time leaves out one term, which is known: of a longer piece it would be above the tolerance."""
     power = RATE_DEGREE + 1
-    integrated = Integrated("power", *operations_of("power", [2**60 * T**power, sp.Integer(0), sp.Integer(0)]))
+    integrated = Integrated(
+        "power", *operations_of("power", [2**60 * T**power, sp.Integer(0), sp.Integer(0)])
+    )
     with mp.workdps(DIGITS):
         piece = integrated.piece(mp.mpf(0))
         true = mp.mpf(2) ** 60 * piece.middle ** (power + 1) / (power + 1)
