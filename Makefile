@@ -17,7 +17,7 @@ help:
 	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
 	@echo "make test-modules  list anew which compiled kernels the tests load"
-	@echo "make mutants   put the written faults and 240 drawn ones into copies of the code; up to an hour, goes on where it stopped"
+	@echo "make mutants   put the written faults and 240 drawn ones into copies of the code; half an hour a run, which goes on where the last one stopped"
 	@echo "make check     generated code in step, ruff, mypy, spelling and prose"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
 	@echo "make generate  rebuild generated/"

@@ -579,7 +579,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=SEED, help=f"of the random lists; {SEED} by default")
     parser.add_argument("--only", default="", help="faults alone whose text contains this")
     parser.add_argument("--tests", nargs="*", default=[], help="these tests alone; all by default")
-    parser.add_argument("--minutes", type=float, default=60.0, help="stop after so long; a later run goes on")
+    parser.add_argument("--minutes", type=float, default=30.0, help="stop after so long; a later run goes on")
     parser.add_argument("--workers", type=int, default=2, help="how many run at once")
     parser.add_argument("--restart", action="store_true", help="forget the outcomes of earlier runs")
     parser.add_argument("--list", action="store_true", help="print the faults and run nothing")
