@@ -25,6 +25,16 @@ def test_a_cone_meets_its_closed_form_at_any_time():
     np.testing.assert_array_equal(reference(times.reshape(2, 4))[1, 2], reference(7.0))
 
 
+def test_no_bit_depends_on_what_was_asked_for_before():
+    """Runs of several lengths share an attitude, in one process or in many."""
+    profile = rate_profiles.random_rate(math.radians(60))
+    once, in_steps = (ReferenceAttitude(profile.rate, profile.substeps) for _ in range(2))
+    times = np.linspace(0, 3, 31)
+    for time in times[::7]:
+        in_steps(time)
+    np.testing.assert_array_equal(once(times), in_steps(times))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "profile",

@@ -88,11 +88,10 @@ class ReferenceAttitude:
         return states
 
     def _extend(self, last: int) -> None:
-        """Store the states up to a knot."""
+        """Store the states up to a knot, in whole parts: no bit depends on what was asked for before."""
         parts = [self._states]
         for first in range(len(self._states) - 1, last, _PART):
-            count = min(_PART, last - first)
-            starts = (first + np.arange(count * self._substeps) / self._substeps) * KNOT
+            starts = (first + np.arange(_PART * self._substeps) / self._substeps) * KNOT
             turns = self._turns(starts, np.full(starts.shape, KNOT / self._substeps))
             states = _magnus().propagate(turns, self._substeps, initial=parts[-1][-1])[1:]
             # The length of a product of rotations is 1 but for rounding.
