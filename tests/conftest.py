@@ -128,7 +128,7 @@ def _is_of_cayley_klein(value: object) -> bool:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let combinations and Cayley-Klein parameters run with the long tests.
+    """Let combinations, Cayley-Klein parameters and what opens a browser run with the long tests.
 
     Every value of every parameter is in a quick test, and in two combinations that are long. Cayley-Klein
     parameters do not run on back ends that show nothing new of them: their kernels and programs are those of Euler
@@ -143,7 +143,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         ):  # the code of C in another language: tests of the targets hold the bits to those of C
             item.add_marker(pytest.mark.long)
             item.add_marker(pytest.mark.skipif(bool(missing := _missing(program)), reason=missing))
-        if any(map(_is_of_cayley_klein, values.values())):
+        if any(map(_is_of_cayley_klein, values.values())) or "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.long)
         elsewhere = (
             IN_OCTAVE not in item.path.parents
