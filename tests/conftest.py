@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import cache
@@ -62,6 +63,7 @@ GARBAGE = (6_000_000, 10, 10)
 def pytest_configure(config: pytest.Config) -> None:
     """Let properties that say no number of examples of their own take a quarter of them, except in the long tests."""
     processes._GARBAGE = GARBAGE  # for commands that run in process too
+    config.addinivalue_line("markers", "needs(*programs): skipped where one of the programs is missing")
     config.addinivalue_line(
         "markers", "every_combination: the long tests run every combination of its parameters"
     )
@@ -145,6 +147,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skipif(bool(missing := _missing(program)), reason=missing))
         if any(map(_is_of_cayley_klein, values.values())) or "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.long)
+        for mark in item.iter_markers("needs"):
+            absent = [program for program in mark.args if shutil.which(program) is None]
+            item.add_marker(
+                pytest.mark.skipif(bool(absent), reason=f"no {', '.join(absent)} on this machine")
+            )
         elsewhere = (
             IN_OCTAVE not in item.path.parents
             if program is octave.command

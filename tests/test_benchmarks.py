@@ -10,7 +10,7 @@ import pytest
 
 import strapgen
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.needs("g++")]
 
 #: Of the four cases two, which have both algorithms, both kinds of samples, and their titles.
 CASES = {

@@ -315,6 +315,12 @@ LESS = {
     "--algorithm euler,two-speed --carry full": "--algorithm two-speed --carry full",
     "own_rate.py --step 0.125 --duration 10": "own_rate.py --step 0.125 --duration 1",
 }
+#: What commands run beside Python and gcc, by a pattern of the command.
+PROGRAMS = {
+    r"--backend \S*cpp": "c++",
+    r"--backend \S*rust": "rustc",
+    r"cost .*--cpu cortex": "arm-none-eabi-gcc",
+}
 #: Pages whose commands need a file that the page shows, and commands that other tests run: tests/cli the second.
 OWN_FILES = ("own-algorithms",)
 TABLES = "strapgen tables"
@@ -350,8 +356,10 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 )
 def test_a_command_of_a_page(command, workplace, capsys, monkeypatch):
     compiler = re.search(r"--cross (\S+)", command)
-    if compiler is not None and shutil.which(compiler[1]) is None:
-        pytest.skip(f"{compiler[1]} is not on this machine")
+    needed = [program for pattern, program in PROGRAMS.items() if re.search(pattern, command)]
+    for program in [compiler[1], *needed] if compiler else needed:
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not on this machine")
     if "octave" in command and (reason := octave.missing()):
         pytest.skip(reason)
     if command.startswith("strapgen generate --all"):  # of all, in tests/targets

@@ -27,6 +27,7 @@ def increments(rng):
 
 
 @pytest.mark.long
+@pytest.mark.needs("c++", "rustc", "octave")
 @pytest.mark.parametrize(
     "reference", ["exact", *(pytest.param(r, marks=pytest.mark.long) for r in ("numpy", "c-float"))]
 )

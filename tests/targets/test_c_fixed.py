@@ -250,6 +250,7 @@ def test_loops_refuse_bad_arguments():
 
 
 @pytest.mark.long
+@pytest.mark.needs("c++")
 @pytest.mark.parametrize(
     ("word", "methods"),
     [(16, ALL), (32, ALL), (64, ("rk4", None))],

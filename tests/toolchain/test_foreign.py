@@ -172,6 +172,7 @@ def test_the_function_of_init_gets_what_it_takes(tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.needs("g++")
 def test_an_adapter_calls_a_class_and_the_compiler_takes_options(tmp_path, monkeypatch):
     (tmp_path / "include").mkdir()
     (tmp_path / "include" / "vector.hpp").write_text("struct Vector { double x, y, z; };\n")

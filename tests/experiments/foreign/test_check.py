@@ -231,6 +231,7 @@ def test_direction_cosines_from_reference_to_body_hold_and_the_wrong_sense_is_na
     )
 
 
+@pytest.mark.needs("g++")
 def test_a_filter_in_cpp_that_holds_its_attitude_and_takes_rates(outcome):
     checked = outcome(
         *(FILTER, "nav::Filter &filter, rates[3], dt -> filter.attitude.q[4]"),
