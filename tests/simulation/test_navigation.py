@@ -93,7 +93,6 @@ def test_both_modes_pass_the_pole(azimuth):
     assert turned < 1.1 * RATE * cycle
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("inclination", GREAT_CIRCLES)
 @pytest.mark.parametrize("azimuth", ["wander", "free"])
 def test_the_equations_hold_to_the_last_digit(azimuth, inclination):
