@@ -155,7 +155,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         elsewhere = (
             IN_OCTAVE not in item.path.parents
             if program is octave.command
-            else program is not None and not {*NOT_IN_OTHER_LANGUAGES}.isdisjoint(item.path.parts)
+            else program is not None
+            and not {*NOT_IN_OTHER_LANGUAGES}.isdisjoint(item.path.relative_to(config.rootpath).parts)
         )
         if elsewhere or (
             values.get("algorithm") == "cayley-klein" and values.get("backend_name", "c") not in CAYLEY_KLEIN
