@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
+import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -11,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import browser_checks
-import built_site
 import hypothesis
 import numpy as np
 import pytest
@@ -63,6 +64,10 @@ GARBAGE = (6_000_000, 10, 10)
 def pytest_configure(config: pytest.Config) -> None:
     """Let properties that say no number of examples of their own take a quarter of them, except in the long tests."""
     processes._GARBAGE = GARBAGE  # for commands that run in process too
+    if hasattr(config, "workerinput"):  # no status depends on these processes
+        # Before anything that tests leave to the end, and so called after it: the system frees at once what a process
+        # has derived, Python one object after another, for seconds.
+        atexit.register(os._exit, 0)
     config.addinivalue_line("markers", "needs(*programs): skipped where one of the programs is missing")
     config.addinivalue_line(
         "markers", "every_combination: the long tests run every combination of its parameters"
@@ -84,7 +89,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--site",
         metavar="FOLDER",
         type=Path,
-        help="test the pages of a site that was built before, and every one of them",
+        help="test the pages of a site that was built before",
     )
     parser.addoption(
         "--all-combinations",
@@ -283,6 +288,10 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="session")
-def site(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the documentation as a site, for the checks of its pages."""
-    return built_site.folder(tmp_path_factory, pytestconfig.getoption("site"))
+def site(pytestconfig: pytest.Config) -> Path:
+    """The folder of the documentation as a site that was built before, for the checks of its pages."""
+    folder = pytestconfig.getoption("site")
+    if folder is None:
+        pytest.skip("make docs-check builds the site and opens its pages")
+    assert (folder / "index.html").is_file(), f"{folder} holds no site; make docs builds one"
+    return folder.resolve()

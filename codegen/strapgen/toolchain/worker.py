@@ -9,16 +9,20 @@ process, and they are imported once.
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
 import sys
 import tempfile
 import traceback
+from functools import cache
 from typing import Any
 
 
 def main() -> None:
     """Answer the requests on standard input until it ends."""
+    # setuptools looks through all installed packages whenever it compiles; they stay the same while this process runs
+    importlib.metadata.entry_points = cache(importlib.metadata.entry_points)  # type: ignore[assignment]
     answers = os.fdopen(os.dup(1), "w")
     for line in sys.stdin:
         request = json.loads(line)
