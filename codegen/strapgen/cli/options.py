@@ -26,7 +26,15 @@ def option(*names: str, metavar: str | None = None, help: str, panel: str | None
 
     A default that the parameter has is shown if it is no None; one that the command finds stands in the help.
     """
-    return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel)
+    check = _require_folder if metavar == "FOLDER" else None
+    return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel, callback=check)
+
+
+def _require_folder(parameter: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Refuse the terminal where a folder is needed; elsewhere - stands for it."""
+    if value == Path("-"):
+        raise InputError(f"{parameter.opts[0]} - is no folder; files are not written to the terminal")
+    return value
 
 
 def _argument(help: str) -> Any:
