@@ -350,6 +350,29 @@ def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
     assert part[0].tobytes() == whole[0, : steps + 1].tobytes()
 
 
+@each("target", TARGETS)
+@each("step", STEPS)
+def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(step, target):
+    sources = generated(step, target)
+    header, source = (
+        next(text for name, text in sources.files.items() if name.endswith(f"_runs{end}"))
+        for end in (".h", ".c")
+    )
+    size, number_bytes = len(sources.companions.identity), np.dtype(DTYPES[target]).itemsize
+
+    def number(pattern: str) -> int:
+        (text,) = set(re.findall(pattern, source))
+        return int(text)
+
+    prefix = sources.function.name.upper()
+    abreast, lanes = (number(rf"enum {{ {prefix}_{name} = (\d+) }};") for name in ("ABREAST", "WIDE_LANES"))
+    # The states of runs that go side by side fill whole vectors of 64 bytes, the longest of x86-64.
+    assert abreast * number_bytes == 64
+    states = size * abreast * number_bytes
+    prepared = 2 * number(r"_wide_prepared_ prepared\[2\]\[(\d+)\];") * lanes * number_bytes
+    assert int(re.search(r"Uses about (\d+) bytes of stack", header)[1]) == max(states, prepared)
+
+
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("target", TARGETS)
 def test_gcc_takes_several_runs_at_once(step, target, folder, objects):
