@@ -98,7 +98,7 @@ def test_both_loops_have_equations_75_and_79_and_the_term_in_the_slow_cycle():
 
 
 def test_a_step_of_first_order_from_rates_has_a_cotangent():
-    """A step turns by the rate at its start times T, and adds half the cross product of the sum of all before it and this.
+    """Steps turn by the rate at their start times T; half the cross product of all before with each of them adds up.
 
     The sum of z^k over k < l, with z = exp(j A), swings as z^l/(z - 1), and 1/(z - 1) is -(1 + j cot(A/2))/2.
     """
