@@ -143,7 +143,7 @@ def test_resampling_in_parts_has_the_bits_of_all_at_once(hz, tmp_path, request):
 
 
 def test_points_of_the_grid_on_last_rows_of_parts_have_the_bits_of_all_at_once(rng, tmp_path, monkeypatch):
-    """The sum of whole intervals rounds otherwise than a piece up to a row: the part that begins there has its point."""
+    """The sum of whole intervals rounds otherwise than a piece up to a row: the part that begins there has it."""
     path = tmp_path / "gyro.csv"
     rates = rng.normal(size=(200, 3)).tolist()
     path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
