@@ -59,7 +59,7 @@ def test_parameters_of_the_least_length_turn_by_twice_the_angle_of_an_error_acro
 
 
 def test_a_change_across_the_least_stretch_turns_a_matrix_by_the_bound_but_for_its_unevenness():
-    """A skew change turns a matrix by its length over the root of 2; where a matrix is uneven, others turn it further."""
+    """A skew change turns a matrix by its length over the root of 2; where it is uneven, others turn it further."""
     change = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 0]]) * 1e-3
     left, _, right = np.linalg.svd(np.diag([SHORTEST, SHORTEST, 1]) + change)
     rotation = left @ right
