@@ -126,7 +126,6 @@ def test_drift_over_hours_is_the_secular_rate(algorithm, method, simulated):
     assert np.abs(made.drift - wanted).max() < 0.01 * np.abs(wanted).max()
 
 
-@pytest.mark.long
 def test_first_order_on_coning_needs_products_of_errors():
     """Its secular drift comes with h^2 while errors are of order h: the eigenvalue has them, to all orders.
 

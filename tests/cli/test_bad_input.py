@@ -298,6 +298,7 @@ BAD = {
     "generate euler --previous 1.5": "previous is '1.5'; a whole number is needed",
     "derive euler --rates --previous 2": "a step takes increments or rates, not both (got 2 previous ones and rates)",
     "derive euler-product --previous 1": "kernel euler-product takes no previous (got 1)",
+    "derive euler-product --ahead 1": "kernel euler-product takes no ahead (got 1)",
     f"simulate euler --previous 33 {CONSTANT}": "previous is 33; a whole number from 0 to 32 is needed",
     f"compare euler --previous x {CONSTANT}": "previous is 'x'; a whole number is needed",
     "generate --all --previous 1": "--previous does not go with it",

@@ -10,7 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from strapgen.catalogue import choose
 from strapgen.cli import main
+from strapgen.experiments.verification import _Exact
+from strapgen.ir.fixed_settings import Settings
+from strapgen.library.generation import Request
 from strapgen.support.version import VERSION
 
 NAME = "euler_rk4_2_w32"
@@ -50,6 +54,19 @@ def test_a_file_as_generated_holds(ending, folder, capsys):
     status, data = verified(folder / f"{NAME}.{ending}", capsys)
     assert status == 0 and data["holds"] and data["in_step"] and data["differences"] == []
     assert 0.5 <= data["max_ulp"] <= data["bound_ulp"] < 0.6
+
+
+def test_the_error_of_a_state_that_saturates_is_that_from_the_end_of_its_range():
+    """The scalar of a product is 0.64, 1.28 and -1.28 from elements near 0.8: inside, and beyond either end."""
+    request = Request(choose("euler-product"), "c-fixed", Settings(state="q15", word=16))
+    exact = _Exact(request, request.sources().fixed)
+    end, w = 1 << 15, 26215
+    inside = exact.error([(0, 0, 0, w), (0, 0, 0, w)], [(0, 0, 0, 20972)])
+    assert inside == pytest.approx(w * w / end - 20972, rel=1e-12)
+    assert exact.error([(w, 0, 0, w), (-w, 0, 0, w)], [(0, 0, 0, end - 1)]) == 1, (
+        "the largest word is a unit below"
+    )
+    assert exact.error([(w, 0, 0, w), (w, 0, 0, -w)], [(0, 0, 0, -end)]) == 0
 
 
 @pytest.mark.parametrize("target", ["c-fixed", pytest.param("c", marks=pytest.mark.long)])

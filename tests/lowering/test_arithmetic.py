@@ -134,6 +134,13 @@ def test_nested_products_take_no_more_multiplications_than_expanded_ones(p):
         ({("x", "x", "y"): 1, ("x", "y", "y"): 1}, 3),  # x (y (x + y))
         ({("x", "x"): 5}, 2),
         ({("x", "y"): 2, ("x", "z"): 2}, 3),  # x (2 (y + z))
+        # As few as of all terms together with their additions, not of the terms alone, nor the fewest terms.
+        ({("x",): 1, ("z", "z"): 1, ("y", "y", "z"): 1, ("y",): 1}, 5),  # z (z + y y) + x + y
+        ({("z",): 2, ("w", "x"): 1, ("x", "y"): 1, ("y",): 2}, 5),  # x (w + y) + 2 (z + y)
+        (
+            {("x", "z", "z"): 1, ("y", "y", "y"): 1, ("x",): 1, ("y", "z", "z"): 2},
+            8,
+        ),  # z z (x + 2 y) + y y y + x
     ],
 )
 def test_operations_of_a_horner_scheme(p, operations):

@@ -140,3 +140,14 @@ def test_resampling_in_parts_has_the_bits_of_all_at_once(hz, tmp_path, request):
     at_once = recording.read_rates(path, "rad/s", hz).increments
     request.getfixturevalue("on_disk")
     np.testing.assert_array_equal(recording.read_rates(path, "rad/s", hz).increments, at_once)
+
+
+def test_points_of_the_grid_on_last_rows_of_parts_have_the_bits_of_all_at_once(rng, tmp_path, monkeypatch):
+    """The sum of whole intervals rounds otherwise than a piece up to a row: the part that begins there has it."""
+    path = tmp_path / "gyro.csv"
+    rates = rng.normal(size=(200, 3)).tolist()
+    path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
+    at_once = recording.read_rates(path, "rad/s", 64).increments
+    for module in (recorded_columns, recording):
+        monkeypatch.setattr(module, "PART", 4)
+    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).increments, at_once)

@@ -23,7 +23,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from pycparser import c_ast, c_parser
 
-from strapgen.catalogue import standard
+from strapgen.catalogue import choose, standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
@@ -43,6 +43,8 @@ OPTIMIZED = "optimized.txt"
 DTYPES = {"c": np.float64, "c-float": np.float32}
 CHOICES = {choice.kernel: choice for choice in standard()}
 STEPS = ["dcm-rk1-2", "dcm-rk4-2", "euler-rk4-2"]
+#: A step of a user whose transition is larger than its state.
+RODRIGUES = str(Path(__file__).resolve().parents[2] / "examples" / "modified_rodrigues.py")
 #: By their names; those whose code differs in more than coefficients.
 KERNELS = [kernel for kernel, choice in CHOICES.items() if tells_more(choice) or kernel in STEPS]
 
@@ -348,6 +350,37 @@ def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
     status, part = propagate(propagate.increments[0], 1, 7, steps=steps, function=propagate.normalize)
     assert status == 0
     assert part[0].tobytes() == whole[0, : steps + 1].tobytes()
+
+
+@each("target", TARGETS)
+@each("step", [*STEPS, RODRIGUES])
+def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(step, target):
+    of_catalogue = step != RODRIGUES
+    sources = (
+        generated(step, target) if of_catalogue else generated_sources.sources(choose(step, "rk1", 1), target)
+    )
+    header, source = (
+        next(text for name, text in sources.files.items() if name.endswith(f"_runs{end}"))
+        for end in (".h", ".c")
+    )
+    size, number_bytes = len(sources.companions.identity), np.dtype(DTYPES[target]).itemsize
+
+    def number(pattern: str) -> int:
+        (text,) = set(re.findall(pattern, source))
+        return int(text)
+
+    prefix = sources.function.name.upper()
+    abreast, lanes, fetched = (
+        number(rf"enum {{ {prefix}_{name} = (\d+) }};") for name in ("ABREAST", "WIDE_LANES", "FETCHED")
+    )
+    # The states of runs that go side by side fill whole vectors of 64 bytes, the longest of x86-64.
+    assert abreast * number_bytes == 64
+    states = size * abreast * number_bytes
+    prepared = 2 * number(r"_wide_prepared_ prepared\[2\]\[(\d+)\];") * lanes * number_bytes
+    assert int(re.search(r"Uses about (\d+) bytes of stack", header)[1]) == max(states, prepared)
+    # Memory is fetched as far ahead as whole steps of samples lie within 512 bytes.
+    step_bytes = sources.function.inputs[-1].size * number_bytes
+    assert 0 <= 512 - fetched * step_bytes < step_bytes
 
 
 @pytest.mark.parametrize("step", STEPS)

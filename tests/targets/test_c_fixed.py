@@ -19,6 +19,7 @@ from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
+from strapgen.targets.c_fixed.statements import _noted
 from strapgen.toolchain import compiler
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
@@ -272,6 +273,17 @@ def test_strict_compilers_are_silent(word, methods, tmp_path):
     for command in commands:
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         assert not done.returncode, done.stderr
+
+
+def test_a_note_stands_behind_a_statement_as_long_as_the_line_has_room():
+    """A function indents by 4, so that 95 of its own are 99 of the file."""
+    statement, end = "x = y;", " /* note */"
+    for width in (95, 96):
+        padded = statement.rjust(width - len(end))
+        assert _noted(padded, "note") == padded + (end if width == 95 else f"\n       {end}")
+    assert _noted(f"{'x' * 95}\n{statement}", "note") == f"{'x' * 95}\n{statement}{end}", (
+        "the last line counts"
+    )
 
 
 def test_the_source_is_integers_alone():

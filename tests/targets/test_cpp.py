@@ -15,6 +15,8 @@ from strapgen.cli import main
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import CompilerError
 from strapgen.targets.contract_lines import Contract
+from strapgen.targets.cpp.text import constants
+from strapgen.targets.definitions import Macro
 from strapgen.toolchain.shared_libraries import COMPILERS
 
 STRICT = (
@@ -72,6 +74,21 @@ def test_a_step_is_a_constant_expression(cxx, tmp_path, right):
     )
     assert (said.returncode == 0) == right, said.stderr
     assert right or "static assertion failed" in said.stderr
+
+
+def test_a_constant_stands_in_one_line_with_its_comment_or_below_it_up_to_the_width():
+    def lines(value: str, meaning: str) -> list[str]:
+        (text,) = constants([Macro("ONE", value, meaning, "int")])
+        return text.split("\n")
+
+    begin, comment = "inline constexpr int one = ", "/* one */"
+    for width in (99, 100):
+        value = "1" * (width - len(f"{begin}; {comment}"))
+        line = f"{begin}{value};"
+        assert lines(value, "one") == ([f"{line} {comment}"] if width == 99 else [comment, line])
+        value = "1" * (width - len(f"{begin};"))
+        broken = [f"{begin.rstrip()}", f"    {value};"] if width == 100 else [f"{begin}{value};"]
+        assert lines(value, "one") == [comment, *broken]
 
 
 def test_what_calls_the_library_is_no_constant_expression():

@@ -97,6 +97,16 @@ def test_both_loops_have_equations_75_and_79_and_the_term_in_the_slow_cycle():
         vibration.two_speed("bias")
 
 
+def test_a_step_of_first_order_from_rates_has_a_cotangent():
+    """Steps turn by the rate at their start times T; half the cross product of all before with each of them adds up.
+
+    The sum of z^k over k < l, with z = exp(j A), swings as z^l/(z - 1), and 1/(z - 1) is -(1 + j cot(A/2))/2.
+    """
+    angle = 2 * sp.pi * F * T
+    computed = vibration.of(choose("euler", "rk1", rates=True)).expression("computed")
+    assert same(computed * sp.sin(angle / 2), CONING * angle / 2 * sp.cos(angle / 2))
+
+
 # Other derivations of the same
 
 

@@ -65,6 +65,11 @@ class Finding:
 
     __repr__ = short_repr
 
+    @classmethod
+    def within(cls, name: str, text: str, measured: float, allowed: float) -> Finding:
+        """Return the finding on a figure that may be as large as another."""
+        return cls(name, measured <= allowed, text, measured, allowed)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the finding as plain JSON data."""
         return asdict(self)
@@ -287,7 +292,7 @@ def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
         states = backend.propagate(increments)
         off, allowed = angle(states, backend), _UNITS_A_STEP * _STEPS * backend.unit
         text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
-        yield Finding(f"back end {name}", off <= allowed, text, off, allowed)
+        yield Finding.within(f"back end {name}", text, off, allowed)
         yield _loop(backend, increments, states)
     yield _fixed(choice, settings, increments, exact_states, angle)
 
@@ -311,7 +316,7 @@ def _loop(backend: Backend, increments: NDArray[np.float64], states: Any) -> Fin
         off = max(off, float(np.abs(state - looped).max()))
     allowed = _UNITS_A_STEP * 20 * backend.unit if backend.name == "numpy" else 0.0
     text = f"20 steps at once and one by one differ by {off:.3g}"
-    return Finding(f"loop {backend.name}", off <= allowed, text, off, allowed)
+    return Finding.within(f"loop {backend.name}", text, off, allowed)
 
 
 def _fixed(
@@ -333,7 +338,7 @@ def _fixed(
     if allowed is None:
         return Finding(name, None, f"{_STEPS} steps: {off:.3g} rad, without a certified bound", off)
     text = f"{_STEPS} steps: {off:.3g} rad from exact arithmetic"
-    return Finding(name, off <= allowed, text, off, allowed)
+    return Finding.within(name, text, off, allowed)
 
 
 def _restoring(choice: Choice, step: _Precise) -> Finding:
@@ -353,4 +358,4 @@ def _restoring(choice: Choice, step: _Precise) -> Finding:
     before, after = defect(state), defect(backend.orthonormalize(state))
     allowed = 2 * before**2 + _UNITS_A_STEP * backend.unit
     text = f"C C' departs from the unit matrix by {before:.3g} before, {after:.3g} after"
-    return Finding(name, after <= allowed, text, after, allowed)
+    return Finding.within(name, text, after, allowed)

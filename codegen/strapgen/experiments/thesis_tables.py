@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-
 from strapgen.backends import BACKENDS, Backend, backend, sources_to_build
 from strapgen.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.catalogue import choose_step
@@ -153,7 +151,7 @@ def entries(
             value,
             normalised,
             printed,
-            bool(np.isfinite(value)) and agrees(normalised, printed),
+            agrees(normalised, printed),
             note,
             abs(value - double) > abs(double) / 2,
             None if (repair := table.repair(algorithm, order)) is None else repair.scan,

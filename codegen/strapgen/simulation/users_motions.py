@@ -357,7 +357,8 @@ class _Integral:
     def _integrated(self, edges: Array, pieces: int) -> tuple[Array, Array, Array]:
         """Return the rotation, the sum of the increments and the integral of the rate of every interval."""
         row = self._row(edges, pieces)
-        rotations = self._step.matrices(self._step.propagate(row, pieces)[:, -1])
+        states = self._step.propagate(row, pieces)  # at the start of each interval and at its end
+        rotations = self._step.matrices(states[:, 1])
         angle = row.sum(axis=(1, 2))
         return rotations, angle, self._integral(edges, pieces) if self._has_rate else angle
 

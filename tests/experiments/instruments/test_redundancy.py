@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from strapgen.cli import main
+from strapgen.experiments.instruments.redundancy import SensorErrors
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "hexad.toml"
 
@@ -19,6 +22,23 @@ def run(command: str, capsys: pytest.CaptureFixture[str], status: int = 0) -> st
     said = capsys.readouterr()
     assert stop.value.code == status, said.err
     return said.err if status else said.out
+
+
+def test_trip_levels_are_multiples_of_the_steady_errors_and_of_those_that_grow_with_the_turn():
+    """In arc seconds 3 of noise, 4 of counts and 12 of bias make 13; scale and bending act on a turn of 0.05 rad."""
+    errors = SensorErrors(
+        cycle_s=1,
+        noise_arcsec=3,
+        pulse_arcsec=4 * 6**0.5,
+        bias_deg_h=12,
+        scale_ppm=100,
+        bending_arcmin_g=2,
+        trip_sigmas=2,
+        trip_rate=3,
+    )
+    levels = errors.trip(np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.04]]), np.array([3.0, 3.0]))
+    steady, bent = math.radians(2 * 13 / 3600), math.radians(6 / 60)
+    assert levels == pytest.approx([steady, steady + 3 * (1e-4 + bent) * 0.05], rel=1e-12)
 
 
 @pytest.mark.long

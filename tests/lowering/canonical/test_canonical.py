@@ -1,8 +1,12 @@
 """Canonical forms of the catalogue's steps: exact, short, readable and found quickly."""
 
+from itertools import combinations, combinations_with_replacement
+from types import SimpleNamespace
+
 import pytest
 import sympy as sp
 from derived import kernel, program
+from gathering import each
 
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.ir.program import Program
@@ -132,3 +136,21 @@ def test_values_are_named_after_what_they_are(choice):
     # Only partial sums and factors that a pass shares have no meaning: few in a matrix, none in a quaternion.
     temporaries = [a.name for a in program(choice).body if is_temporary(a.name)]
     assert len(temporaries) <= (3 if choice.name == "dcm" else 0)
+
+
+@each("vectors", [1, 2, 3])
+@each("degree", [0, 1, 2, 3, 4, 5])
+def test_the_stated_terms_are_all_products_up_to_the_degree(degree, vectors, monkeypatch):
+    """They are monomials in the scalar products, alone and with each vector and each cross product."""
+    monkeypatch.setattr(canonical, "_MOST_TERMS", {"few": 0, "many": 0})
+    scalar_products = list(combinations_with_replacement(range(vectors), 2))
+    beside = [0, *[1] * vectors, *(2 for _ in combinations(range(vectors), 2))]
+    terms = sum(
+        1
+        for size in beside
+        for count in range(degree // 2 + 1)
+        for _ in combinations_with_replacement(scalar_products, count)
+        if size + 2 * count <= degree
+    )
+    transition = SimpleNamespace(base=lambda: range(vectors), degree=lambda: degree)
+    assert f"degree {degree} in {vectors} vectors, up to {terms} terms" in canonical.expansion(transition)

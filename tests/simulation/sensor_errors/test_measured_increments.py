@@ -117,7 +117,7 @@ def test_a_run_in_parts_measures_what_a_whole_one_does(cause, row):
     errors = EVERY if cause is None else EVERY.only(cause)
     whole = MeasurementUnit(errors, float(STEP))(row, 0.1 + row)
     unit = MeasurementUnit(errors, float(STEP))
-    parts = [unit(part, 0.1 + part) for part in np.split(row, [1, 2, 130, 131, 390])]
+    parts = [unit(part, 0.1 + part) for part in np.split(row, [0, 1, 2, 130, 130, 131, 390])]
     for kind in (0, 1):
         # Pulses are whole ones in both, where no angle lies at the edge of a pulse to round-off.
         np.testing.assert_allclose(np.concatenate([part[kind] for part in parts]), whole[kind], atol=1e-15)

@@ -182,9 +182,9 @@ def fourth(words: Words) -> dict[tuple[int, int], Scalars]:
     collected: dict[tuple[int, int], Scalars] = {}
     for (a, b, c, d), weight in words.items():
         for left, other, sign in ((c, d, 1), (d, c, -1)):
-            if left != a:
-                key, turned = (min(a, left), max(a, left)), sign if a < left else -sign
-                _collect(collected.setdefault(key, {}), b, other, turned * weight)
+            # It is minus the product of the swapped vectors, and 0 of a vector with itself.
+            key, turned = (min(a, left), max(a, left)), sign * ((a < left) - (left < a))
+            _collect(collected.setdefault(key, {}), b, other, turned * weight)
     return {key: weights for key, row in sorted(collected.items()) if (weights := _nonzero(row))}
 
 

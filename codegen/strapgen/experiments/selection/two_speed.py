@@ -27,6 +27,7 @@ from strapgen.experiments.selection.algorithm import FREE, ProcessorCost, refere
 from strapgen.experiments.selection.brief import DesignBrief
 from strapgen.experiments.selection.causes import Rounding
 from strapgen.experiments.systems.cost import measured_budget
+from strapgen.fixedpoint.runs.angle_accumulation import turning_of_matrices
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
@@ -205,14 +206,13 @@ class TwoSpeedLoops:
         vector = self.increments * _length(errors["fast", "next_coning"])
         vector += _length(errors["vector", "rotation_vector"]) + samples
         local = _length(errors["update", "next"])
-        shortest = 1 - float(Settings().allowance)
+        proper = 1 - Settings().allowance
+        shortest = float(proper)
         if local >= shortest / 2:
             raise InputError("the words are too short for a bound")
         if self.state != "dcm":
             return vector + 2 * math.asin(local / shortest)
-        stretched = math.sqrt(2 - shortest**2)
-        uneven = (stretched - shortest) / (stretched + shortest)
-        return vector + math.sqrt((1 + uneven**2) / 2) * local / (shortest - local)
+        return vector + float(turning_of_matrices(proper)) * local / (shortest - local)
 
     @cached_property
     def fixed(self) -> Fitted:

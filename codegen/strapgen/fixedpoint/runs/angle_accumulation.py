@@ -206,7 +206,7 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
     frame in which the stretch of the matrix is diagonal, with k the difference of two singular values over their sum.
     """
     shortest, longest = sizes.shortest, sizes.longest
-    uneven = (longest - shortest) / (longest + shortest)
+    uneven = _unevenness(shortest, longest)
     proper = _turning(uneven)
 
     def step_angle(sizes: _Sizes) -> Fraction:
@@ -243,6 +243,24 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
         up(growth),
         up(added),
     )
+
+
+def turning_of_matrices(shortest: Fraction) -> Fraction:
+    """Return the angle that the nearest rotation turns as a proper matrix changes, per length of the change.
+
+    The angle is told in the stretch of the matrix: it has to be divided by the smallest singular value on the way.
+
+    Parameters
+    ----------
+    shortest : Fraction
+        The smallest singular value of a proper matrix.
+    """
+    return _turning(_unevenness(shortest, _longest(shortest)))
+
+
+def _unevenness(shortest: Fraction, longest: Fraction) -> Fraction:
+    """Return the largest difference of two singular values over their sum."""
+    return (longest - shortest) / (longest + shortest)
 
 
 def _turning(uneven: Fraction) -> Fraction:

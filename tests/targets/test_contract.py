@@ -1,0 +1,34 @@
+"""What the contract of generated code says of an argument."""
+
+from __future__ import annotations
+
+from gathering import each
+
+from strapgen.catalogue import choose
+from strapgen.ir.fixed_settings import Settings
+from strapgen.library import generated_sources
+from strapgen.targets.contract import argument_text
+
+
+@each(
+    ("settings", "limits", "error"),
+    [
+        # A product is rounded by half a place.
+        (
+            Settings(word=16),
+            "format Q1.14, unit 2^-14; range -17408 to 17408 (-1.0625 to 1.0625)",
+            "error at most 3.05176e-05, 0.5000 of the last place",
+        ),
+        # What saturates stores 1 itself as a place less.
+        (
+            Settings(word=16, state="q15"),
+            "format Q0.15, unit 2^-15; range -32768 to 32767 (-1 to 0.999969)",
+            "saturates at both ends; error at most 3.05176e-05, 1.0000 of the last place, where the exact value is "
+            "from -1 to 1; beyond, at most the larger of this and its distance from the range",
+        ),
+    ],
+)
+def test_an_output_tells_its_error_and_whether_it_saturates_and_an_input_neither(settings, limits, error):
+    interface = generated_sources.sources(choose("euler-product"), "c-fixed", settings).fixed
+    assert [argument_text(argument) for argument in interface.inputs] == [limits, limits]
+    assert [argument_text(argument) for argument in interface.outputs] == [f"{limits}; {error}"]
