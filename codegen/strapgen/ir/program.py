@@ -19,6 +19,7 @@ from strapgen.ir.attitude_step import Companions
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.support.brief import notebook_html, short_repr
+from strapgen.support.once import once
 
 
 @dataclass(frozen=True)
@@ -46,16 +47,16 @@ class Operation:
     def __hash__(self) -> int:
         return self._hash
 
-    @cached_property
+    @once
     def _hash(self) -> int:
         return hash((self.kind, self.arguments))
 
-    @cached_property
+    @once
     def size(self) -> int:
         """Number of operations in the tree."""
         return 1 + sum(node.size for node in self.arguments if isinstance(node, Operation))
 
-    @cached_property
+    @once
     def names(self) -> frozenset[str]:
         """The names that the tree uses."""
         return frozenset().union(*map(names_in, self.arguments))
@@ -63,7 +64,7 @@ class Operation:
     def __repr__(self) -> str:
         return self._text
 
-    @cached_property
+    @once
     def _text(self) -> str:
         return f"Operation(kind={self.kind!r}, arguments={self.arguments!r})"
 
