@@ -12,7 +12,6 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from strapgen.ir.attitude_step import Companions
@@ -218,7 +217,7 @@ class Program:
         """The outputs, and the transition where there is one."""
         return self.outputs if self.transition is None else (*self.outputs, self.transition)
 
-    @cached_property
+    @once
     def operations(self) -> dict[str, int]:
         """Count of operations by kind; subtractions count as additions.
 
@@ -232,7 +231,7 @@ class Program:
                     counts[key] += 1
         return counts
 
-    @cached_property
+    @once
     def temporaries(self) -> int:
         """Number of assigned names that are not elements of an output."""
         held = {node.name for result in self.outputs for node in result.nodes if isinstance(node, Reference)}
@@ -275,7 +274,7 @@ class Program:
             slots[slot] = operations[kind](*[slots[k] for k in arguments])
         return {name: [slots[k] for k in elements] for name, elements in code.results}
 
-    @cached_property
+    @once
     def _instructions(self) -> _Instructions:
         """The program as a list of single operations, which takes less time to run than its trees."""
         names: dict[str, int] = {}
