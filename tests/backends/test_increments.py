@@ -60,7 +60,7 @@ def test_pulses_that_cannot_be_counted(size, said):
 
 def test_the_simulator_feeds_pulses_to_every_back_end(make):
     motion = strapgen.motion("constant", x_deg_s=10, y_deg_s=-7, z_deg_s=3)
-    backend = make("euler", largest=0.012, carry="full")
+    backend = make("euler", largest=0.011, carry="full")
     size = 2.0**-12
     run = strapgen.simulate(backend, motion, "0.125", 10, pulse=size)
     # Half a pulse at most on each axis, and as much again for the turning of the axes between steps.
@@ -69,7 +69,7 @@ def test_the_simulator_feeds_pulses_to_every_back_end(make):
 
 def test_pulses_of_the_format_s_unit_reach_fixed_point_exactly(make):
     motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
-    backend = make("euler", largest=0.012)
+    backend = make("euler", largest=0.011)
     given_ = pulses(motion.increments(strapgen.ir.fixed_settings.Fraction(1, 8), 80, 2), 2.0**-20)
     np.testing.assert_array_equal(backend.representable(given_).astype(float), given_)
 

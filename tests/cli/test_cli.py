@@ -542,7 +542,9 @@ def test_generate_fixed_point_text(strapgen_says):
     assert re.search(r"\n  next: Q1\.30, error at most \d\.\d+e-\d+, \d\.\d{4} of the last place\n", said)
 
 
-@pytest.mark.parametrize("backend", ["c-fixed32", "c-fixed16", "fixed-model"])
+@pytest.mark.parametrize(
+    "backend", ["c-fixed32", *(pytest.param(b, marks=pytest.mark.long) for b in ("c-fixed16", "fixed-model"))]
+)
 def test_simulate_in_fixed_point(backend, strapgen_says):
     run = (
         f"simulate euler --backend {backend} --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 "

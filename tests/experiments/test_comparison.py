@@ -149,7 +149,10 @@ def test_what_does_not_go_with_a_choice_is_told(options, error, said):
 
 
 def test_a_back_end_is_shown_under_the_name_that_was_asked_for(increments):
-    rows = comparison.compare("euler", "rk4", 2, ["c-q31", "c-fixed32"], increments[:2])
+    settings = Settings(largest_angle=strapgen.ir.fixed_settings.Fraction(3, 256))
+    rows = comparison.compare(
+        "euler", "rk4", 2, ["c-q31", "c-fixed32"], increments[:2] / 2, settings=settings
+    )
     assert [row.backend for row in rows] == ["c-q31", "c-fixed32"]
 
 

@@ -135,7 +135,7 @@ def test_a_state_at_the_identity_saturates_in_each_step_and_does_not_drift():
     assert all(apart[n] <= backend.rounding_bound(int(n)) for n in steps)
 
 
-@pytest.mark.parametrize("carry", ["none", "full"])
+@pytest.mark.parametrize("carry", [pytest.param("none", marks=pytest.mark.long), "full"])
 def test_a_run_with_a_state_that_saturates_is_inside_its_bound(carry, rng):
     # Turns through the identity, where the largest element reaches 1.
     angles = np.rint(9000 * np.sin(np.arange(6000) * 0.05)).reshape(-1, 2, 1) * [1.0, 0.0, 0.0] * 3e-6

@@ -41,6 +41,30 @@ def test_sources_are_those_of_the_pipeline():
         assert generated_sources.sources(choice, target) == strapgen.generate(program, target)
 
 
+def test_what_a_user_does_to_the_files_changes_no_sources_of_others():
+    sources = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
+    (name,) = sources.files
+    text = sources.files.pop(name)
+    again = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
+    assert again.files == {name: text}
+
+
+def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):
+    choice = catalogue.choose("euler-product")
+    first = generated_sources.sources(choice, "numpy"), generated_sources.fixed_program(choice)
+    monkeypatch.setattr(cache, "entry", None)
+    assert (generated_sources.sources(choice, "numpy"), generated_sources.fixed_program(choice)) == first
+
+
+def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch):
+    monkeypatch.setattr(generated_sources, "_entries", {})
+    monkeypatch.setattr(generated_sources, "_MOST_ENTRIES", 2)
+    read = []
+    for key in ("a", "b", "a", "c", "a", "b"):
+        assert generated_sources._remembered(key, "", lambda key=key: read.append(key) or key) == key
+    assert read == ["a", "b", "c", "b"]
+
+
 def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     choice = catalogue.choose("euler-normalize")
@@ -58,7 +82,8 @@ def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp
     choice = catalogue.choose("euler-product")
     wanted = strapgen.lower(catalogue.derive(choice))
     generated_sources.sources(choice, "numpy")
-    monkeypatch.setattr(generated_sources, "_programs", {})  # as another process
+    for name in ("_programs", "_entries"):  # as another process
+        monkeypatch.setattr(generated_sources, name, {})
 
     def never(_choice):
         raise AssertionError("derived again")

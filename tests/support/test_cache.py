@@ -376,7 +376,8 @@ def test_an_entry_that_another_process_removes_at_once_is_made_again(root, times
 def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypatch):
     for name in ("_loaded", "_modules"):
         monkeypatch.setattr(compiler, name, {})
-    monkeypatch.setattr(generated_sources, "_programs", {})
+    for name in ("_programs", "_entries"):
+        monkeypatch.setattr(generated_sources, name, {})
     looked_up, removed = cache.lookup, []
 
     def lookup(of_kind: str, key: str) -> Path | None:
@@ -387,7 +388,8 @@ def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypat
         return place
 
     compiler.load(generated_sources.sources(choose("euler-product"), "c"))
-    monkeypatch.setattr(generated_sources, "_programs", {})
+    for name in ("_programs", "_entries"):
+        monkeypatch.setattr(generated_sources, name, {})
     for name in ("_loaded", "_modules"):
         monkeypatch.setattr(compiler, name, {})
     monkeypatch.setattr(cache, "lookup", lookup)
@@ -526,7 +528,7 @@ def test_what_is_made_is_the_user_s_alone_whatever_the_umask(root, umask, monkey
     assert cache.lookup("kind", "key") == place and not warnings.messages
 
 
-def test_planted_python_does_not_run(root, tmp_path, warnings):
+def test_planted_python_does_not_run(root, tmp_path, warnings, monkeypatch):
     """Generated text is executed as it is: a manifest that is right proves nothing."""
     sources = generated_sources.sources(choose("euler-product"), "numpy")
     (entry,) = (root / "sources").iterdir()
@@ -535,6 +537,7 @@ def test_planted_python_does_not_run(root, tmp_path, warnings):
     (entry / name).write_text(f"open({str(marker)!r}, 'w')\n{sources.files[name]}")
     (entry / "manifest.json").write_text(json.dumps(cache._hashes(entry)))
     to_stranger(*entry.iterdir(), entry)
+    monkeypatch.setattr(generated_sources, "_entries", {})  # as another process
     again = generated_sources.sources(choose("euler-product"), "numpy")
     compiler._import_text(again)
     assert not marker.exists() and again == sources

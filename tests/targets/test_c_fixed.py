@@ -204,17 +204,18 @@ def test_what_is_refused_on_the_way_leaves_outputs_and_residuals_alone(rng):
 
 
 def test_an_output_may_be_the_input():
-    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60)))
+    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60), carry="full"))
     ffi, call = in_c.module.ffi, getattr(in_c.module.lib, in_c.function.name)
     increments = ffi.new("int32_t[6]", [10**6 * k for k in range(6)])
     state, out = ffi.new("int32_t[4]", [1, 2, 3, 1 << 30]), ffi.new("int32_t[4]")
-    assert call(state, increments, out) == 0
-    assert call(state, increments, state) == 0
-    assert list(state) == list(out)
+    first, second = (ffi.new("uint32_t[8]", [7] * 8) for _ in range(2))
+    assert call(state, increments, first, out) == 0
+    assert call(state, increments, second, state) == 0
+    assert (list(state), list(second)) == (list(out), list(first))
 
 
 def test_arrays_stop_at_the_first_refusal():
-    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60)))
+    in_c, _ = pair(EULER, Settings(32, Fraction(1, 60), carry="full"))
     states = np.array([[0, 0, 0, 1 << 30]] * 5)
     increments = np.zeros((5, 6), int)
     increments[3, 2] = 2**31 - 1

@@ -64,6 +64,7 @@ class Quantization:
     def __post_init__(self) -> None:
         self.word, self.rounding_error = self.settings.word, ROUNDINGS[self.settings.rounding]
         self.values = dict(self.plan.values)
+        self._proved: dict[str, Fraction] = {}
 
     def largest(self, fraction: int) -> int:
         """Return the largest integer that a word of so many fraction bits holds."""
@@ -71,7 +72,9 @@ class Quantization:
 
     def size(self, name: str) -> Fraction:
         """Return the largest magnitude of a quantity in calls that pass the checks so far."""
-        proved = self.quantities.items[name].range.magnitude
+        proved = self._proved.get(name)
+        if proved is None:
+            proved = self._proved[name] = self.quantities.items[name].range.magnitude
         return min(proved, self.checked.get(name, proved))
 
     def too_short(self, name: str) -> InputError:

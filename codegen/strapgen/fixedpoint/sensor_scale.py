@@ -70,7 +70,7 @@ def in_counts(program: Program, sensor: Sensor) -> Program:
     # Functions have series of their own, which a scale of their argument would make longer.
     operations = (n for a in program.body for n in walk(a.value) if isinstance(n, Operation))
     if all(node.kind in _LINEAR for node in operations):
-        candidates.insert(0, (folded, _weights(folded, counted)))
+        candidates.insert(0, (folded, dict(_weights(folded, tuple(counted)))))
     program, weights = min(candidates, key=lambda pair: _total_cost(*pair))
     scaling = _Scaling(sensor.scale, weights)
     body = tuple(replace(a, value=scaling.assigned(a)) for a in program.body)
@@ -220,14 +220,15 @@ def _is_shift(node: Node) -> bool:
 # Weights
 
 
-def _weights(program: Program, counted: Mapping[str, int]) -> dict[str, int]:
+@lru_cache(maxsize=8)
+def _weights(program: Program, counted: tuple[str, ...]) -> Mapping[str, int]:
     """Return the weights with the fewest multiplications that are known.
 
     A value of one degree has that weight; a polynomial of several has the one with which its first user needs no
     coefficient. Weights are then changed as long as that saves multiplications.
     """
     results = {n.name for result in program.results for n in result.nodes if isinstance(n, Reference)}
-    degrees = {name: {degree} for name, degree in counted.items()}
+    degrees = {name: {1} for name in counted}
     for assignment in program.body:
         degrees[assignment.name] = {0} if assignment.name in results else _degrees(assignment.value, degrees)
     weights = {name: min(several, default=0) for name, several in degrees.items()}

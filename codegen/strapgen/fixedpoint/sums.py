@@ -18,7 +18,7 @@ from strapgen.fixedpoint.quantities import (
     is_power_of_two,
 )
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
-from strapgen.fixedpoint.terms import Aligned, Placed, aligned, largest_wide, nearest, up
+from strapgen.fixedpoint.terms import Aligned, Placed, aligned, binary, largest_wide, nearest, up
 from strapgen.fixedpoint.words.filters import Factor, filter_words, nearest_word
 from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.formats import Format, finest
@@ -142,8 +142,8 @@ def _product_term(
     factor, bits = rounded or nearest_word(coefficient, context.word)
     if context.settings.digits and rounded is None:
         factor = from_digits(signed_digits(factor, context.settings.digits))
-    wrong = abs(Fraction(factor, 1) / Fraction(2) ** bits - coefficient)
-    stored = values[0].magnitude / Fraction(2) ** values[0].fraction
+    wrong = abs(binary(factor, bits) - coefficient)
+    stored = binary(values[0].magnitude, values[0].fraction)
     term = Term(names, factor, coefficient=Coefficient(coefficient, bits))
     return Placed(term, places + bits, up(error + wrong * stored))
 

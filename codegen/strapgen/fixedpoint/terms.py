@@ -66,6 +66,22 @@ def up(value: Fraction) -> Fraction:
     return Fraction(-((-value.numerator << GRID) // value.denominator), 1 << GRID)
 
 
+def in_units(bound: Fraction) -> int:
+    """Return a bound in units of the grid of the intervals, on which bounds are."""
+    return -((-bound.numerator << GRID) // bound.denominator)
+
+
+def binary(integer: int, fraction: int) -> Fraction:
+    """Return an integer with so many fraction bits as a number.
+
+    Examples
+    --------
+    >>> binary(3, 2), binary(3, -1)
+    (Fraction(3, 4), Fraction(6, 1))
+    """
+    return Fraction(integer, 1 << fraction) if fraction >= 0 else Fraction(integer << -fraction)
+
+
 def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str, Value]) -> Aligned:
     """Return terms at one place.
 
@@ -84,6 +100,7 @@ def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str,
     """
     shifted: list[Term] = []
     peak, error = 0, Fraction(0)
+    inherited = cut = 0  # errors of terms in units of the grid, and terms that are shifted down
     for item in terms:
         term, wrong = item.term, item.error
         # A shift by all bits of a wide number but one leaves 0 or -1, as every longer one would.
@@ -98,11 +115,17 @@ def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str,
             coefficient = known and replace(known, fraction=known.fraction + shift)
             shifted.append(Term((), integer, coefficient=coefficient))
         else:
-            shifted.append(replace(term, shift=shift))
-            error += wrong + (Fraction(2) ** -place if shift < 0 else 0)
+            shifted.append(Term(term.names, term.factor, shift, term.coefficient))
+            inherited += in_units(wrong)
+            cut += shift < 0
         size = _bound(shifted[-1], values)
         peak += (size >> -shift) + 1 if shift < 0 and term.names else size
-    return Aligned(tuple(shifted), peak, up(error))
+    if place <= GRID:
+        inherited += cut << (GRID - place)
+    else:
+        error += binary(cut, place)
+    on_grid = Fraction(inherited, 1 << GRID)
+    return Aligned(tuple(shifted), peak, on_grid + up(error) if error else on_grid)
 
 
 def terms_fit(terms: Iterable[Term], word: int, values: Mapping[str, Value]) -> bool:

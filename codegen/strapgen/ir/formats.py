@@ -86,9 +86,16 @@ def finest(largest: Fraction, word: int) -> int:
         return word - 1
     bits = largest.numerator.bit_length() - largest.denominator.bit_length()
     fraction = word - bits + 1
-    while largest * Fraction(2) ** fraction > top:
+    while _exceeds(largest, fraction, top):
         fraction -= 1
     return fraction
+
+
+def _exceeds(largest: Fraction, fraction: int, top: int) -> bool:
+    """Tell whether a magnitude with so many fraction bits exceeds an integer."""
+    if fraction >= 0:
+        return largest.numerator << fraction > top * largest.denominator
+    return largest.numerator > top * largest.denominator << -fraction
 
 
 def check_word(word: int) -> int:

@@ -12,13 +12,13 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.support.brief import notebook_html, short_repr
+from strapgen.support.once import once
 
 
 @dataclass(frozen=True)
@@ -46,16 +46,16 @@ class Operation:
     def __hash__(self) -> int:
         return self._hash
 
-    @cached_property
+    @once
     def _hash(self) -> int:
         return hash((self.kind, self.arguments))
 
-    @cached_property
+    @once
     def size(self) -> int:
         """Number of operations in the tree."""
         return 1 + sum(node.size for node in self.arguments if isinstance(node, Operation))
 
-    @cached_property
+    @once
     def names(self) -> frozenset[str]:
         """The names that the tree uses."""
         return frozenset().union(*map(names_in, self.arguments))
@@ -63,7 +63,7 @@ class Operation:
     def __repr__(self) -> str:
         return self._text
 
-    @cached_property
+    @once
     def _text(self) -> str:
         return f"Operation(kind={self.kind!r}, arguments={self.arguments!r})"
 
@@ -217,7 +217,7 @@ class Program:
         """The outputs, and the transition where there is one."""
         return self.outputs if self.transition is None else (*self.outputs, self.transition)
 
-    @cached_property
+    @once
     def operations(self) -> dict[str, int]:
         """Count of operations by kind; subtractions count as additions.
 
@@ -231,7 +231,7 @@ class Program:
                     counts[key] += 1
         return counts
 
-    @cached_property
+    @once
     def temporaries(self) -> int:
         """Number of assigned names that are not elements of an output."""
         held = {node.name for result in self.outputs for node in result.nodes if isinstance(node, Reference)}
@@ -274,7 +274,7 @@ class Program:
             slots[slot] = operations[kind](*[slots[k] for k in arguments])
         return {name: [slots[k] for k in elements] for name, elements in code.results}
 
-    @cached_property
+    @once
     def _instructions(self) -> _Instructions:
         """The program as a list of single operations, which takes less time to run than its trees."""
         names: dict[str, int] = {}

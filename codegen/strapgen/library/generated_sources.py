@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import json
 import pickle
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from strapgen import targets
 from strapgen.catalogue import Choice
@@ -18,13 +20,34 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.support import cache
 from strapgen.support.exceptions import InputError
+from strapgen.support.timing import from_cache
 from strapgen.targets.names import UNNAMED, Naming
 
 if TYPE_CHECKING:
     from strapgen.ir.integer_program import FixedProgram
     from strapgen.ir.program import Program
 
+T = TypeVar("T")
+
 _programs: dict[str, Program] = {}
+#: What this process has read last from the cache, by its folder and the key of the entry, whose content never changes.
+_entries: dict[tuple[Path, str], Any] = {}
+#: So many entries are remembered; one of sources takes some ten kilobytes.
+_MOST_ENTRIES = 256
+
+
+def _remembered(key: str, what: str, read: Callable[[], T]) -> T:
+    """Return the content of an entry, which a process checks and reads once; the log has every use."""
+    place = cache.root(), key
+    if place in _entries:
+        from_cache(what)
+        content: T = _entries.pop(place)
+    else:
+        content = cache.persistently(read)
+    _entries[place] = content  # the last one now
+    if len(_entries) > _MOST_ENTRIES:
+        del _entries[next(iter(_entries))]
+    return content
 
 
 def program(choice: Choice) -> Program:
@@ -94,13 +117,15 @@ def fixed_program(choice: Choice, settings: Settings | None = None) -> FixedProg
 
         (draft / "fixed.pickle").write_bytes(pickle.dumps(pipeline.quantize(program(choice), settings)))
 
-    def read() -> bytes:
-        place = cache.entry("fixed-programs", key, fill, f"integers of {choice.kernel}")
-        return cache.read(place, "fixed.pickle")
+    what = f"integers of {choice.kernel}"
+
+    def read() -> FixedProgram:
+        place = cache.entry("fixed-programs", key, fill, what)
+        fixed: FixedProgram = pickle.loads(cache.read(place, "fixed.pickle"))
+        return fixed
 
     key = cache.digest([cache.generator_digest(), choice.identity, _text(settings)])
-    fixed: FixedProgram = pickle.loads(cache.persistently(read))
-    return fixed
+    return _remembered(key, what, read)
 
 
 def _text(settings: Settings) -> str:
@@ -164,10 +189,13 @@ def sources(
         ]
     )
 
+    what = f"sources of {choice.kernel} for {target}"
+
     def read() -> Sources:
-        folder = cache.entry("sources", key, fill, f"sources of {choice.kernel} for {target}")
+        folder = cache.entry("sources", key, fill, what)
         interface = json.loads(cache.read(folder, "interface.json"))
         files = {name: cache.read(folder, name).decode() for name in interface["files"]}
         return Sources.restore(interface, files)
 
-    return cache.persistently(read)
+    known = _remembered(key, what, read)
+    return replace(known, files=dict(known.files))  # which a user may change

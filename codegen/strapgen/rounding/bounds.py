@@ -45,11 +45,17 @@ class _Analysis:
         exact = ExactRanges(program, self.expressions, box)
         self.ranges, self.conditions = exact.ranges, tuple(exact.conditions)
         self._slopes = slopes(self.expressions, self.ranges)
+        self._moves: dict[tuple[str, tuple[int, ...]], list[dict[int, Fraction]]] = {}
 
     def moves(self, result: Result, held: Collection[int] = ()) -> list[dict[int, Fraction]]:
         """Return for every element of a result how far it moves with every operation, see `sensitivities`."""
-        places = self.expressions.results[result.signal.name]
-        return [sensitivities(self.expressions, self._slopes, place, held) for place in places]
+        key = result.signal.name, tuple(held)
+        if key not in self._moves:
+            places = self.expressions.results[result.signal.name]
+            self._moves[key] = [
+                sensitivities(self.expressions, self._slopes, place, held) for place in places
+            ]
+        return self._moves[key]
 
 
 @lru_cache(maxsize=64)
@@ -105,15 +111,23 @@ def rounding_bounds(
     names = [signal.name for signal in program.inputs]
     for name in settings.ranges:
         checks.choice(f"input of {program.kernel}", name, names)
-    format_ = NUMBERS[number]
+    precision = NUMBERS[number].precision
     if not _has_numpy():
-        return proved.bounds(program, number, format_.precision)
+        return proved.bounds(program, number, precision)
     known = {*settings.ranges, *TURNING}
     for signal in program.inputs:
         if signal.bound is None and not signal.constraint and signal.name not in known:
             reason = f"the range of {signal.name} is not known"
-            return RoundingBounds(number, format_.precision, reason=reason)
-    limits = tuple((s.name, largest_magnitude(program, s, settings)) for s in program.inputs)
+            return RoundingBounds(number, precision, reason=reason)
+    return _bounds(
+        program, tuple((s.name, largest_magnitude(program, s, settings)) for s in program.inputs), number
+    )
+
+
+@lru_cache(maxsize=64)
+def _bounds(program: Program, limits: tuple[tuple[str, Fraction], ...], number: str) -> RoundingBounds:
+    """Bound the rounding of a program on a box of inputs, once for all targets with such numbers."""
+    format_ = NUMBERS[number]
     inputs = tuple(Condition(name, -largest, largest) for name, largest in limits)
     analysis = _analysis(program, limits)
     if isinstance(analysis, str):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
+
+from strapgen.fixedpoint.terms import binary
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,15 @@ class NumberFormat:
     @property
     def underflow(self) -> Fraction:
         """Half the smallest number: the largest error of a rounding near zero."""
-        return Fraction(2) ** (self.smallest - 1)
+        return power_of_two(self.smallest - 1)
 
     def rounded(self, value: Fraction) -> Fraction:
         """Return the nearest number, of two the even one, as a literal is read."""
         if not value:
             return value
-        step = Fraction(2) ** max(exponent(abs(value)) - self.precision + 1, self.smallest)
-        return round(value / step) * step
+        place = max(exponent(abs(value)) - self.precision + 1, self.smallest)
+        steps = round(binary(value.numerator, place) / value.denominator)
+        return binary(steps, -place)
 
     def half_ulp(self, largest: Fraction) -> Fraction:
         """Return the largest error of rounding a number of at most this magnitude.
@@ -59,8 +63,8 @@ class NumberFormat:
         if not largest:
             return Fraction(0)
         power = exponent(largest)
-        above = largest - Fraction(2) ** power
-        half = Fraction(2) ** (power - self.precision)
+        above = largest - power_of_two(power)
+        half = power_of_two(power - self.precision)
         return max(half / 2, min(half, above), self.underflow)
 
     def ulp(self, largest: Fraction) -> Fraction:
@@ -84,5 +88,12 @@ def exponent(value: Fraction) -> int:
     >>> exponent(Fraction(5, 16)), exponent(Fraction(8))
     (-2, 3)
     """
-    power = value.numerator.bit_length() - value.denominator.bit_length()
-    return power if value >= Fraction(2) ** power else power - 1
+    top, bottom = value.numerator, value.denominator
+    power = top.bit_length() - bottom.bit_length()
+    return power if top << max(0, -power) >= bottom << max(0, power) else power - 1
+
+
+@lru_cache(maxsize=4096)
+def power_of_two(power: int) -> Fraction:
+    """Return a power of two."""
+    return binary(1, -power)

@@ -18,6 +18,7 @@ from strapgen.cli import main
 from strapgen.evidence import subjects
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Verdict
+from strapgen.experiments import thesis_tables
 from strapgen.experiments.dossier.algorithm import dossier
 from strapgen.experiments.dossier.conditions import Conditions
 from strapgen.reports.evidence import evidence_page, read_page
@@ -31,8 +32,27 @@ ROOT = Path(__file__).resolve().parents[3]
 COMMAND = "report euler euler-product --beside rk4:2,magnus4:2 --backend numpy,c-fixed32 --duration 1/2 --sample-hz 50"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def one_table():
+    """Let the thesis have one table: a report takes all that there are, and the command prints the same."""
+    (third,) = (table for table in thesis_tables.TABLES if table.number == 3)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(thesis_tables, "TABLES", (third,))
+        for name in ("build_all", "run_tables"):
+            function = getattr(thesis_tables, name)
+            patch.setattr(
+                function,
+                "__defaults__",
+                tuple(
+                    (third,) if isinstance(default, tuple) and third in default else default
+                    for default in function.__defaults__
+                ),
+            )
+        yield
+
+
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def page(tmp_path_factory, one_table):
     """Return the file of a report."""
     path = tmp_path_factory.mktemp("report") / "report.html"
     # In this process, where the commands beside the numbers find what it has derived.

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Container, Iterable, Iterator, Mapping
-from fractions import Fraction
 
 from strapgen.ir.integer_program import IntegerSum, Term, Value, used_by
 
 #: Bits below the last place of a sum down to which its products are computed.
 _BELOW = 8
-#: A coarser format may add this part of the rounding error of a value that it is multiplied into.
-_PART = Fraction(1, 16)
+#: A coarser format may add a part of the rounding error of a value that it is multiplied into: so many bits less.
+_PART = 4
 #: Bits by which that is less where the sum's own rounding comes with the next call: other errors add up alone.
 _FED_BACK = 4
 
@@ -76,15 +74,15 @@ def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int,
 
 def _room(term: Term, place: int, value: Value, factor: Value, others: list[Value]) -> int:
     """Return by how many bits a factor of a term may be coarser, so that the error of the sum hardly grows."""
-    # What an error of the factor is multiplied with.
-    size = abs(term.factor) / Fraction(2) ** (place - factor.fraction)
+    # What an error of the factor is multiplied with, as an integer with fraction bits.
+    size, bits = abs(term.factor), place - factor.fraction
     for other in others:
-        size = Fraction(other.magnitude) / Fraction(2) ** other.fraction
+        size, bits = other.magnitude, other.fraction
     if not size:  # a product with what is always zero
         return place
     fraction = value.fraction + (_FED_BACK if _is_fed_back(value) else 0)
-    units = _PART / Fraction(2) ** fraction / size * Fraction(2) ** factor.fraction
-    return max(0, math.floor(units).bit_length() - 1)
+    units = factor.fraction + bits - fraction - _PART
+    return max(0, ((1 << units) // size).bit_length() - 1) if units > 0 else 0
 
 
 def _is_fed_back(value: Value) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from operator import is_not
 
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference
 from strapgen.lowering.names import shared_names
@@ -36,7 +37,9 @@ def reuse_values(program: Program) -> Program:
             return node
         if node in known:
             return known[node]
-        rewritten = Operation(node.kind, tuple(rewrite(argument) for argument in node.arguments))
+        arguments = tuple([rewrite(argument) for argument in node.arguments])
+        is_changed = any(map(is_not, arguments, node.arguments))
+        rewritten = Operation(node.kind, arguments) if is_changed else node
         if whole or occurrences[node] < 2:
             return rewritten
         known[node] = Reference(next(names))
@@ -44,9 +47,10 @@ def reuse_values(program: Program) -> Program:
         return known[node]
 
     for assignment in program.body:
-        body.append(replace(assignment, value=rewrite(assignment.value, whole=True)))
+        value = rewrite(assignment.value, whole=True)
+        body.append(assignment if value is assignment.value else replace(assignment, value=value))
         known.setdefault(assignment.value, Reference(assignment.name))
-    return replace(program, body=tuple(body))
+    return program if body == [*program.body] else replace(program, body=tuple(body))
 
 
 def _occurrences(program: Program) -> Counter[Node]:

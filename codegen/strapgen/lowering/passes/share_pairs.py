@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import combinations
 
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
 from strapgen.lowering.names import is_temporary, shared_names
 from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses
+from strapgen.support.once import once
 
 #: The kind of the sum or product, two members, and whether their signs are equal; those of factors always are.
 _Pair = tuple[str, Node, Node, bool]
@@ -28,18 +29,18 @@ class _Many:
     kind: str
     members: list[tuple[bool, Node | _Many]]
 
-    @cached_property
+    @once
     def terms(self) -> list[Term]:
         return [(sign, _tree(member)) for sign, member in self.members]
 
-    @cached_property
+    @once
     def node(self) -> Node:
         if self.kind == "add":
             return plain(signed_sum(self.terms))
         nodes = [node for _, node in self.terms]
         return chain("multiply", nodes) if self.kind == "multiply" else Operation(self.kind, tuple(nodes))
 
-    @cached_property
+    @once
     def pairs(self) -> frozenset[_Pair]:
         if self.kind not in ("add", "multiply"):
             return frozenset()
