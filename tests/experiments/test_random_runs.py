@@ -33,7 +33,7 @@ def test_the_closed_forms_lie_in_the_interval_of_many_runs(method, increments, p
 
 
 def test_runs_in_parts_are_the_runs_in_one_piece(monkeypatch):
-    choice = catalogue.choose_step("euler", "coning-combined", 3, previous=2)
+    choice = catalogue.choose_step("euler", "coning-compressed", 3, previous=2)
     runs = SteadyRuns(choice, replace(PULSES, noise=1e-5), 40, 5)
     whole = outcome(runs)
     monkeypatch.setattr(experiment, "_DRAWN", 5 * 3 * 3 * 40)
