@@ -41,6 +41,20 @@ def test_sources_are_those_of_the_pipeline():
         assert generated_sources.sources(choice, target) == strapgen.generate(program, target)
 
 
+def test_sources_that_were_used_last_are_remembered_and_belong_to_the_caller(monkeypatch):
+    monkeypatch.setattr(generated_sources, "_sources", {})
+    monkeypatch.setattr(generated_sources, "_MOST_SOURCES", 2)
+    first, second, third = map(catalogue.choose, ("euler-product", "dcm-product", "euler-normalize"))
+    for choice in (first, second, first):
+        changed = generated_sources.sources(choice, "numpy")
+        changed.files.clear()
+        changed.operations.clear()
+    generated_sources.sources(third, "numpy")
+    assert [one.kernel for one in generated_sources._sources.values()] == [first.kernel, third.kernel]
+    again = generated_sources.sources(first, "numpy")
+    assert again.files and again.operations
+
+
 def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     choice = catalogue.choose("euler-normalize")

@@ -387,7 +387,8 @@ def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypat
         return place
 
     compiler.load(generated_sources.sources(choose("euler-product"), "c"))
-    monkeypatch.setattr(generated_sources, "_programs", {})
+    for name in ("_programs", "_sources"):  # as another process
+        monkeypatch.setattr(generated_sources, name, {})
     for name in ("_loaded", "_modules"):
         monkeypatch.setattr(compiler, name, {})
     monkeypatch.setattr(cache, "lookup", lookup)
@@ -535,6 +536,7 @@ def test_planted_python_does_not_run(root, tmp_path, warnings):
     (entry / name).write_text(f"open({str(marker)!r}, 'w')\n{sources.files[name]}")
     (entry / "manifest.json").write_text(json.dumps(cache._hashes(entry)))
     to_stranger(*entry.iterdir(), entry)
+    generated_sources._sources.clear()  # as another process
     again = generated_sources.sources(choose("euler-product"), "numpy")
     compiler._import_text(again)
     assert not marker.exists() and again == sources

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from strapgen.ir.program import Program
 
 _programs: dict[str, Program] = {}
+#: Sources that were used last, by the cache folder and their key, and how many of them are remembered.
+_sources: dict[tuple[Path, str], Sources] = {}
+_MOST_SOURCES = 128
 
 
 def program(choice: Choice) -> Program:
@@ -170,4 +174,10 @@ def sources(
         files = {name: cache.read(folder, name).decode() for name in interface["files"]}
         return Sources.restore(interface, files)
 
-    return cache.persistently(read)
+    place = cache.root(), key
+    latest = _sources.pop(place, None) or cache.persistently(read)
+    _sources[place] = latest
+    if len(_sources) > _MOST_SOURCES:
+        oldest, *_ = tuple(_sources)  # at once, as other threads may add some
+        _sources.pop(oldest, None)
+    return replace(latest, files={**latest.files}, operations={**latest.operations})
