@@ -172,7 +172,7 @@ def test_the_command_answers_in_json(capsys):
         ("{example} --order 5 --set a=1", "there is no solution"),
         ("euler --order 3", "kernel euler-rk4-2 has no unknowns"),
         ("missing.py --order 3", "is no file"),
-        ("imu-compensate --order 3", "kernel imu-compensate is no attitude step"),
+        ("euler-product --order 3", "kernel euler-product is no attitude step"),
         ("{example} --order 3 --on sculling", "motion of the attitude step 'sculling' is not known"),
         (
             "{velocity} --order 3 --on coning",
