@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shlex
 import tomllib
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
+import session_library
 import sympy as sp
 
 from strapgen.catalogue.methods import order_conditions, tableaux, unknown_tableau
@@ -34,8 +36,15 @@ def three():
 
 @pytest.fixture(scope="module")
 def four():
-    unknown = unknown_tableau.read(EXAMPLES / "kutta4.toml")
-    return unknown, unknown.solve()
+    """Kutta's methods, which one process of the session solves for."""
+    file = EXAMPLES / "kutta4.toml"
+    unknown = unknown_tableau.read(file)
+
+    def fill(folder: Path) -> None:
+        (folder / "solution.pickle").write_bytes(pickle.dumps(unknown.solve()))
+
+    folder = session_library.folder("families", [file.read_text()], fill)
+    return unknown, pickle.loads((folder / "solution.pickle").read_bytes())
 
 
 def coefficients(method: tableaux.Tableau) -> dict[str, sp.Expr]:
