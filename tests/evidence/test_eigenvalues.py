@@ -61,6 +61,8 @@ def test_numbers_above_eigenvalues_are_above_them():
     matrix = flint.fmpq_mat([[0, 3], [3, 0]])
     assert 3 < eigenvalues._above(matrix) < 3 + 1e-6
     assert eigenvalues._above(flint.fmpq_mat(3, 3)) > 0
+    third = flint.fmpq_mat([[flint.fmpq(1, 3)]])
+    assert Fraction(1, 3) < Fraction(eigenvalues._above(third)) < Fraction(1, 3) + Fraction(1, 10**6)
 
 
 def test_what_is_curved_in_a_box_counts():
