@@ -691,7 +691,7 @@ def test_a_path_is_repeated_in_full(folder, capsys):
     assert path in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("entry", ["1if 2else 3", "1is 1", "0x1for x in y", "1or 2"])
+@each("entry", ["1if 2else 3", "1is 1", "0x1for x in y", "1or 2"])
 def test_python_s_warnings_of_a_coefficient_are_not_shown(entry, folder, capsys):
     text = 'name = "x"\nsource = "y"\norder = 1\nnodes = ["0"]\nmatrix = [[]]\nweights = ["{}"]\n'
     Path("method.toml").write_text(text.format(entry))

@@ -20,6 +20,7 @@ import derived
 import numpy as np
 import pytest
 import sympy as sp
+from gathering import each
 from precisions import single
 from tolerances import certified
 
@@ -144,7 +145,7 @@ def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
             strapgen_says(" ".join(map(shlex.quote, words)).replace(*LESS.get(command, ("", ""))))
 
 
-@pytest.mark.parametrize("command", ["list", "tableau", "derive", "generate", "simulate", "tables"])
+@each("command", ["list", "tableau", "derive", "generate", "simulate", "tables"])
 def test_help_says_what_the_format_may_be(command, strapgen_says):
     assert "--format" in strapgen_says(f"{command} --help")
 
@@ -377,7 +378,7 @@ def test_vibration_under_a_spectrum(strapgen_says, tmp_path):
 # coning
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "wanted"),
     [
         ("--samples 2", "2/3"),

@@ -7,6 +7,7 @@ import shlex
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from gathering import each
 
 from strapgen.cli import main
 from strapgen.evidence import collection, gappa
@@ -54,7 +55,7 @@ def test_a_tool_that_is_missing_is_named_and_fails_where_all_must_be_there(capsy
     assert "install frama-c-base" in said and "install gappa" in said
 
 
-@pytest.mark.parametrize(
+@each(
     ("command", "line"),
     [
         ("", "a kernel is needed, or --all"),

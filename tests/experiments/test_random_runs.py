@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen import catalogue
 from strapgen.cli import main
@@ -76,7 +77,7 @@ def test_ten_thousand_runs_of_more_steps_than_are_drawn_at_a_time(capsys):
     assert drifts[0] == drifts[1]
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "said"),
     [
         ("--runs 0", "runs is 0"),

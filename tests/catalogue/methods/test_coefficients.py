@@ -18,7 +18,7 @@ QUICK = settings(derandomize=True, database=None, deadline=None)
 ROOT = sp.sqrt(21)
 
 
-@pytest.mark.parametrize(
+@each(
     ("written", "value"),
     [
         ("9/44", Fraction(9, 44)),
@@ -46,7 +46,7 @@ def test_rationals_are_fractions_however_they_are_written(written, value):
     assert read == value
 
 
-@pytest.mark.parametrize(
+@each(
     ("written", "value"),
     [
         ("(18-sqrt(21))/180", sp.Rational(1, 10) - ROOT / 180),

@@ -8,6 +8,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.catalogue.methods import coning_coefficients, coning_drift
 from strapgen.catalogue.methods.coning_drift import ConingShape
@@ -48,7 +49,7 @@ def test_the_drift_is_that_of_cross_products_of_samples(shape, b):
         assert float(value) == pytest.approx(computed - true, abs=1e-14)
 
 
-@pytest.mark.parametrize(("samples", "previous"), [(1, 1), (1, 5), (4, 0), (3, 3)])
+@each(("samples", "previous"), [(1, 1), (1, 5), (4, 0), (3, 3)])
 def test_compressed_coefficients_annul_every_power_and_have_their_published_drift(samples, previous):
     design = coning_coefficients.design(samples, previous)
     newest = samples + previous - 1

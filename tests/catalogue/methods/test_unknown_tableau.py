@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import session_library
 import sympy as sp
+from gathering import each
 
 from strapgen.catalogue.methods import order_conditions, tableaux, unknown_tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
@@ -200,7 +201,7 @@ def test_a_member_is_a_file_for_other_commands(capsys, tmp_path):
     assert "euler-three-stages" in says(f"derive euler --tableau {file} --format json", capsys)
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "reason"),
     [
         ({"unknowns": []}, "unknowns is empty"),
