@@ -28,17 +28,12 @@ LOOPS = [(name, order) for name, orders in ORDERS.items() for order in orders]
 
 
 def steady(name, order=None):
-    """Return the states that a step of each input leads to, by the final value theorem, as {state: {input: value}}."""
+    """Return the states that a step of each input leads to, in which nothing changes, as {state: {input: value}}."""
     loop = closed_loop(name, order)
     known = dict(zip(loop.gains, symbolic_gains(name, order), strict=True))
-    response = (s * sp.eye(len(loop.states)) - loop.continuous.subs(known)).LUsolve(
-        loop.disturbance.subs(known)
-    )
+    states = (-loop.continuous.subs(known)).LUsolve(loop.disturbance.subs(known))
     return {
-        state: {
-            driver: sp.simplify(sp.cancel(response[row, column]).subs(s, 0))
-            for column, driver in enumerate(loop.inputs)
-        }
+        state: {driver: sp.simplify(states[row, column]) for column, driver in enumerate(loop.inputs)}
         for row, state in enumerate(loop.states)
     }
 
