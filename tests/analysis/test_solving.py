@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from gathering import each
 
 import strapgen
 from strapgen.analysis import velocity_conditions, velocity_series
@@ -160,7 +161,7 @@ def test_the_command_answers_in_json(capsys):
     assert sp.solve(sp.sympify(leading["terms"]["h^5, drift: w1 x w2"], {"a": a}), a) == [MILLER["a"]]
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "reason"),
     [
         ("{example} --order 9", "order on general motion is 9; a whole number from 1 to 8 is needed"),

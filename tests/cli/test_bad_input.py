@@ -660,7 +660,7 @@ def test_cache_folder_that_cannot_be_written(place, folder, capsys, monkeypatch)
 LONG = "x" * 5000
 
 
-@pytest.mark.parametrize(
+@each(
     "command",
     [
         f"simulate euler --{LONG}",

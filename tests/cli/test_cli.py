@@ -466,7 +466,7 @@ def test_derive_program(strapgen_says):
     )
 
 
-@pytest.mark.parametrize("show", ["text", "latex", "program", "operations"])
+@each("show", ["text", "latex", "program", "operations"])
 def test_derive_json(show, strapgen_says):
     data = json.loads(strapgen_says(f"derive euler --show {show} --format json"))
     wanted = [

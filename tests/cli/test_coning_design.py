@@ -82,7 +82,7 @@ def test_a_design_goes_wherever_a_method_goes(run, tmp_path):
     assert "largest drift over the band to 1.3 rad a sample" in text
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "words"),
     [
         ("band", "a band is needed, as --band in rad a sample, or as --band-hz with --sample-hz"),

@@ -88,7 +88,7 @@ def test_nodes_that_are_nearly_the_same_are_told_apart():
         assert any("0_1235_2" in name for name in elements) and len(elements) == len(set(elements))
 
 
-@pytest.mark.parametrize("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
+@each("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
 def test_nodes_of_every_method_have_names_of_their_own(name):
     kernel = derive("euler", name, rates=True)
     signals = [*kernel.inputs, *(stage.signal for stage in kernel.stages)]

@@ -249,7 +249,7 @@ def test_the_step_order_is_that_of_the_exact_rotation_of_the_fitted_rate(count, 
         assert lowest_difference(found, true_rotation("euler", true, order + 1)) == order + 1
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
+@each(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
 def test_a_rate_of_the_fit_s_degree_is_followed_exactly(count, previous):
     true = generic_rate(count + previous - 1)
     found = rotation("dcm", fitted_rate(true, count, previous, 7), 7)

@@ -111,7 +111,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
+@each("case", WRONG)
 def test_a_wrong_file_gets_one_line(case, text, tmp_path):
     old, new, words = WRONG[case]
     path = tmp_path / "wrong.toml"

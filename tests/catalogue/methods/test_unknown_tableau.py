@@ -228,7 +228,7 @@ def test_a_bad_file_gets_one_line(change, reason):
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "reason"),
     [
         ("tableau {heun} --set c4=1", "unknown 'c4' is not known; allowed: c2, c3"),
