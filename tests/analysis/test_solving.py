@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from gathering import each
 
 import strapgen
 from strapgen.analysis import velocity_conditions, velocity_series
@@ -160,7 +161,7 @@ def test_the_command_answers_in_json(capsys):
     assert sp.solve(sp.sympify(leading["terms"]["h^5, drift: w1 x w2"], {"a": a}), a) == [MILLER["a"]]
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "reason"),
     [
         ("{example} --order 9", "order on general motion is 9; a whole number from 1 to 8 is needed"),
@@ -172,7 +173,7 @@ def test_the_command_answers_in_json(capsys):
         ("{example} --order 5 --set a=1", "there is no solution"),
         ("euler --order 3", "kernel euler-rk4-2 has no unknowns"),
         ("missing.py --order 3", "is no file"),
-        ("imu-compensate --order 3", "kernel imu-compensate is no attitude step"),
+        ("euler-product --order 3", "kernel euler-product is no attitude step"),
         ("{example} --order 3 --on sculling", "motion of the attitude step 'sculling' is not known"),
         (
             "{velocity} --order 3 --on coning",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from gathering import each
 
 import strapgen
 from strapgen import vibration
@@ -174,7 +175,7 @@ def test_values_that_are_none_are_refused():
         strapgen.choose(EXAMPLE, constants={"a": [1, 2]})
 
 
-@pytest.mark.parametrize(
+@each(
     ("unknowns", "vector", "reason"),
     [
         ("a = build.parameter('h')", "first + second", "the unknown h has a name that series use themselves"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gathering import each
 
 import strapgen
 from strapgen.backends import blocked_scan
@@ -20,7 +21,7 @@ KERNELS = {
 PLACES = (3, 50)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@each("kernel", KERNELS)
 def test_a_program_has_the_bits_of_its_function(kernel, rng):
     evaluator = strapgen.evaluator(kernel, "numpy")
     shapes = [signal.shape for signal in evaluator.function.inputs]

@@ -400,7 +400,7 @@ def test_methods_without_tableau_agree_in_floating_point(method, algorithm, prev
         assert np.abs(histories[name] - np.array(states)).max() <= roundoff(backend, 200)
 
 
-@pytest.mark.parametrize("method", ["magnus2", "magnus4", "magnus6", "munthe-kaas4"])
+@each("method", ["magnus2", "magnus4", "magnus6", "munthe-kaas4"])
 def test_exponentials_stay_rotations_however_long_the_run(method, rng):
     backend = strapgen.backend("euler", method, 2, "c")
     states = backend.propagate(random_increments(rng, 2000, 2, size=0.5))

@@ -117,7 +117,7 @@ def test_parts_are_of_like_size():
     assert max(sizes) - min(sizes) <= 2 * 16
 
 
-@pytest.mark.parametrize("batch", [(3,), (50, 2), (1,), (0,), ()])
+@each("batch", [(3,), (50, 2), (1,), (0,), ()])
 def test_numpy_evaluates_blocks_as_it_does_samples(monkeypatch, rng, batch):
     backend = strapgen.backend("dcm", backend="numpy")
     state = backend.step(backend.identity, rng.normal(scale=0.3, size=(*batch, 2, 3)))

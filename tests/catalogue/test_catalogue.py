@@ -24,7 +24,7 @@ def test_the_default_is_fourth_order_on_two_increments():
     assert choose("dcm-from-euler").kernel == "dcm-from-euler"
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "named"),
     [
         (("quaternion",), ["algorithm 'quaternion'", "euler", "strapgen list kernels shows all"]),
@@ -108,7 +108,7 @@ def test_signals_are_explained(choice):
             assert ("scalar last" in signal.meaning) == signal.elements[3].endswith("_s")
 
 
-@pytest.mark.parametrize("choice", STANDARD[:12], ids=lambda choice: choice.kernel)
+@each("choice", STANDARD[:12], ids=lambda choice: choice.kernel)
 def test_companions_are_in_the_catalogue_and_fit(choice):
     kernel = derived(choice)
     state = kernel.inputs[0]

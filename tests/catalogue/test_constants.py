@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,9 +17,7 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 
 
-@pytest.mark.parametrize(
-    "value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"]
-)
+@each("value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"])
 def test_a_number_is_exact_in_every_spelling(value):
     assert read({"cycle": value}) == (("cycle", (Fraction(1, 50),)),)
 
@@ -29,7 +28,7 @@ def test_rows_follow_each_other_and_names_are_sorted():
     assert read({"a": [7], "b": np.arange(4.0).reshape(2, 2)}) == rows
 
 
-@pytest.mark.parametrize(
+@each(
     ("constants", "error", "words"),
     [
         ({"cycle": "fast"}, InputError, "constant cycle is 'fast'; a finite number is needed"),

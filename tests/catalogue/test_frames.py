@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from derived import kernel
+from gathering import each
 
 from strapgen.catalogue import KERNELS, VECTORS, Choice, choose
 from strapgen.ir.signals import Signal
@@ -82,7 +83,7 @@ def test_every_vector_states_its_frame_and_a_state_keeps_it():
     assert set(WITHOUT) <= present
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "over"),
     [
         ("imu-compensate", {"increment", "velocity_increment"}),

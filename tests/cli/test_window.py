@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from gathering import each
 
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.windows import WINDOWS
@@ -117,7 +118,7 @@ def test_a_spectrum_shapes_the_filters(run, tmp_path):
     assert "--spectrum psd.csv" in (tmp_path / "low.toml").read_text().splitlines()[0]
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "message"),
     [
         ("--ahead 2 --band 1", "--previous is needed, a number of samples"),
@@ -229,7 +230,7 @@ def test_a_file_is_shown_and_plotted(run, tmp_path):
     assert warned == "wrote picture.svg\n" and "polynomial" in (tmp_path / "picture.svg").read_text()
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "message"),
     [
         ("window", "Missing command. Allowed: design, show"),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen.design.calibration import (
     ACCELERATION,
@@ -119,7 +120,7 @@ def test_combinations_that_leave_no_trace_are_exact(tmp_path):
         one.estimate(file.errors["rate"])
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "said"),
     [
         ("", "positions are missing"),

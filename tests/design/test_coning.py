@@ -324,7 +324,7 @@ def test_one_sample_alone_has_no_coefficients():
         design(ConingBrief(1, 0, "band", BAND))
 
 
-def test_with_all_powers_annulled_nothing_is_left_to_design(shaped):
+def test_with_all_powers_annulled_nothing_is_left_to_design():
     brief = ConingBrief(1, 3, "band", BAND, powers=3)
     assert design(brief).coefficients == annulling(brief.shape)
     assert design(replace(brief, objective="worst", band=None, lines=FLAT)).coefficients == annulling(

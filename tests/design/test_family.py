@@ -124,7 +124,7 @@ def test_a_step_of_two_samples_integrates_what_is_in_its_band():
 
 def test_a_symmetric_window_of_two_samples_is_its_filters():
     # A tap that is off by 1e-30 takes the symmetry away, and with it the sums and differences of samples.
-    brief = replace(SMALL, increments=2, rotation="exact", terms=4)
+    brief = replace(SMALL, increments=2, rotation="exact", terms=2)
     window = replace(design(brief), file="designed here")
     first, *others = window.filters
     uneven = replace(

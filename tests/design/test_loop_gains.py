@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen.catalogue.kernels.loops.level import level_loop
 from strapgen.design import loop_gains
@@ -28,22 +29,17 @@ LOOPS = [(name, order) for name, orders in ORDERS.items() for order in orders]
 
 
 def steady(name, order=None):
-    """Return the states that a step of each input leads to, by the final value theorem, as {state: {input: value}}."""
+    """Return the states that a step of each input leads to, in which nothing changes, as {state: {input: value}}."""
     loop = closed_loop(name, order)
     known = dict(zip(loop.gains, symbolic_gains(name, order), strict=True))
-    response = (s * sp.eye(len(loop.states)) - loop.continuous.subs(known)).LUsolve(
-        loop.disturbance.subs(known)
-    )
+    states = (-loop.continuous.subs(known)).LUsolve(loop.disturbance.subs(known))
     return {
-        state: {
-            driver: sp.simplify(sp.limit(sp.together(response[row, column] / s * s), s, 0))
-            for column, driver in enumerate(loop.inputs)
-        }
+        state: {driver: sp.simplify(states[row, column]) for column, driver in enumerate(loop.inputs)}
         for row, state in enumerate(loop.states)
     }
 
 
-@pytest.mark.parametrize(("name", "order"), LOOPS)
+@each(("name", "order"), LOOPS)
 def test_all_poles_lie_at_the_time_constant(name, order):
     loop = closed_loop(name, order)
     matrix = loop.continuous.subs(dict(zip(loop.gains, symbolic_gains(name, order), strict=True)))
@@ -81,7 +77,7 @@ def test_gains_are_those_of_the_source():
     assert gains("level", Fraction(15), 2)[2] == 0
 
 
-@pytest.mark.parametrize(("name", "order"), LOOPS)
+@each(("name", "order"), LOOPS)
 def test_a_cycle_leaves_the_steady_state_as_it_is(name, order):
     loop = closed_loop(name, order)
     held = loop.continuous.LUsolve(loop.disturbance)
@@ -108,7 +104,7 @@ def test_between_the_calls_the_tilt_splits_the_poles_of_levelling():
         assert abs(poles[0]) < 1
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "order", "limit"),
     [("level", 3, "2/3"), ("erection", 2, "1"), ("heading", 2, "2"), ("vertical", 3, "2")],
 )

@@ -61,6 +61,11 @@ def test_numbers_above_eigenvalues_are_above_them():
     matrix = flint.fmpq_mat([[0, 3], [3, 0]])
     assert 3 < eigenvalues._above(matrix) < 3 + 1e-6
     assert eigenvalues._above(flint.fmpq_mat(3, 3)) > 0
+    third = flint.fmpq_mat([[flint.fmpq(1, 3)]])
+    assert Fraction(1, 3) < Fraction(eigenvalues._above(third)) < Fraction(1, 3) + Fraction(1, 10**6)
+    for one, eigenvalue in ((third, flint.fmpq(1, 3)), (matrix, flint.fmpq(3))):
+        tiny = flint.fmpq(1, 10**20)
+        assert eigenvalues._exceeds(eigenvalue + tiny, one) and not eigenvalues._exceeds(eigenvalue, one)
 
 
 def test_what_is_curved_in_a_box_counts():

@@ -122,7 +122,9 @@ RIGHT = {
         ),
     ],
 )
-def test_a_fault_is_found(fault, fails, says, tmp_path):
+def test_a_fault_is_found(fault, fails, says, tmp_path, monkeypatch):
+    if fails:  # back ends compute what is derived, be it right or wrong
+        monkeypatch.setattr(conformance, "_back_ends", lambda *_: [])
     path = tmp_path / "two_sample.py"
     path.write_text(STEP.format(**(RIGHT | fault)))
     found = findings(choose(str(path)))

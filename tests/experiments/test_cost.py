@@ -6,6 +6,7 @@ import json
 import shutil
 
 import pytest
+from gathering import each
 
 from strapgen import pipeline
 from strapgen.cli import main
@@ -76,7 +77,7 @@ def test_the_command_prints_what_was_agreed(capsys):
         assert row["executed"] is None or row["executed"] > 20
 
 
-@pytest.mark.parametrize(
+@each(
     ("words", "said"),
     [
         ("", "a kernel is needed, or --all"),

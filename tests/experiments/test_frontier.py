@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from gathering import each
 
 from strapgen.catalogue import METHODS
 from strapgen.experiments import frontier
@@ -47,7 +48,7 @@ def test_names_stand_for_candidates():
     assert file.choice.increments == 3
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "words"),
     [
         ("rk5", "method 'rk5' is not known"),

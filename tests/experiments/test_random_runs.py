@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen import catalogue
 from strapgen.cli import main
@@ -33,7 +34,7 @@ def test_the_closed_forms_lie_in_the_interval_of_many_runs(method, increments, p
 
 
 def test_runs_in_parts_are_the_runs_in_one_piece(monkeypatch):
-    choice = catalogue.choose_step("euler", "coning-combined", 3, previous=2)
+    choice = catalogue.choose_step("euler", "coning-compressed", 3, previous=2)
     runs = SteadyRuns(choice, replace(PULSES, noise=1e-5), 40, 5)
     whole = outcome(runs)
     monkeypatch.setattr(experiment, "_DRAWN", 5 * 3 * 3 * 40)
@@ -76,7 +77,7 @@ def test_ten_thousand_runs_of_more_steps_than_are_drawn_at_a_time(capsys):
     assert drifts[0] == drifts[1]
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "said"),
     [
         ("--runs 0", "runs is 0"),

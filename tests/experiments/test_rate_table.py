@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.experiments.rate_table import MOTIONS, angles, stress
 from strapgen.ir.fixed_settings import Settings
@@ -65,7 +66,7 @@ def test_two_speeds():
     assert "oscillating; pitch up to" in text
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "says"),
     [
         ({"duration": 0}, "duration is 0"),

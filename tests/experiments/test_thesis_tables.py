@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gathering import each
 from tolerances import roundoff
 
 import strapgen
@@ -100,10 +101,12 @@ def test_every_repair_of_the_scan_is_disclosed():
         (5, ".23e-6"): ".23e-?",
     }
     for table in TABLES:
-        for each in table.repairs:
-            if each.algorithm:
-                assert table.printed[each.algorithm][ORDERS.index(each.order)] == each.figure
-    motions = {table.number: [each.scan for each in table.repairs if not each.algorithm] for table in TABLES}
+        for repair in table.repairs:
+            if repair.algorithm:
+                assert table.printed[repair.algorithm][ORDERS.index(repair.order)] == repair.figure
+    motions = {
+        table.number: [repair.scan for repair in table.repairs if not repair.algorithm] for table in TABLES
+    }
     assert motions == {1: [], 2: [], 3: [], 4: ["b = .1", "-a sin bt"], 5: ["-a sin bt"]}
 
 
@@ -166,7 +169,7 @@ def test_records_between_orthonormalizations_do_not_come_out(table, base):
     assert not -5e-4 <= drift - float(table.base) < 1e-3
 
 
-@pytest.mark.parametrize(
+@each(
     ("value", "printed", "same"),
     [
         (0.4356, ".44", True),

@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 import pytest
+from gathering import each
 
 from strapgen.experiments import word_length
 from strapgen.experiments.word_length import cases, run, run_case
@@ -116,7 +117,7 @@ def test_image(outcomes):
         plots.word_length_image(outcomes, "study.xyz")
 
 
-@pytest.mark.parametrize(
+@each(
     ("values", "said"),
     [
         ({"words": ()}, "the study has 0 cases"),

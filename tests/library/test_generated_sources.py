@@ -43,10 +43,11 @@ def test_sources_are_those_of_the_pipeline():
 
 def test_what_a_user_does_to_the_files_changes_no_sources_of_others():
     sources = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
-    (name,) = sources.files
-    text = sources.files.pop(name)
+    files, operations = {**sources.files}, {**sources.operations}
+    sources.files.clear()
+    sources.operations.clear()
     again = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
-    assert again.files == {name: text}
+    assert (again.files, again.operations) == (files, operations) and files and operations
 
 
 def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):

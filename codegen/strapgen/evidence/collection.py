@@ -55,12 +55,12 @@ def collect(subjects: Sequence[Subject], folder: Path, tools: Sequence[str] = ()
         checks.choice("tool", tool, CHECKS)
     for subject in subjects:
         subject.sources  # noqa: B018 - one line of refusal before any work, and once for all processes
+    each = [(tool, subject, folder / subject.name) for tool in tools or CHECKS for subject in subjects]
+    if len(each) == 1:  # it needs no other process
+        yield _examined(*each[0])
+        return
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), end_with_parent) as pool:
-        tasks = [
-            pool.submit(_examined, tool, subject, folder / subject.name)
-            for tool in tools or CHECKS
-            for subject in subjects
-        ]
+        tasks = [pool.submit(_examined, *task) for task in each]
         try:
             for task in as_completed(tasks):
                 yield task.result()

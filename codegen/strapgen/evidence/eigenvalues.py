@@ -141,22 +141,30 @@ def _least_square(box: _Box) -> Fraction:
 def _largest_eigenvalue(matrix: Any) -> float:
     """Return about the largest eigenvalue of a matrix."""
     rows = [[int(x.p) / int(x.q) for x in row] for row in matrix.tolist()]
+    if len(rows) == 1:
+        return rows[0][0]
     return float(np.linalg.eigvalsh(np.array(rows)).max())
 
 
 def _above(matrix: Any) -> float:
-    """Return a number that is above all eigenvalues: what they lack of it has positive leading minors."""
+    """Return a number that is above all eigenvalues."""
+    about = _largest_eigenvalue(matrix)
+    margin = 1e-9 * abs(about) + 1e-30
+    while not _exceeds(exact(Fraction(about + margin)), matrix):
+        margin *= 16
+    return about + margin
+
+
+def _exceeds(number: Any, matrix: Any) -> bool:
+    """Tell whether a number is above all eigenvalues: what they lack of it has positive leading minors."""
     from flint import fmpq_mat
 
-    size, about = matrix.nrows(), _largest_eigenvalue(matrix)
-    margin = 1e-9 * abs(about) + 1e-30
-    while True:
-        unit = [[exact(Fraction(about + margin)) * (i == j) for j in range(size)] for i in range(size)]
-        lack = (fmpq_mat(unit) - matrix).tolist()
-        minors = (fmpq_mat([row[:k] for row in lack[:k]]).det() for k in range(1, size + 1))
-        if all(minor > 0 for minor in minors):
-            return about + margin
-        margin *= 16
+    size = matrix.nrows()
+    if size == 1:
+        return bool(number > matrix[0, 0])
+    lack = (fmpq_mat([[number * (i == j) for j in range(size)] for i in range(size)]) - matrix).tolist()
+    minors = (fmpq_mat([row[:k] for row in lack[:k]]).det() for k in range(1, size + 1))
+    return all(minor > 0 for minor in minors)
 
 
 def _rounded_up(number: Any) -> float:

@@ -287,14 +287,7 @@ def frontier(
     InputError
         If a number is not allowed, or the file holds another study.
     """
-    rate = checks.number("sample_hz", sample_hz, positive=True)
-    length = checks.number("duration", duration, positive=True)
-    for candidate in several:
-        if length * rate < candidate.increments:
-            raise InputError(
-                f"duration {float(length):g} s is shorter than a step of {candidate.name} at {float(rate):g} Hz"
-            )
-    checks.multiple("duration", length, "sampling interval", 1 / rate)
+    rate, length = require_steps(several, sample_hz, duration)
     for name, settings in motions.values():
         any_motion(name, str(length), settings)  # refuses what is not known
     cases = {one.name: Trial(one, str(rate), str(length), motions) for one in several}
@@ -308,6 +301,31 @@ def frontier(
         finished = resume(run_trial, cases, results, about, jobs, cluster, files)
     for _, data in finished:
         yield Standing(**data)
+
+
+def require_steps(several: Sequence[Candidate], sample_hz: str, duration: str) -> tuple[Fraction, Fraction]:
+    """Return the sampling rate and the duration as numbers, in which every algorithm has a whole step.
+
+    Parameters
+    ----------
+    several : sequence of Candidate
+    sample_hz, duration : str
+        As for `frontier`.
+
+    Raises
+    ------
+    InputError
+        If one is not allowed, or a step is longer than the duration.
+    """
+    rate = checks.number("sample_hz", sample_hz, positive=True)
+    length = checks.number("duration", duration, positive=True)
+    for candidate in several:
+        if length * rate < candidate.increments:
+            raise InputError(
+                f"duration {float(length):g} s is shorter than a step of {candidate.name} at {float(rate):g} Hz"
+            )
+    checks.multiple("duration", length, "sampling interval", 1 / rate)
+    return rate, length
 
 
 def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> list[Standing]:

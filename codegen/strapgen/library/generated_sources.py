@@ -39,14 +39,15 @@ _MOST_ENTRIES = 256
 def _remembered(key: str, what: str, read: Callable[[], T]) -> T:
     """Return the content of an entry, which a process checks and reads once; the log has every use."""
     place = cache.root(), key
-    if place in _entries:
-        from_cache(what)
-        content: T = _entries.pop(place)
-    else:
+    content: T | None = _entries.pop(place, None)
+    if content is None:
         content = cache.persistently(read)
+    else:
+        from_cache(what)
     _entries[place] = content  # the last one now
     if len(_entries) > _MOST_ENTRIES:
-        del _entries[next(iter(_entries))]
+        oldest, *_ = tuple(_entries)  # at once, as other threads may add some
+        _entries.pop(oldest, None)
     return content
 
 
@@ -198,4 +199,5 @@ def sources(
         return Sources.restore(interface, files)
 
     known = _remembered(key, what, read)
-    return replace(known, files=dict(known.files))  # which a user may change
+    # A user may change what can be changed.
+    return replace(known, files={**known.files}, operations={**known.operations})

@@ -32,6 +32,10 @@ Covariant = tuple[int, ...]
 Coefficients = dict[Covariant, Polynomial]
 
 _Degree = tuple[int, ...]
+#: Yields the covariants that may stand at a degree, each with its elements and the degree left for its products.
+_Ansatz = Callable[[_Degree], Iterator[tuple[Covariant, list[Any], _Degree]]]
+#: Covariants with products, and by each monomial of each element the coefficients that it has in them.
+_Products = tuple[list[tuple[Covariant, Monomial]], dict[Any, dict[int, Any]]]
 
 #: The unit matrix as the elements xx, xy, xz, yy, yz, zz.
 _UNIT = [1, 0, 0, 1, 0, 1]
@@ -116,6 +120,7 @@ class Frame:
         self.vectors = [[next(coordinates) for _ in range(n)] + [self.ring.zero] * (3 - n) for n in lengths]
         self._owner = [k for k, n in enumerate(lengths) for _ in range(n)]
         self._values: dict[Monomial, Any] = {(): self.ring.one}
+        self._known: dict[tuple[str, _Degree], _Products] = {}
 
     def quaternion(self, vector: list[Any], scalar: Any) -> Decomposition:
         """Decompose a quaternion.
@@ -167,34 +172,29 @@ class Frame:
                 yield (i,), u[i], _less(degree, i)
         else:
             for i, j in itertools.combinations(range(self.count), 2):
-                yield (i, j), cross_elements(u[i], u[j]), _less(degree, i, j)
+                if min(rest := _less(degree, i, j)) >= 0:
+                    yield (i, j), cross_elements(u[i], u[j]), rest
 
     def _symmetrics(self, degree: _Degree) -> Iterator[tuple[Covariant, list[Any], _Degree]]:
         # Products with the first vector come first, so that they are preferred where several sums are equal.
+        # What a degree has no room for needs no product.
         u = self.vectors
         for i in range(self.count):
             if sum(degree) % 2:
                 for j, k in itertools.combinations(range(self.count), 2):
-                    yield (i, j, k), _symmetrized(u[i], cross_elements(u[j], u[k])), _less(degree, i, j, k)
+                    if min(rest := _less(degree, i, j, k)) >= 0:
+                        yield (i, j, k), _symmetrized(u[i], cross_elements(u[j], u[k])), rest
             else:
                 for j in range(i, self.count):
-                    yield (i, j), _symmetrized(u[i], u[j]), _less(degree, i, j)
+                    if min(rest := _less(degree, i, j)) >= 0:
+                        yield (i, j), _symmetrized(u[i], u[j]), rest
         yield (), [self.ring(number) for number in _UNIT], degree
 
-    def _solve(
-        self, elements: list[Any], ansatz: Callable[[_Degree], Iterator[tuple[Covariant, list[Any], _Degree]]]
-    ) -> Coefficients:
+    def _solve(self, elements: list[Any], ansatz: _Ansatz) -> Coefficients:
         solved: Coefficients = {}
         for degree, target in self._by_degree(elements).items():
-            labels: list[tuple[Covariant, Monomial]] = []
-            rows: dict[Any, dict[int, Any]] = {}
-            for covariant, parts, rest in ansatz(degree):
-                for monomial in invariants(rest, triple=not covariant):
-                    value = self._value(monomial)
-                    for k, part in enumerate(parts):
-                        for place, coefficient in (part * value).terms():
-                            rows.setdefault((k, place), {})[len(labels)] = coefficient
-                    labels.append((covariant, monomial))
+            labels, known = self._products(ansatz, degree)
+            rows = {place: {**row} for place, row in known.items()}
             for place, coefficient in target.items():
                 rows.setdefault(place, {})[len(labels)] = coefficient
             system = dict(enumerate(rows.values()))
@@ -209,6 +209,21 @@ class Frame:
                     value = Fraction(int(coefficient.numerator), int(coefficient.denominator))
                     solved.setdefault(covariant, {})[monomial] = value
         return solved
+
+    def _products(self, ansatz: _Ansatz, degree: _Degree) -> _Products:
+        """Return all products of a degree, and what each adds to every monomial of every element."""
+        if (ansatz.__name__, degree) not in self._known:
+            labels: list[tuple[Covariant, Monomial]] = []
+            rows: dict[Any, dict[int, Any]] = {}
+            for covariant, parts, rest in ansatz(degree):
+                for monomial in invariants(rest, triple=not covariant):
+                    value = self._value(monomial)
+                    for k, part in enumerate(parts):
+                        for place, coefficient in (part * value).terms():
+                            rows.setdefault((k, place), {})[len(labels)] = coefficient
+                    labels.append((covariant, monomial))
+            self._known[ansatz.__name__, degree] = labels, rows
+        return self._known[ansatz.__name__, degree]
 
     def _by_degree(self, elements: list[Any]) -> dict[_Degree, dict[Any, Any]]:
         parts: dict[_Degree, dict[Any, Any]] = {}

@@ -56,7 +56,7 @@ def test_increments_come_in_the_order_of_time_and_those_beside_the_step_count_fr
     assert (f"the last {ahead} are those after the step" in signal.meaning) == bool(ahead)
 
 
-@pytest.mark.parametrize(
+@each(
     ("node", "expected"),
     [
         (Fraction(0), "0"),
@@ -88,7 +88,7 @@ def test_nodes_that_are_nearly_the_same_are_told_apart():
         assert any("0_1235_2" in name for name in elements) and len(elements) == len(set(elements))
 
 
-@pytest.mark.parametrize("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
+@each("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
 def test_nodes_of_every_method_have_names_of_their_own(name):
     kernel = derive("euler", name, rates=True)
     signals = [*kernel.inputs, *(stage.signal for stage in kernel.stages)]
@@ -109,7 +109,7 @@ def test_a_signal_of_rates_lists_its_nodes():
 # Orders
 
 
-@pytest.mark.parametrize(
+@each(
     ("order", "text", "limited"),
     [
         (Order(6, 6, 3, 4), "method order 6, rate extraction order 3: the step is of order 4", True),
@@ -171,7 +171,7 @@ def test_a_note_says_where_samples_limit_the_order_and_only_there(algorithm):
 # Names and commands
 
 
-@pytest.mark.parametrize(
+@each(
     ("chosen", "name", "arguments"),
     [
         (("dcm", "rk4", 2), "dcm-rk4-2", "dcm --method rk4 --increments 2"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen.catalogue.kernels import gyro_model
 from strapgen.catalogue.kernels.gyro_model import (
@@ -76,7 +77,7 @@ def entry(letter, text):
     return sp.S.Zero if text == "0" else sign * factor * symbol(f"{letter}_{label}")
 
 
-@pytest.mark.parametrize("letter", FIGURE_20)
+@each("letter", FIGURE_20)
 def test_the_matrix_is_that_of_figure_20(letter):
     rows = [[entry(letter, text) for text in row.split()] for row in FIGURE_20[letter].split(";")]
     assert source_structure().matrices[letter] == sp.Matrix(rows)

@@ -47,7 +47,7 @@ def fractions(text: str) -> list[Fraction]:
 # Coefficients
 
 
-@pytest.mark.parametrize(
+@each(
     ("samples", "previous", "form", "published"),
     [
         # R. B. Miller 1983 and, for more samples, tables in use (Yan Gongmin's PSINS among others).
@@ -74,7 +74,7 @@ def test_pairs_are_ordered_by_the_newer_sample_the_newest_pair_last(samples, pre
     assert pairs == ([pair for pair in every if pair[1] == total - 1] if form == "compressed" else every)
 
 
-@pytest.mark.parametrize("samples", range(2, MOST_INCREMENTS + 1))
+@each("samples", range(2, MOST_INCREMENTS + 1))
 def test_compressed_coefficients_leave_what_the_literature_says(samples):
     # N N! / (2^(N+1) (1 3 ... (2N+1))) alpha^2 lambda^(2N+1) in a slow cycle.
     found = design(samples).residual().leading

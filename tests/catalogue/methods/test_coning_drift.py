@@ -8,6 +8,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.catalogue.methods import coning_coefficients, coning_drift
 from strapgen.catalogue.methods.coning_drift import ConingShape
@@ -48,7 +49,16 @@ def test_the_drift_is_that_of_cross_products_of_samples(shape, b):
         assert float(value) == pytest.approx(computed - true, abs=1e-14)
 
 
-@pytest.mark.parametrize(("samples", "previous"), [(1, 1), (1, 5), (4, 0), (3, 3)])
+def test_the_largest_drift_of_a_band_is_that_of_its_frequencies_through_the_gyro():
+    shape = ConingShape(1, 2, GYRO)
+    coefficients = [Fraction(1, 7), Fraction(-1, 30), Fraction(1, 90)][: shape.unknowns]
+    values = coning_drift.errors(shape, coefficients, np.linspace(0, 1, 301)[1:].tolist())
+    # Between 300 frequencies a peak is higher by the square of 1/600, times half of what bends it, at most 10.
+    expected = float(max(map(abs, values)))
+    assert coning_drift.largest(shape, coefficients, Fraction(1)) == pytest.approx(expected, rel=3e-5)
+
+
+@each(("samples", "previous"), [(1, 1), (1, 5), (4, 0), (3, 3)])
 def test_compressed_coefficients_annul_every_power_and_have_their_published_drift(samples, previous):
     design = coning_coefficients.design(samples, previous)
     newest = samples + previous - 1

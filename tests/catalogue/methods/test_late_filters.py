@@ -6,6 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from gathering import each
 
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.late_filters import NEXT, SHORT, LateFilters, polynomial, short_place
@@ -35,7 +36,7 @@ def test_memory_holds_a_window_with_a_gap(name, capacity, most):
     assert (filters.capacity, filters.most_commits) == (capacity, most)
 
 
-@pytest.mark.parametrize("count", range(1, SHORT + 1))
+@each("count", range(1, SHORT + 1))
 def test_few_samples_have_the_polynomial_through_them(count):
     filters = LateFilters(WINDOW)
     for place in range(count):

@@ -65,14 +65,14 @@ def test_k_increments_are_exact_on_rates_of_degree_k_minus_1(coefficients, node,
     assert extracted(coefficients, len(coefficients), node, h) == rate(coefficients, node * h)
 
 
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+@each("count", range(1, MOST_INCREMENTS + 1))
 def test_every_count_is_exact_at_the_nodes_of_the_methods(count):
     coefficients = [Fraction((-1) ** k * (k + 2), k + 1) for k in range(count)]
     for node in (Fraction(0), Fraction(1, 2), Fraction(1)):
         assert extracted(coefficients, count, node, Fraction(1, 8)) == rate(coefficients, node / 8)
 
 
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+@each("count", range(1, MOST_INCREMENTS + 1))
 def test_an_irrational_node_is_exact_too(count):
     node = sp.Rational(1, 2) + sp.sqrt(21) / 14
     coefficients = [sp.Rational((-1) ** k * (k + 2), k + 1) for k in range(count)]
@@ -85,7 +85,7 @@ def test_an_irrational_node_is_exact_too(count):
     assert sp.expand(found - sum(c * node**k for k, c in enumerate(coefficients))) == 0
 
 
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
+@each("count", range(1, MOST_INCREMENTS + 1))
 def test_k_increments_are_not_exact_on_degree_k(count):
     # At a sample the derivative of the interpolation's remainder is not zero.
     coefficients = [Fraction(0)] * count + [Fraction(1)]
@@ -249,7 +249,7 @@ def test_the_step_order_is_that_of_the_exact_rotation_of_the_fitted_rate(count, 
         assert lowest_difference(found, true_rotation("euler", true, order + 1)) == order + 1
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
+@each(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
 def test_a_rate_of_the_fit_s_degree_is_followed_exactly(count, previous):
     true = generic_rate(count + previous - 1)
     found = rotation("dcm", fitted_rate(true, count, previous, 7), 7)

@@ -6,6 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from gathering import each
 
 import strapgen
 from strapgen import choose, derive
@@ -110,7 +111,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
+@each("case", WRONG)
 def test_a_wrong_file_gets_one_line(case, text, tmp_path):
     old, new, words = WRONG[case]
     path = tmp_path / "wrong.toml"
@@ -122,7 +123,7 @@ def test_a_wrong_file_gets_one_line(case, text, tmp_path):
     assert str(refused.value).startswith(f"{path}: ") and "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
+@each(
     ("options", "words"),
     [
         ({"increments": 2}, "increments is 2; a step of coning-shaped-8 has 1"),

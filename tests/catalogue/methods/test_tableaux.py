@@ -255,7 +255,7 @@ def test_what_is_wrong_is_told_in_one_line(said, written):
     assert "\n" not in message and len(message) < 250
 
 
-@pytest.mark.parametrize(
+@each(
     ("content", "said"),
     [
         (b"name = ", "mine.toml is not TOML (Invalid value"),

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shlex
 import tomllib
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
+import session_library
 import sympy as sp
+from gathering import each
 
 from strapgen.catalogue.methods import order_conditions, tableaux, unknown_tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
@@ -34,8 +37,15 @@ def three():
 
 @pytest.fixture(scope="module")
 def four():
-    unknown = unknown_tableau.read(EXAMPLES / "kutta4.toml")
-    return unknown, unknown.solve()
+    """Kutta's methods, which one process of the session solves for."""
+    file = EXAMPLES / "kutta4.toml"
+    unknown = unknown_tableau.read(file)
+
+    def fill(folder: Path) -> None:
+        (folder / "solution.pickle").write_bytes(pickle.dumps(unknown.solve()))
+
+    folder = session_library.folder("families", [file.read_text()], fill)
+    return unknown, pickle.loads((folder / "solution.pickle").read_bytes())
 
 
 def coefficients(method: tableaux.Tableau) -> dict[str, sp.Expr]:
@@ -191,7 +201,7 @@ def test_a_member_is_a_file_for_other_commands(capsys, tmp_path):
     assert "euler-three-stages" in says(f"derive euler --tableau {file} --format json", capsys)
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "reason"),
     [
         ({"unknowns": []}, "unknowns is empty"),
@@ -218,7 +228,7 @@ def test_a_bad_file_gets_one_line(change, reason):
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "reason"),
     [
         ("tableau {heun} --set c4=1", "unknown 'c4' is not known; allowed: c2, c3"),

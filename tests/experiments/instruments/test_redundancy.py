@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.cli import main
 from strapgen.experiments.instruments.redundancy import SensorErrors
@@ -89,7 +90,7 @@ def test_a_geometry_becomes_code_and_tables(tmp_path, monkeypatch, capsys):
     assert "no failure is isolated, whichever sensors fail; one more is detected" in said
 
 
-@pytest.mark.parametrize(
+@each(
     ("command", "reason"),
     [
         ("redundancy flat.toml", "flat.toml: all axes lie in one plane"),

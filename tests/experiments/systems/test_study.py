@@ -40,10 +40,14 @@ def test_rates_and_attitudes_of_the_vehicle_belong_together(shaken):
 
 
 def test_increments_repeat_with_the_motion(shaken):
-    angle, velocity = shaken.increments(0.1, 1300)
-    assert (angle[1200:] == angle[:100]).all()
-    assert (velocity[1200:] == velocity[:100]).all()
-    assert np.allclose(shaken.attitude(np.array([120.25])), shaken.attitude(np.array([0.25])), atol=1e-9)
+    for increments in TurningVehicle(math.radians(45), math.radians(70)).increments(0.1, 1300):
+        assert (increments[1200:] == increments[:100]).all()
+    first, again = np.array([0.25, 0.5]), np.array([120.25, 120.5])
+    assert np.allclose(shaken.attitude(again), shaken.attitude(first), atol=1e-9)
+    # Phases of up to 461 Hz are 3.5e5 rad after two minutes, and rounded to 8e-11; accelerations add up to less than
+    # 1000 m/s^2.
+    for one, other in zip(shaken.measured(again), shaken.measured(first), strict=True):
+        assert np.allclose(one, other, rtol=0, atol=1e-7)
 
 
 def test_increments_are_those_of_half_the_cycle_added(shaken):

@@ -85,11 +85,12 @@ def gyro_errors(number: int, W: sp.Matrix, A: sp.Matrix, unbalance: sp.Expr) -> 
     """
     symbols = parameters(number)
     none = dict.fromkeys(PARAMETERS, sp.S.Zero)
+    exact = gyro_torques(W, A, unbalance, none)
     result = sp.zeros(2, 1)
     for name, symbol in symbols.items():
         # Only one parameter at a time, so that products of two of them do not appear.
         one = gyro_torques(W, A, unbalance, none | {name: symbol})
-        result += (one - gyro_torques(W, A, unbalance, none)).applyfunc(sp.expand)
+        result += (one - exact).applyfunc(sp.expand)
     return result
 
 

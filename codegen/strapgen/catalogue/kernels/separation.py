@@ -194,13 +194,21 @@ def _covariance(gyros: tuple[TwoAxisGyro, ...], sign: int) -> sp.ImmutableMatrix
     angle of the torquers about it cancels.
     """
     gram = _gram(gyros, sign)
-    if sp.simplify(gram.det(method="berkowitz")) == 0:
+    if _vanishes(sp.expand(gram.det(method="berkowitz"))):
         motion = [sp.simplify(element) for element in gram.nullspace(simplify=True)[0]]
         raise InputError(
             f"the layout is singular: no torquer measures the rate {tuple(motion[:3])} together with the acceleration "
             f"{tuple(motion[3:])}; unbalances are {', '.join(str(gyro.unbalance) for gyro in gyros)}"
         )
     return gram.inv().applyfunc(sp.simplify).as_immutable()
+
+
+def _vanishes(expanded: sp.Expr) -> bool:
+    """Tell whether an expression is 0: a polynomial with rational coefficients is not, if it has terms."""
+    symbols = sorted(expanded.free_symbols, key=str)
+    if symbols and expanded.is_polynomial() and sp.Poly(expanded, *symbols).domain in (sp.ZZ, sp.QQ):
+        return False
+    return bool(sp.simplify(expanded) == 0)
 
 
 def _gram(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:

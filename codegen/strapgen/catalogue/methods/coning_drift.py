@@ -9,8 +9,9 @@ alpha^2 E / (N T) with
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from math import factorial
 from typing import Any, NamedTuple
 
@@ -171,9 +172,8 @@ def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction
     >>> f"{largest(ConingShape(1, 1), [Fraction(1, 12)], Fraction(1)):.3e}"
     '1.479e-02'
     """
-    beta = _REAL.mpf(band.numerator) / band.denominator
-    points = [beta * _REAL.sin(_REAL.pi * k / (2 * _POINTS)) for k in range(1, _POINTS + 1)]
-    values = [abs(value) for value in errors(shape, coefficients, points)]
+    points, rows = _search(shape, band)
+    values = [abs(value) for value in _sums(coefficients, rows)]
     peaks = [values[-1]]
     for k in range(1, _POINTS - 1):
         if values[k] >= max(values[k - 1], values[k + 1]):
@@ -186,6 +186,14 @@ def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction
             slope = y0 / x0 - curvature * x0
             peaks.append(values[k] - (slope * slope / (4 * curvature) if curvature else 0))
     return float(max(peaks))
+
+
+@lru_cache(maxsize=2)
+def _search(shape: ConingShape, band: Fraction) -> tuple[list[Any], list[tuple[list[Any], Any]]]:
+    """Return the frequencies at which the largest drift of a band is searched, and the terms at each."""
+    beta = _REAL.mpf(band.numerator) / band.denominator
+    points = [beta * _REAL.sin(_REAL.pi * k / (2 * _POINTS)) for k in range(1, _POINTS + 1)]
+    return points, [terms(shape, b, _REAL) for b in points]
 
 
 def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequence[Any]) -> list[Any]:
@@ -209,9 +217,10 @@ def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequenc
     >>> [f"{float(value):.3e}" for value in errors(ConingShape(1, 1), [Fraction(1, 12)], [0.1, 0.2])]
     ['-1.665e-07', '-5.308e-06']
     """
+    return _sums(coefficients, (terms(shape, _REAL.mpf(b), _REAL) for b in points))
+
+
+def _sums(coefficients: Sequence[Fraction], rows: Iterable[tuple[list[Any], Any]]) -> list[Any]:
+    """Return the sums of coefficients times columns, without the right sides."""
     weights = [_REAL.mpf(c.numerator) / c.denominator for c in coefficients]
-    result = []
-    for b in points:
-        columns, right = terms(shape, _REAL.mpf(b), _REAL)
-        result.append(_REAL.fdot(zip(weights, columns, strict=True)) - right)
-    return result
+    return [_REAL.fdot(zip(weights, columns, strict=True)) - right for columns, right in rows]

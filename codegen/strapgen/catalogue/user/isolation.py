@@ -20,6 +20,7 @@ from importlib.machinery import ExtensionFileLoader, ModuleSpec, PathFinder, Sou
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from strapgen.support.cache import digest
 from strapgen.support.resources import PACKAGE
@@ -128,8 +129,22 @@ def _is_installed(path: str) -> bool:
     return path.startswith(_roots()) or os.path.realpath(path).startswith(_roots())
 
 
-def _place(module: ModuleType | None) -> str:
-    """Return the file or the folder of a module; "" for a built-in one."""
+#: The places of modules with whether they belong to an installed package: a module stays where it was loaded from.
+_places: WeakKeyDictionary[ModuleType, tuple[str, bool]] = WeakKeyDictionary()
+
+
+def _place(module: ModuleType | None) -> tuple[str, bool]:
+    """Return the file or the folder of a module, "" for a built-in one, and whether it is installed."""
+    if type(module) is not ModuleType:  # it may answer anything, and differently each time
+        place = _file_or_folder(module)
+        return place, _is_installed(place)
+    if module not in _places:
+        place = _file_or_folder(module)
+        _places[module] = place, _is_installed(place)
+    return _places[module]
+
+
+def _file_or_folder(module: ModuleType | None) -> str:
     file = getattr(module, "__file__", None)
     if file:
         return str(file)
@@ -279,8 +294,8 @@ def _is_users(name: str, module: ModuleType | None, anew: tuple[str, ...]) -> bo
         name.startswith("strapgen_") and _is_compiled(module)
     ):
         return False  # the last ones are generated C
-    place = _place(module)
-    return bool(place) and (top in anew or not _is_installed(place))
+    place, is_installed = _place(module)
+    return bool(place) and (top in anew or not is_installed)
 
 
 def _removable(modules: dict[str, ModuleType], anew: tuple[str, ...], record: Record) -> list[str]:
@@ -297,7 +312,7 @@ def _put_back(before: dict[str, ModuleType], anew: tuple[str, ...], record: Reco
     for name, module in list(sys.modules.items()):
         if before.get(name) is module:
             continue
-        place = _place(module)
+        place, _ = _place(module)
         if place and not Path(place).exists():
             record.outside = f"imports {name} from an archive"
         if _is_users(name, module, anew):  # versions tell of all others

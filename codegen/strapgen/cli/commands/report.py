@@ -187,8 +187,9 @@ def _page(
         gathering.DossierCase(choice, conditions, fixed.settings(choice.increments_per_step), places)
         for choice in shown
     ]
-    known = [*track(gathering.dossiers(cases), "gathering", len(cases))]
     several = gathering.compared(shown, beside)
+    frontier.require_steps(several, conditions.sample_hz, conditions.duration)  # before what takes long
+    known = [*track(gathering.dossiers(cases), "gathering", len(cases))]
     standings = [*track(gathering.standings(several, conditions), "comparing", len(several))]
     tables = gathering.tables(shown, places)
     content = Content(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,7 +95,12 @@ class TurningVehicle:
 
     def attitude(self, time: Array) -> Array:
         """Return C_b^n at some times, (..., 3, 3); axes n are east, north, up."""
-        (sr, cr), (sp, cp), (sh, ch) = ((np.sin(a), np.cos(a)) for a in self._angles(np.asarray(time, float)))
+        return self._turned([(np.sin(a), np.cos(a)) for a in self._angles(np.asarray(time, float))])
+
+    @staticmethod
+    def _turned(angles: Sequence[tuple[Array, Array]]) -> Array:
+        """Return C_b^n from the sines and cosines of roll, pitch and heading."""
+        (sr, cr), (sp, cp), (sh, ch) = angles
         rows = [
             [cp * ch, sr * sp * ch - cr * sh, cr * sp * ch + sr * sh],
             [cp * sh, sr * sp * sh + cr * ch, cr * sp * sh - sr * ch],
@@ -106,9 +111,9 @@ class TurningVehicle:
 
     def measured(self, time: Array) -> tuple[Array, Array]:
         """Return body rate in rad/s and specific force in m/s^2 at some times, body axes, (..., 3)."""
-        roll, pitch, _ = self._angles(time)
+        angles = [(np.sin(a), np.cos(a)) for a in self._angles(time)]
         roll_rate, pitch_rate, turn_rate = self._angles(time, 1)
-        sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+        (sr, cr), (sp, cp), _ = angles
         rate = np.stack(
             [
                 roll_rate - turn_rate * sp,
@@ -117,7 +122,7 @@ class TurningVehicle:
             ],
             axis=-1,
         )
-        attitude = self.attitude(time)
+        attitude = self._turned(angles)
         force = attitude[..., 2, :] * self.gravity
         zero = np.zeros_like(time)
         shaken = [self._channel(f"velocity_{axis}", time, 1) for axis in "xy"]
