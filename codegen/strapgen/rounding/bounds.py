@@ -144,6 +144,23 @@ def rounding_bounds(
     )
 
 
+def bounds_of_text(program: Program, number: str) -> RoundingBounds:
+    """Return the bounds that generated text states, which the languages with a type of numbers have in common.
+
+    Parameters
+    ----------
+    program : Program
+    number : str
+        Type of the numbers: "double" or "float".
+    """
+    return _in_common(program, number) if _has_numpy() else rounding_bounds(program, number)
+
+
+@lru_cache(maxsize=64)
+def _in_common(program: Program, number: str) -> RoundingBounds:
+    return rounding_bounds(program, number)
+
+
 def _has_numpy() -> bool:
     try:
         import numpy  # noqa: F401

@@ -11,7 +11,7 @@ from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, names_in, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
-from strapgen.rounding import rounding_bounds
+from strapgen.rounding import bounds_of_text
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c.rounding_text import rounding_text, with_names
 from strapgen.targets.lines import fill_expression
@@ -124,7 +124,7 @@ def emit(program: Program, target: str) -> Sources:
     name = function_name(program, real.infix)
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, real.name)
+    rounding = bounds_of_text(program, real.name)
     _, files = printed(
         program,
         lambda named, _: _files(named, name, target, with_names(rounding, program, named)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.sources import Function, Sources
-from strapgen.rounding import rounding_bounds
+from strapgen.rounding import bounds_of_text
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c import emit as c
 from strapgen.targets.c.rounding_text import rounding_text, with_names
@@ -50,7 +50,7 @@ def emit(program: Program, target: str) -> Sources:
     real = c.real_of(target)
     name = function_name(program, real.infix)
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, real.name)
+    rounding = bounds_of_text(program, real.name)
     _, files = printed(
         program,
         lambda named, _: _files(named, name, target, with_names(rounding, program, named)),

@@ -8,7 +8,7 @@ from fractions import Fraction
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Constant, Node, Operation, Program, Result, walk
 from strapgen.ir.sources import Function, Sources
-from strapgen.rounding import rounding_bounds
+from strapgen.rounding import bounds_of_text
 from strapgen.targets import contract, contract_lines
 from strapgen.targets.c.emit import HALF_TURNS
 from strapgen.targets.c.rounding_text import rounding_text, with_names
@@ -70,7 +70,7 @@ def emit(program: Program, target: str) -> Sources:
     """
     name = file_name(program)
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, "double")
+    rounding = bounds_of_text(program, "double")
     _, files = printed(
         program,
         lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
