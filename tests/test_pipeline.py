@@ -164,7 +164,7 @@ def test_verbose_shows_stages_on_stderr_and_what_the_cache_holds(empty_cache, ca
         r"generate euler-rk4-2 for c: \d+\.\d{3} s\n",
         first.err,
     )
-    generated_sources._sources.clear()  # as another process
+    generated_sources._entries.clear()  # as another process
     run("--verbose", *words)
     second = capsys.readouterr()
     assert second.err == "sources of euler-rk4-2 for c: from the cache\n"

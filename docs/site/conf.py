@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import Any
 
 from docutils import nodes
+from sphinx import addnodes
 
 from strapgen import __version__
 
@@ -79,7 +81,34 @@ def colour_commands(app: Any, document: nodes.document) -> None:
             block["language"] = "bash"
 
 
+@cache
+def titles_of_pages(environment: Any) -> dict[str, nodes.bullet_list]:
+    """Return what pages contain without their sections, which a navigation of titles leaves out in the end."""
+    titles = {page: contents.deepcopy() for page, contents in environment.tocs.items()}
+    for contents in titles.values():
+        for entry in contents.children:
+            pages = list(entry.findall(addnodes.toctree))
+            entry[1:] = [nodes.bullet_list("", *pages)] if pages else []
+    return titles
+
+
+def navigate_by_titles(app: Any, page: str, template: str, context: dict[str, Any], document: Any) -> None:
+    """Have the navigation of a page made of titles: Sphinx would copy every section of the site for every page."""
+
+    def navigation(**options: Any) -> Any:
+        contents = app.env.tocs
+        app.env.tocs = titles_of_pages(app.env) if options.get("titles_only") else contents
+        try:
+            return toctree(**options)
+        finally:
+            app.env.tocs = contents
+
+    toctree = context["toctree"]
+    context["toctree"] = navigation
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Register what this file adds to Sphinx."""
     app.connect("doctree-read", colour_commands)
+    app.connect("html-page-context", navigate_by_titles, priority=400)  # before the theme calls it
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -3,13 +3,13 @@
 import json
 import os
 import random
-import signal
 import subprocess
 import sys
 import time
 from fractions import Fraction
 from pathlib import Path
 
+import preloaded
 import pytest
 
 from strapgen.cli import main
@@ -94,42 +94,34 @@ class Machines:
         if name != "scheduler":
             words = ["worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
             words += ["--local-directory", str(self.folder / name), "--death-timeout", "60"]
-        self.processes[name] = subprocess.Popen(
-            [sys.executable, "-m", "dask", *words],
-            env=os.environ | {"STRAPGEN_CACHE_DIR": str(self.folder / f"cache-{name}")},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        place = str(self.folder / f"cache-{name}")
+        self.processes[name] = preloaded.begin(words, self.folder / name, STRAPGEN_CACHE_DIR=place)
 
     def kill(self, name):
-        self.processes[name].send_signal(signal.SIGKILL)
-        self.processes[name].wait()
+        self.processes[name].kill()
+        self.processes[name].join()
         for ended in [name] if name != "scheduler" else list(self.processes):  # without it, workers end
             self.processes[ended].kill()
-            self.processes[ended].wait()
+            self.processes[ended].join()
             self.begin(ended)
 
     def end(self):
         for process in self.processes.values():
             process.kill()
-            process.wait()
+            process.join()
 
 
 @pytest.fixture
 def machines(tmp_path):
     pytest.importorskip("distributed")
-    several = Machines(tmp_path)
-    yield several
-    several.end()
+    with preloaded.imported():
+        several = Machines(tmp_path)
+        yield several
+        several.end()
 
 
-def client(words):
-    return subprocess.Popen(
-        [sys.executable, "-m", "strapgen", *words, "--format", "json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def client(words, output):
+    return preloaded.begin(["strapgen", *words, "--format", "json"], output)
 
 
 def here(words, capsys):
@@ -146,7 +138,7 @@ def test_studies_are_completed_whatever_is_killed(tmp_path, machines, capsys):
     for study, killed in zip(STUDIES, ["scheduler", "worker-1", "client"], strict=True):
         results = tmp_path / f"{study}.jsonl"
         words = [*STUDIES[study], "--scheduler", machines.address, "--results", str(results)]
-        first = client(words)
+        first = client(words, tmp_path / "first")
         deadline = time.monotonic() + 90
         while time.monotonic() < deadline and (not results.exists() or results.read_bytes().count(b"\n") < 2):
             time.sleep(0.02)
@@ -155,11 +147,12 @@ def test_studies_are_completed_whatever_is_killed(tmp_path, machines, capsys):
             first.kill()
         else:
             machines.kill(killed)
-        first.communicate()
+        first.join()
         for _ in range(5):
-            again = client(words)
-            there, said = again.communicate()
-            if again.returncode == 0:
+            again = client(words, tmp_path / "again")
+            again.join()
+            there, said = preloaded.said(tmp_path / "again")
+            if again.exitcode == 0:
                 break
             assert said.startswith("strapgen: ") and "Traceback" not in said, study
         outcomes = [json.loads(text) for text in (there, here(STUDIES[study], capsys))]
@@ -174,5 +167,6 @@ def test_studies_are_completed_whatever_is_killed(tmp_path, machines, capsys):
 def test_a_brief_is_answered_by_workers_that_do_not_have_its_files(capsys):
     pytest.importorskip("distributed")
     words = ["design", str(BRIEFS / "ins-1.toml"), "--method", "rk4:2,coning-compressed:4"]
-    there, said = client([*words, "--cluster", "local:1"]).communicate()
-    assert there == here(words, capsys), said
+    command = [sys.executable, "-m", "strapgen", *words, "--cluster", "local:1", "--format", "json"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout == here(words, capsys), done.stderr

@@ -165,16 +165,13 @@ def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] 
     if not first or not second:
         return None
     begin = min(second)
-    place = next(k for k, x in enumerate(second[begin]) if x)
-    direction = [sp.cancel(x / second[begin][place]) for x in second[begin]]
+    direction = second[begin]
+    place = next(k for k, x in enumerate(direction) if x)
     rows = []
     for series_terms in (first, second):
         row = {}
         for power, vector in series_terms.items():
-            if any(
-                sp.cancel(sp.expand(x - vector[place] * d)) != 0
-                for x, d in zip(vector, direction, strict=True)
-            ):
+            if vector is not direction and not _parallel(vector, direction, place):
                 return None
             row[power] = vector[place]
         rows.append(row)
@@ -191,6 +188,15 @@ def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] 
         if value:
             leading[power] = value
     return dict(list(leading.items())[:terms])
+
+
+def _parallel(vector: Sequence[sp.Expr], direction: Sequence[sp.Expr], place: int) -> bool:
+    """Tell whether all elements are to one of them as those of a direction are, without a quotient of long sums."""
+    return all(
+        sp.expand(x * direction[place] - vector[place] * d) == 0
+        for k, (x, d) in enumerate(zip(vector, direction, strict=True))
+        if k != place
+    )
 
 
 def _reduced(upper: sp.Expr, lower: sp.Expr) -> sp.Expr:

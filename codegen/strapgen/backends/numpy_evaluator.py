@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -31,7 +32,7 @@ class NumpyEvaluator(Evaluator):
 
     def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
         """Evaluate on checked arrays, many samples in blocks whose temporaries stay in the cache."""
-        count = int(np.prod(batch, dtype=int))
+        count = math.prod(batch)
         if count <= _BLOCK:
             result = self.generated(*arrays)
             return result if isinstance(result, tuple) else (result,)

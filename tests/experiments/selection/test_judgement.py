@@ -97,7 +97,18 @@ def test_every_class_of_1984_has_an_answer_that_is_generated_and_that_a_simulati
     """The hardest class from a method of every kind."""
     path, folder = BRIEFS / f"{name}.toml", tmp_path / "firmware"
     with pytest.raises(SystemExit) as stop:
-        words = ["design", str(path), "--method", methods, "--simulate", str(runs), "--format", "json"]
+        words = [
+            "design",
+            str(path),
+            "--method",
+            methods,
+            "--simulate",
+            str(runs),
+            "--format",
+            "json",
+            "--jobs",
+            "1",
+        ]
         main([*words, "--generate", str(folder)])
     assert stop.value.code in (0, None)
     rows = json.loads(capsys.readouterr().out)
