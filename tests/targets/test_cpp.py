@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -89,6 +90,16 @@ def test_a_constant_stands_in_one_line_with_its_comment_or_below_it_up_to_the_wi
         value = "1" * (width - len(f"{begin};"))
         broken = [f"{begin.rstrip()}", f"    {value};"] if width == 100 else [f"{begin}{value};"]
         assert lines(value, "one") == [comment, *broken]
+
+
+def test_inputs_that_a_kernel_does_not_read_are_named_for_the_compiler():
+    for kernel, unused in (("constant-increments", ["middle"]), ("euler-product", [])):
+        (text,) = (
+            text
+            for name, text in generated_sources.sources(catalogue.choose(kernel), "cpp").files.items()
+            if name.endswith(".hpp")
+        )
+        assert re.findall(r"\(void\)(\w+);", text) == unused
 
 
 def test_what_calls_the_library_is_no_constant_expression():
