@@ -713,6 +713,12 @@ def test_names_of_both_types_differ(target):
 
 
 @each("target", TARGETS)
+@each(("kernel", "unused"), [("constant-increments", ["middle"]), ("euler-product", [])])
+def test_inputs_that_a_kernel_does_not_read_are_named_for_the_compiler(kernel, unused, target):
+    assert re.findall(r"\(void\)(\w+);", text_of(generated(kernel, target), ".c")) == unused
+
+
+@each("target", TARGETS)
 @each("kernel", KERNELS)
 def test_text_is_clean(kernel, target):
     for text in generated(kernel, target).files.values():

@@ -1,13 +1,16 @@
-"""What the contract of generated code says of an argument."""
+"""What the contract of generated code says of an argument and of a value."""
 
 from __future__ import annotations
+
+from fractions import Fraction
 
 from gathering import each
 
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.integer_program import IntegerSum, Value
 from strapgen.library import generated_sources
-from strapgen.targets.contract import argument_text
+from strapgen.targets.contract import argument_text, value_text
 
 
 @each(
@@ -32,3 +35,9 @@ def test_an_output_tells_its_error_and_whether_it_saturates_and_an_input_neither
     interface = generated_sources.sources(choose("euler-product"), "c-fixed", settings).fixed
     assert [argument_text(argument) for argument in interface.inputs] == [limits, limits]
     assert [argument_text(argument) for argument in interface.outputs] == [f"{limits}; {error}"]
+
+
+def test_a_value_tells_its_format_and_its_range_outward_and_its_error_upward():
+    """Of integers from -7 to 1001 in Q5.10 the range is -0.0068359... to 0.97753..., rounded away from each other."""
+    value = Value("x", IntegerSum(()), 10, False, -7, 1001, Fraction(0), Fraction(1, 999), 1001)
+    assert value_text(value, 16) == "Q5.10, -0.00684 .. 0.978, error 0.0011"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from strapgen.cli import main
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import CompilerError
 from strapgen.targets.contract_lines import Contract
+from strapgen.targets.cpp.fixed import _word
 from strapgen.targets.cpp.text import constants
 from strapgen.targets.definitions import Macro
 from strapgen.toolchain.shared_libraries import COMPILERS
@@ -89,6 +91,22 @@ def test_a_constant_stands_in_one_line_with_its_comment_or_below_it_up_to_the_wi
         value = "1" * (width - len(f"{begin};"))
         broken = [f"{begin.rstrip()}", f"    {value};"] if width == 100 else [f"{begin}{value};"]
         assert lines(value, "one") == [comment, *broken]
+
+
+def test_inputs_that_a_kernel_does_not_read_are_named_for_the_compiler():
+    for kernel, unused in (("constant-increments", ["middle"]), ("euler-product", [])):
+        (text,) = (
+            text
+            for name, text in generated_sources.sources(catalogue.choose(kernel), "cpp").files.items()
+            if name.endswith(".hpp")
+        )
+        assert re.findall(r"\(void\)(\w+);", text) == unused
+
+
+def test_words_of_64_bits_have_the_same_wide_numbers_in_every_header():
+    words = [_word(64, name) for name in ("one", "other")]
+    assert {(word.wide, word.magnitude) for word in words} == {("int128", "uint128")}
+    assert (_word(32, "one").wide, _word(32, "one").magnitude) == ("std::int64_t", "std::uint64_t")
 
 
 def test_what_calls_the_library_is_no_constant_expression():

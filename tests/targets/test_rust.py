@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from gathering import each
 from languages import DOUBLE, check_bits_of_c, check_lines
 
 import strapgen
@@ -15,6 +16,7 @@ from strapgen.library import generated_sources
 from strapgen.support.exceptions import CompilerError
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.names import Naming
+from strapgen.targets.rust.fixed import _WORDS, RustStatementPrinter
 from strapgen.targets.rust.text import module_name
 from strapgen.toolchain.shared_libraries import COMPILERS
 
@@ -39,6 +41,15 @@ def test_some_kernels_have_the_bits_of_c(rustc, rng):
 @pytest.mark.parametrize(("other", "c"), [("rust", "c"), ("rust-float", "c-float")])
 def test_every_kernel_has_the_bits_of_c(rustc, other, c, rng):
     check_bits_of_c(catalogue.standard(), other, c, rng)
+
+
+@each("value", [0, 1, 15, 16, 17, 31, 48, 2**40 - 1, 2**40, 2**40 + 1, -16, -31, -(2**40)])
+def test_a_wide_constant_is_its_integer_and_a_power_of_two_from_16_on_says_its_type(value):
+    printer = object.__new__(RustStatementPrinter)
+    printer.word = _WORDS[32]
+    text = printer.constant(value, wide=True)
+    assert eval(text.replace("_i64", "")) == value
+    assert ("_i64" in text) == (abs(value) in {2**k for k in range(4, 63)})
 
 
 def crate(folder: Path, choices: list, *targets: str) -> list[str]:
