@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
+from gathering import each
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "codegen" / "strapgen"
@@ -249,7 +249,7 @@ def test_only_the_front_door_composes_stages():
     assert not offenders, "\n".join(offenders)
 
 
-@pytest.mark.parametrize(
+@each(
     "text",
     [
         "from strapgen.catalogue import derive",
@@ -312,9 +312,7 @@ def test_only_reports_and_the_command_line_have_texts_of_results():
     assert not offenders, "\n".join(offenders)
 
 
-@pytest.mark.parametrize(
-    "text", ["name.ljust(3)", "f'{x:>10.3e}'", "f'{x:<{width}}'", "f'{x:{align}{width}}'", "w.writerow(r)"]
-)
+@each("text", ["name.ljust(3)", "f'{x:>10.3e}'", "f'{x:<{width}}'", "f'{x:{align}{width}}'", "w.writerow(r)"])
 def test_a_layout_is_seen(text):
     assert list(layouts(ast.parse(text)))
     assert not list(layouts(ast.parse("f'{x:.3e} {x:+.2%} {x:{spec}}'")))

@@ -7,6 +7,7 @@ import derived
 import numpy as np
 import pytest
 import sympy as sp
+from gathering import each
 from sympy.polys.ring_series import rs_integrate, rs_mul, rs_series_inversion
 from sympy.polys.rings import PolyElement
 
@@ -84,7 +85,7 @@ def test_the_loss_is_that_of_a_truncated_exponential(method):
         assert sp.expand(cosine + sp.I * sine - sum(powers)) == 0
 
 
-@pytest.mark.parametrize(
+@each(
     ("method", "printed"),
     [
         ("rk1", sp.Rational(1, 4) + 9 * X**2 / 80),
@@ -172,8 +173,8 @@ def test_claim_1_on_one_axis(method):
         found.append([leading(sp.expand(errors[k][1 if k == "drift" else 0])) for k in ("drift", "scale")])
     one = found[0]
     assert {one[0][1], one[1][1]} == {order + 1, order + 2}
-    for n, each in enumerate(found, 1):
-        assert [(n * coefficient, power) for coefficient, power in one] == each
+    for n, row in enumerate(found, 1):
+        assert [(n * coefficient, power) for coefficient, power in one] == row
 
 
 @pytest.mark.parametrize("method", STANDARD_METHODS)

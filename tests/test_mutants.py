@@ -16,6 +16,7 @@ import mutants
 import mutation_operators
 import pytest
 from chosen_tests import ordered
+from gathering import each
 from mutation_operators import Site
 
 SOURCE = '''\
@@ -202,7 +203,7 @@ def test_chosen_tests_come_in_their_order_and_others_after_them():
     assert ordered(names, {"first": ["d", "b"], "without": [], "others": False}) == ["d", "b"]
 
 
-@pytest.mark.parametrize(
+@each(
     ("status", "by"),
     [
         (0, None),

@@ -163,7 +163,7 @@ def test_sine_series_leaves_out_no_more_than_it_says(first, bits, reach):
         assert distance <= _precise(left_out) + PRECISE.mpf(2) ** -390
 
 
-@pytest.mark.parametrize("bits", [9, 17, 33, 65])
+@each("bits", [9, 17, 33, 65])
 def test_arctangent_series_leaves_out_no_more_than_it_says(bits):
     coefficients, left_out = function_series.arctangent_series(Fraction(1, 2**bits))
     assert left_out <= Fraction(1, 2**bits)
@@ -256,7 +256,7 @@ def test_any_argument_stays_below_the_bound(case, data):
     assert worst_error(lowered, inputs, integers, kind) <= lowered.interface.outputs[0].errors[0]
 
 
-@pytest.mark.parametrize(
+@each(
     ("kind", "bounds"),
     [
         ("sin", (Fraction(3),)),

@@ -9,6 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from derived import FIXED_POINT, program
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -217,7 +218,7 @@ def test_a_user_fixes_formats():
     assert formats["p_y"] != "Q0.31"
 
 
-@pytest.mark.parametrize(
+@each(
     ("formats", "said"),
     [
         ({"increments": "Q-9.40"}, "format Q-9.40 of increments does not hold its range of \\+-0.125"),

@@ -47,7 +47,7 @@ def exact_outputs(choice: Choice, fixed, words) -> list[Fraction]:
     return program(choice).run(numbers)["next"]
 
 
-@pytest.mark.parametrize(("choice", "stated"), CASES, ids=lambda case: getattr(case, "kernel", ""))
+@each(("choice", "stated"), CASES, ids=lambda case: getattr(case, "kernel", ""))
 def test_c_is_the_model_and_inside_its_bound_on_counts(choice, stated, rng):
     fixed = quantized(choice, Settings.of(increments=choice.increments_per_step, **stated))
     model, in_c = ModelEvaluator(generate(fixed, "fixed-model")), CFixedEvaluator(generate(fixed, "c-fixed"))

@@ -6,6 +6,7 @@ import json
 from fractions import Fraction
 
 import pytest
+from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -29,7 +30,7 @@ def test_the_finest_format_holds_its_magnitude_and_none_finer_does(largest, word
     assert largest * Fraction(2) ** (fraction + 1) > top
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "said"),
     [("Q1.31", "33 bits"), ("q1.30", "Qm.n is needed"), ("1.30", "Qm.n"), ("", "Qm.n"), ("Q١.30", "Qm.n")],
 )
@@ -38,7 +39,7 @@ def test_formats_that_cannot_be_used(text, said):
         Format.parse(text, 32)
 
 
-@pytest.mark.parametrize(
+@each(
     ("values", "said"),
     [
         ({"word": 7}, "word is 7; a whole number of bits from 8 to 64"),

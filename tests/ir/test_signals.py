@@ -5,6 +5,7 @@ from dataclasses import FrozenInstanceError
 from fractions import Fraction
 
 import pytest
+from gathering import each
 
 from strapgen.ir.signals import FRAMES, Signal, after
 from strapgen.support.exceptions import InputError
@@ -34,7 +35,7 @@ def test_shape_and_elements_must_agree(shape, elements):
         Signal("rate", shape, elements)
 
 
-@pytest.mark.parametrize(
+@each(
     "signal",
     [
         Signal.vector("rate", "w", unit="rad/s", meaning="body rate", bound=Fraction(1, 3)),
@@ -50,7 +51,7 @@ def test_plain_data_holds_all_of_a_signal(signal):
     assert type(restored.bound) is type(signal.bound)  # 1/3 must not come back as a decimal
 
 
-@pytest.mark.parametrize(
+@each(
     ("fields", "words"),
     [
         (

@@ -4,6 +4,7 @@ import math
 from fractions import Fraction
 
 import pytest
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -121,7 +122,7 @@ def test_nested_products_take_no_more_multiplications_than_expanded_ones(p):
     )
 
 
-@pytest.mark.parametrize(
+@each(
     ("p", "operations"),
     [
         ({}, 0),

@@ -7,6 +7,7 @@ import re
 from itertools import combinations
 
 import pytest
+from gathering import each
 
 from strapgen.reports.plots import dark_mode, figures
 from strapgen.reports.plots.dark_mode import DARK_PAPER, PAPER, contrast, linear, on_dark, to_oklab
@@ -51,7 +52,7 @@ def nearest(colours: list[str], eyes: str) -> float:
     return min(math.dist(seen(one, eyes), seen(other, eyes)) for one, other in combinations(colours, 2))
 
 
-@pytest.mark.parametrize("eyes", VISION)
+@each("eyes", VISION)
 def test_the_colours_of_lines_are_told_apart_by_all_eyes(eyes):
     assert nearest(figures.several_colours(8), eyes) > TOLD_APART
 

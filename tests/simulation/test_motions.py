@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gathering import each
 from scipy.integrate import quad
 from tolerances import roundoff
 
@@ -74,7 +75,7 @@ def test_a_fine_run_meets_the_truth(name, backend_name):
     assert np.abs(run.error).max() <= 1e-12 + 2 * roundoff(backend, 800)
 
 
-@pytest.mark.parametrize("name", MOTIONS)
+@each("name", MOTIONS)
 def test_truth_is_a_rotation_that_starts_at_the_identity(name):
     attitude = strapgen.motion(name, **MOTIONS[name]).attitude(np.linspace(0, 180, 50))
     np.testing.assert_array_equal(attitude[0], np.eye(3))
@@ -128,7 +129,7 @@ def test_many_digits_need_a_closed_form():
         strapgen.converge(strapgen.choose("euler"), motion, ["1/2", "1/4"], 1)
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "settings", "words"),
     [
         ("spin", {}, "motion 'spin' is not known; allowed: constant, sinusoidal, coning, polynomial"),

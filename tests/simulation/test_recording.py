@@ -347,7 +347,7 @@ def test_resampling_keeps_the_whole_angle():
     np.testing.assert_allclose(uneven.increments.sum(axis=0), whole, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize(
+@each(
     ("hertz", "said"),
     [
         ("0", "resample_hz is 0; a number above 0 is needed"),

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gathering import each
 
 import strapgen
 from strapgen.backends.increments import pulses
@@ -47,7 +48,7 @@ def test_records_are_thinned_and_pulses_counted():
     )
 
 
-@pytest.mark.parametrize(
+@each(
     ("choice", "backend"),
     [
         (strapgen.choose("euler", "window-4-2"), "c"),

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import preloaded
 import pytest
+from gathering import each
 
 from strapgen.cli import main
 from strapgen.support import cache, clusters
@@ -27,7 +28,7 @@ STUDIES = {
 }
 
 
-@pytest.mark.parametrize(
+@each(
     ("scheduler", "cluster", "said"),
     [
         ("tcp://a:1", "local:2", "--scheduler and --cluster are both given; one is needed"),

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.symbolic import bernstein
 from strapgen.symbolic.bernstein import eigenvalue_bounds
@@ -19,7 +20,7 @@ def near(bounds: tuple[Fraction, Fraction], low: float, high: float) -> bool:
     return 1.04 * low - 1e-9 <= bounds[0] <= low and high <= bounds[1] <= 1.04 * high + 1e-9
 
 
-@pytest.mark.parametrize(
+@each(
     ("polynomial", "low", "high"),
     [
         ({(1, 1): ONE}, 0, 1),

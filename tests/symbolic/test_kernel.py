@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen.ir.signals import Signal
 from strapgen.symbolic.kernel import Kernel, KernelBuilder, Stage, symbols
@@ -72,7 +73,7 @@ def test_polynomials():
     assert two_stages().polynomials() == {"r": [r], "more": [r - y, ring(7)]}
 
 
-@pytest.mark.parametrize(
+@each(
     "expression",
     [
         lambda x: 1 / x,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen.symbolic import evaluation
 from strapgen.symbolic.power_series import Powers, SeriesRoot, function
@@ -75,7 +76,7 @@ def test_even_functions_of_a_root_are_series():
     assert sp.expand(made - cut) == 0
 
 
-@pytest.mark.parametrize(
+@each(
     ("expression", "says"),
     [
         (1 / a, "begins with 0"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen.support.exceptions import InputError
 from strapgen.symbolic.reading import expression
@@ -12,7 +13,7 @@ A, B = sp.symbols("a b", real=True)
 NAMES = {"a": A, "b": B}
 
 
-@pytest.mark.parametrize(
+@each(
     "value",
     [
         sp.Rational(-57, 80),
@@ -29,7 +30,7 @@ def test_decimals_are_exact():
     assert expression("value", "0.1 + 2e-1*a", NAMES) == sp.Rational(1, 10) + A / 5
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "reason"),
     [
         ("c + 1", "c is not known; known are a, b, pi"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.backends.systems import system_runner
 from strapgen.backends.two_speed import TwoSpeed
@@ -30,7 +31,7 @@ def test_every_file_is_a_system_and_every_form_in_two_speeds_has_one():
         described("two-speed-eulre")
 
 
-@pytest.mark.parametrize(("algorithm", "sculling"), FORMS)
+@each(("algorithm", "sculling"), FORMS)
 def test_copies_and_sums_are_read_off_the_formulas(algorithm, sculling):
     programs = description(algorithm, sculling).programs
     assert copies(programs["fast"]) == {"previous_increment": "increment"}

@@ -141,7 +141,7 @@ def test_whole_numbers_are_not_cut():
     assert function("euler-normalize")(np.array([0, 0, 3, 4], np.float32)).dtype == np.float32
 
 
-@pytest.mark.parametrize("kernel", STEPS)
+@each("kernel", STEPS)
 def test_step_is_the_product_with_its_transition(kernel, rng):
     state, increments = samples(programs()[kernel], (7,), rng).values()
     transition = getattr(module(kernel), f"{generated(kernel).function.name}_transition")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
+from gathering import each
 
 from strapgen import derive
 from strapgen.ir.signals import Signal
@@ -54,7 +55,7 @@ def truncated(expression):
 R = sp.sqrt(X**2 + 2 * Y**2)
 
 
-@pytest.mark.parametrize(
+@each(
     "expression",
     [
         (1 + X - 3 * Y) * (2 - X * Y + Y),
@@ -72,7 +73,7 @@ def test_expansions_are_those_of_sympy(expression):
     assert sp.expand(expanded(expression) - truncated(expression)) == 0
 
 
-@pytest.mark.parametrize(
+@each(
     ("expression", "wanted"),
     [
         (sp.sinc(R / 2), 1 - (X**2 + 2 * Y**2) / 24),

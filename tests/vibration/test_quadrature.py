@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gathering import each
 
 from strapgen.support.exceptions import InputError
 from strapgen.vibration.quadrature import integrate
 
 
-@pytest.mark.parametrize(
+@each(
     ("function", "edges", "value"),
     [
         (lambda x: x**7, [0, 2], 32.0),

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from gathering import each
 
 import strapgen
 from strapgen import catalogue, vibration
@@ -321,7 +322,7 @@ def test_files_that_cannot_be_read(path, tmp_path):
         read_spectrum(tmp_path / path)
 
 
-@pytest.mark.parametrize(
+@each(
     ("transfers", "edges", "said"),
     [
         ({"angle_z": abs}, (1.0, 2.0), "transfer function 'angle_z' is not known"),
@@ -338,7 +339,7 @@ def test_spectra_that_are_refused(transfers, edges, said):
         Spectrum(np.ones_like, transfers, edges)
 
 
-@pytest.mark.parametrize(
+@each(
     ("changed", "said"),
     [
         ({"density": 1}, "density is 1; a function of frequency is needed"),

@@ -3,6 +3,7 @@
 from fractions import Fraction
 
 import pytest
+from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -47,7 +48,7 @@ def computed(made: Pool) -> dict[str, Form]:
     return forms
 
 
-@pytest.mark.parametrize(
+@each(
     ("a", "b", "c"),
     [
         ((2, -4, 0), (1, -2, 0), 2),
@@ -146,7 +147,7 @@ def test_a_sum_of_two_named_vectors_takes_three_additions():
     assert made.vectors[name].operations == 3
 
 
-@pytest.mark.parametrize(
+@each(
     ("whole", "parts", "operations"),
     [
         # (d1 + d4) + (d2 + d3)/3: two sums, a multiple and a sum

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 
-import pytest
 from gathering import each
 
 from strapgen import pipeline
@@ -59,7 +58,7 @@ def test_every_formula_of_the_catalogue_keeps_its_signs():
     whole()
 
 
-@pytest.mark.parametrize(
+@each(
     ("latex", "expected"),
     [
         (

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from gathering import each
 from scipy.integrate import quad
 
 import strapgen
@@ -131,7 +132,7 @@ def test_the_truth_is_not_what_the_gyro_passes_on():
     )
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "settings", "words"),
     [
         ("random", {}, "motion random needs parameters; allowed: rate_deg_s, rate_rad_s"),
