@@ -48,6 +48,8 @@ FIRST_TESTS, FIRST_FILES, FIRST_S = 150, 12, 15
 #: The second session begins with the files whose tests execute most; it stays below the number of tests from which on
 #: a library is compiled beforehand.
 WIDE_FILES, SECOND_TESTS = 3, 900
+#: Tests that compare the lists of faults with the sources: they fail under every fault, and are left out.
+ABOUT_FAULTS = "tests/test_mutants.py"
 #: Memory of a process in bytes at which a fault that allocates without end is stopped.
 MEMORY = 6 << 30
 #: What the cache has of compiled modules, each under a hash of all that goes into it: no fault changes its meaning.
@@ -243,6 +245,12 @@ def second_of(tests: Sequence[MappedTest]) -> list[MappedTest]:
 # The runs
 
 
+def command(words: Sequence[str]) -> list[str]:
+    """Return the command of a session of pytest."""
+    options = ["-q", "-m", "not long", "-p", "no:cacheprovider", f"--ignore={ABOUT_FAULTS}"]
+    return [sys.executable, "-m", "pytest", *options, *words]
+
+
 class Runner:
     """Runs sessions of pytest in copies of the checkout, up to a moment of the monotonic clock; `stop` ends all."""
 
@@ -269,7 +277,7 @@ class Runner:
                 compiled.mkdir(parents=True, exist_ok=True)
                 (Path(cache) / kind).symlink_to(compiled)
             process = subprocess.Popen(
-                [sys.executable, "-m", "pytest", "-q", "-m", "not long", "-p", "no:cacheprovider", *words],
+                command(words),
                 cwd=place,
                 env=os.environ
                 | {"PYTHONPATH": f"{place}/codegen:{place}/tests", "STRAPGEN_CACHE_DIR": cache}

@@ -237,6 +237,11 @@ def test_the_requirement_is_all_written_and_most_drawn_faults():
         few[fault_too_many.key] = outcomes[fault_too_many.key]
 
 
+def test_tests_that_read_the_lists_of_faults_notice_none():
+    assert (mutants.ROOT / mutants.ABOUT_FAULTS).samefile(__file__)
+    assert f"--ignore={mutants.ABOUT_FAULTS}" in mutants.command(["-x"])
+
+
 def test_a_fault_is_put_into_a_copy_and_taken_out_again(tmp_path, monkeypatch):
     monkeypatch.setattr(mutants, "ROOT", tmp_path / "root")
     for folder in ("root", "copy"):
