@@ -161,7 +161,7 @@ evidence-page: $(READY)
 	$(BIN)/strapgen evidence --all --complete --page generated/EVIDENCE.md
 
 # The wheel is built from the source archive, and passes the archive's tests without the sources beside it; the tests of
-# the sources themselves, their layout and faults in them, stay out.
+# the sources themselves, their layout and faults in them, stay out. For git the archive lies in no checkout.
 release-check: $(TOOLS)
 	rm -rf dist build/release
 	$(BIN)/python -m build --outdir dist .
@@ -170,7 +170,8 @@ release-check: $(TOOLS)
 	mv build/release/codegen build/release/sources
 	$(PYTHON) -m venv build/release/.venv
 	build/release/.venv/bin/python -m pip install --disable-pip-version-check "$$(ls dist/*.whl)[dev]"
-	cd build/release && .venv/bin/python -m pytest -n auto --dist worksteal -m "not long" \
+	cd build/release && GIT_CEILING_DIRECTORIES=$(CURDIR)/build \
+	  .venv/bin/python -m pytest -n auto --dist worksteal -m "not long" \
 	  --ignore tests/test_architecture.py --ignore tests/test_mutants.py tests
 
 faults: $(TOOLS)
