@@ -47,6 +47,12 @@ def test_runs_in_parts_are_the_runs_in_one_piece(monkeypatch):
     assert np.abs(turned).max() <= PULSES.pulse / 2, "angles are whole numbers of pulses, the first one exact"
 
 
+def test_every_part_of_a_run_has_noise_of_its_own():
+    drawn = experiment._Gyro(SteadyRuns(catalogue.choose_step("euler", "rk4", 2), NOISE, 6, 5), beside=0)
+    rows = np.concatenate([drawn.rows(6), drawn.rows(6)])
+    assert np.unique(rows).size == rows.size
+
+
 def test_the_number_of_processes_changes_nothing(tmp_path):
     choice = catalogue.choose_step("euler", "rk2", 1)
     runs = SteadyRuns(choice, NOISE, 20, 600)
