@@ -199,5 +199,5 @@ def sources(
         return Sources.restore(interface, files)
 
     known = _remembered(key, what, read)
-    # A user may change what can be changed.
+    # Copies: what a user does to them changes nothing that others get.
     return replace(known, files={**known.files}, operations={**known.operations})
