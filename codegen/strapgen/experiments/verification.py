@@ -51,8 +51,8 @@ class Verification:
     calls : int
         Calls in all.
     max_ulp : float or None
-        Largest distance from arithmetic of 40 digits, in units in the last place of the output; None if the file does
-        not compile with what its command generates.
+        Largest distance from arithmetic of 40 digits, in units in the last place of the output; None if the file was
+        not run.
     bound_ulp : float or None
         The certified bound of that distance; None where there is none.
     """
@@ -101,8 +101,10 @@ def paths_of(file: Path) -> tuple[Path, Path]:
     return pair
 
 
-def verify(file: Path, request: Request, increments: Array | None = None) -> Verification:
-    """Compare a file with what its command generates, compile it as it stands, and run it.
+def verify(
+    file: Path, request: Request, increments: Array | None = None, *, run_differing: bool = False
+) -> Verification:
+    """Compare a file with what its command generates; compile and run it if nothing differs.
 
     Parameters
     ----------
@@ -112,6 +114,8 @@ def verify(file: Path, request: Request, increments: Array | None = None) -> Ver
         What the command in its header asks for.
     increments : array, (N, elements), optional
         Increments of a run in rad, for a step; by default a cone near the largest increments.
+    run_differing : bool, optional
+        Whether a file that differs is compiled and run too, with all that was written into it.
 
     Returns
     -------
@@ -120,12 +124,14 @@ def verify(file: Path, request: Request, increments: Array | None = None) -> Ver
     Raises
     ------
     CompilerError
-        If the file does not compile.
+        If a file in step does not compile.
     InputError
         If the file is not the one that its command generates, or the run leaves its range.
     """
     sources, here = _read(file, request)
     differences = tuple(_differences(file.parent, here, sources))
+    if differences and not run_differing:
+        return Verification(file, differences, 0, 0, None, None)
     compiled = replace(sources, files={**sources.files, **here})
     table = vectors_of_choice(request.choice, request.target, request.settings, CALLS, naming=request.naming)
     try:
@@ -140,26 +146,20 @@ def verify(file: Path, request: Request, increments: Array | None = None) -> Ver
         return Verification(file, (*differences, f"{file}: does not compile: {error}"), 0, 0, None, None)
 
 
-def file_backend(file: Path, request: Request) -> Backend:
-    """Return a file as a back end: it is compiled as it stands.
-
-    Parameters
-    ----------
-    file : Path
-        The source or the header of a generated attitude step.
-    request : Request
-        What the command in its header asks for.
+def file_backend(file: Path, request: Request, *, run_differing: bool = False) -> Backend:
+    """Return a file as a back end; parameters and errors are those of `verify`.
 
     Raises
     ------
-    CompilerError
-        If the file does not compile.
     InputError
-        If the file is no attitude step, or not the one that its command generates.
+        If the file is no attitude step, or differs from what its command generates and may not run then.
     """
     sources, here = _read(file, request)
     if sources.companions is None:
         raise InputError(f"{file} is the kernel {sources.kernel}, which is no attitude step")
+    differences = list(_differences(file.parent, here, sources))
+    if differences and not run_differing:
+        raise InputError(f"{differences[0]}; --run-differing compiles and runs the file as it stands")
     step = StepSources(replace(sources, files={**sources.files, **here}), request.choice)
     backend = backend_class(sources.target)(step)
     backend.name = str(file)
@@ -167,24 +167,39 @@ def file_backend(file: Path, request: Request) -> Backend:
 
 
 def _read(file: Path, request: Request) -> tuple[Sources, dict[str, str]]:
-    """Return what the command of a file generates, and the text of the file and of its header."""
+    """Return what the command of a file generates, and the text of the file, of its header and of its loops."""
     sources = request.sources()
     here = {path.name: text_of(path) for path in paths_of(file)}
     if not {*here} <= {*sources.step_files}:
         names = " and ".join(sources.step_files)
         raise InputError(f"the command in {file} generates {names}; another name goes with --name")
-    return sources, here
+    return sources, here | present_runs(file.parent, sources)
+
+
+def present_runs(folder: Path, sources: Sources) -> dict[str, str]:
+    """Return the text of the loops over runs in a folder, "" for one that is missing beside others; none if all are."""
+    runs = {name: folder / name for name in sources.runs}
+    if not any(path.is_file() for path in runs.values()):
+        return {}
+    return {name: text_of(path) if path.is_file() else "" for name, path in runs.items()}
 
 
 def _differences(folder: Path, here: dict[str, str], sources: Sources) -> Iterator[str]:
     """Yield the lines of files that differ from generated ones, and why they may."""
-    (reason,) = (_reason(text, sources.files[name]) for name, text in here.items() if name.endswith(".h"))
+    (reason,) = (
+        _reason(text, sources.files[name])
+        for name, text in here.items()
+        if name.endswith(".h") and name not in sources.runs
+    )
     for name, text in here.items():
         new = sources.files[name]
-        if name.endswith(".h") and reason == "other options":
+        if name.endswith(".h") and name not in sources.runs and reason == "other options":
             line = text[: text.index("Generated by:")].count("\n") + 1
             yield f"{folder / name}:{line}: other options: the file is not what this command generates"
-        yield from differing_lines(folder / name, text, new, reason)
+        if text or not new:
+            yield from differing_lines(folder / name, text, new, reason)
+        else:
+            yield f"{folder / name}: is empty or not there"
 
 
 def differing_lines(path: Path, text: str, new: str, reason: str) -> Iterator[str]:

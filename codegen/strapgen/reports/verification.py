@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from strapgen.experiments.systems.verification import SystemVerification
 from strapgen.experiments.verification import Verification
+from strapgen.experiments.whole_verification import WholeVerification
 from strapgen.reports.report import Report
+
+#: Why there are no figures of calls.
+_NOT_RUN = "not compiled, since it differs; --run-differing compiles and runs it as it stands"
 
 
 def verification_report(result: Verification) -> Report:
@@ -27,8 +30,8 @@ def _data(result: Verification) -> dict[str, Any]:
     }
 
 
-def system_verification_report(result: SystemVerification) -> Report:
-    """Return the verification of a described system as a report."""
+def whole_verification_report(result: WholeVerification) -> Report:
+    """Return the verification of a whole as a report."""
 
     def data() -> dict[str, Any]:
         return {
@@ -44,7 +47,7 @@ def system_verification_report(result: SystemVerification) -> Report:
         lines = [*result.differences, f"{result.header}: {result.files} files, {state} with the command"]
         for stage in result.stages:
             if stage.max_ulp is None:
-                lines.append(stage.differences[-1])
+                lines.append(f"{stage.file.stem}: {_NOT_RUN}")
             else:
                 lines.append(f"{stage.file.stem}: {_calls(stage)}")
         return "\n".join(lines)
@@ -55,9 +58,7 @@ def system_verification_report(result: SystemVerification) -> Report:
 def _text(result: Verification) -> str:
     lines = [*result.differences]
     lines.append(f"{result.file}: {'in step' if result.in_step else 'out of step'} with its command")
-    if result.max_ulp is None:
-        return "\n".join(lines)
-    return "\n".join([*lines, _calls(result)])
+    return "\n".join([*lines, _NOT_RUN if result.max_ulp is None else _calls(result)])
 
 
 def _calls(result: Verification) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.cli.commands.verify import request_of
+from strapgen.cli.commands.verify import RunDiffering, header_command_of
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import (
@@ -29,6 +31,8 @@ from strapgen.systems.built_in import is_system
 if TYPE_CHECKING:
     from strapgen.backends import Backend
     from strapgen.catalogue import Choice
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.library.generation import Request
     from strapgen.reports.comparison import ComparedKernel
 
 
@@ -56,6 +60,7 @@ def compare(
             panel="Algorithm",
         ),
     ] = None,
+    run_differing: RunDiffering = False,
     source: SampleSource,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     fail_above: Annotated[
@@ -89,6 +94,7 @@ def compare(
         return compared_system(algorithm, methods, names, reference, others, source, fixed, output)
     choices = _taking_increments(methods.choices(algorithm))
     names = _backends(backend, reference, files)
+    requests = {path: header_command_of(path).request([algorithm]) for path in files or ()}
     most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference})
@@ -106,11 +112,11 @@ def compare(
             inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
             rows = comparison.compare(
                 choice,
-                backends=[*names, *_of_files(files, choice)],
+                backends=[*names, *_of_files(requests, choice, run_differing)],
                 increments=inputs.increments,
                 reference=reference,
                 truth=inputs.truth,
-                settings=fixed.at_step(inputs.step).settings(choice.increments_per_step),
+                settings=_counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), requests),
             )
             kernels.append(
                 ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
@@ -134,17 +140,39 @@ def _taking_increments(choices: list[Choice]) -> list[Choice]:
     return choices
 
 
-def _of_files(files: list[Path] | None, choice: Choice) -> list[Backend]:
+def _of_files(requests: Mapping[Path, Request], choice: Choice, run_differing: bool) -> list[Backend]:
     """Return files as back ends of a step that is compared."""
     from strapgen.experiments.verification import file_backend
 
     result = []
-    for path in files or ():
-        request = request_of(path)
+    for path, request in requests.items():
         if request.choice.kernel != choice.kernel:
             raise InputError(f"{path} is {request.choice.kernel}, and {choice.kernel} is compared")
-        result.append(file_backend(path, request))
+        result.append(file_backend(path, request, run_differing=run_differing))
     return result
+
+
+def _counted(settings: Settings | None, requests: Mapping[Path, Request]) -> Settings | None:
+    """Return settings with the gyro whose counts the files take: all back ends then run on its counts.
+
+    Raises
+    ------
+    InputError
+        If the files, or the options of the command, state different gyros.
+    """
+    from strapgen.ir.fixed_settings import Settings
+
+    gyros = {} if settings is None or settings.sensor is None else {settings.sensor: "the command"}
+    for path, request in requests.items():
+        if request.settings is not None and request.settings.sensor is not None:
+            gyros.setdefault(request.settings.sensor, str(path))
+    if len(gyros) > 1:
+        stated = " and ".join(f"{sensor.stated} of {place}" for sensor, place in gyros.items())
+        raise InputError(f"{stated} are different gyros; one run has the counts of one")
+    counting = next((r.settings for r in requests.values() if r.settings and r.settings.sensor), None)
+    if counting is None or (settings is not None and settings.sensor is not None):
+        return settings
+    return replace(settings or Settings(), sensor=counting.sensor, input_bits=counting.input_bits)
 
 
 def _fail_above(kernels: list[ComparedKernel], most: float, said: str) -> None:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from strapgen.ir.fixed_settings import Settings
+    from strapgen.ir.sources import Sources
+    from strapgen.systems.bounds import SystemBounds
     from strapgen.systems.budget import Budget
     from strapgen.systems.fitting import Fitted
 
@@ -87,19 +89,18 @@ def system(
     """
     check_format(format)
     _check_options(file, out, draw, with_runs, output)
-    fit, needs, command = _fitted(file, target, sample_hz, cpu, fixed)
+    fit, needs, command = fitted_stages(file, target, sample_hz, cpu, fixed)
     if with_runs and not _compiled(target):
         raise InputError(
             f"--with-runs goes with targets in C, not with {target}; its module runs many cycles"
         )
     from strapgen.reports.systems.drawing import drawing
-    from strapgen.reports.systems.summary import bound_lines, system_data, system_report
+    from strapgen.reports.systems.summary import system_data, system_report
     from strapgen.support.files import write_files
-    from strapgen.systems import budget, generation
     from strapgen.systems.bounds import bounds
 
     errors = bounds(fit)
-    sources = generation.unit(fit, command, [*bound_lines(fit, errors), *budget.lines(needs)])
+    sources = unit(fit, needs, errors, command)
     files = sources.files if with_runs else sources.step_files
     place = SourceOptions(out=out, check=output.check, force=output.force)
     if output.check:
@@ -141,7 +142,15 @@ def _compiled(target: str) -> bool:
     return TARGETS[target].compiled
 
 
-def _fitted(
+def unit(fit: Fitted, needs: Budget, errors: SystemBounds, command: str) -> Sources:
+    """Return the files of the whole, with bounds and budget in its head."""
+    from strapgen.reports.systems.summary import bound_lines
+    from strapgen.systems import budget, generation
+
+    return generation.unit(fit, command, [*bound_lines(fit, errors), *budget.lines(needs)])
+
+
+def fitted_stages(
     file: Path, target: str, sample_hz: str | None, cpu: str | None, fixed: FixedOptions
 ) -> tuple[Fitted, Budget, str]:
     """Return the generated stages, what they need, and the command that makes the files again."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,6 +13,10 @@ from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.source_options import SourceOptions
 from strapgen.support.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.ir.sources import Sources
 
 
 @grouped
@@ -38,16 +42,10 @@ def two_speed(
     Example: strapgen two-speed dcm --target c --out firmware
     """
     check_format(format)
-    from strapgen.ir.fixed_settings import Settings
     from strapgen.systems import two_speed_sources
-    from strapgen.targets import fixed_targets
 
     form = whole("sculling", sculling) or 0
-    settings = fixed.settings(1)
-    if target in fixed_targets():
-        settings = settings or Settings()
-    elif settings is not None:
-        raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
+    settings = _settings(target, fixed)
     sources = two_speed_sources.sources(algorithm, form, target, settings)
     files = sources.files if output.with_runs else sources.step_files
     if output.project:
@@ -71,3 +69,30 @@ def two_speed(
     typer.echo(f"{sources.kernel} for {target}")
     for path in written:
         typer.echo(f"  {path}")
+
+
+def generated(algorithm: str, sculling: str, target: str, fixed: FixedOptions) -> Sources:
+    """Return the sources that the options ask for.
+
+    Raises
+    ------
+    InputError
+        If options do not go together.
+    """
+    from strapgen.systems import two_speed_sources
+
+    form = whole("sculling", sculling) or 0
+    return two_speed_sources.sources(algorithm, form, target, _settings(target, fixed))
+
+
+def _settings(target: str, fixed: FixedOptions) -> Settings | None:
+    """Return the settings of fixed point, which a target in floating point has none of."""
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.targets import fixed_targets
+
+    settings = fixed.settings(1)
+    if target in fixed_targets():
+        return settings or Settings()
+    if settings is not None:
+        raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
+    return None

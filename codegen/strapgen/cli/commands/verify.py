@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import shlex
-from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.cli.help import PlainCommand
 from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.sample_source import SampleSource
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.library.generation import Request
+    from strapgen.cli.header_command import HeaderCommand
+
+RunDiffering = Annotated[
+    bool,
+    option(
+        "--run-differing",
+        help="Compile and run a file that differs from what its command generates, with all that is in it.",
+        panel="Input",
+    ),
+]
 
 
 @grouped
@@ -24,84 +31,88 @@ def verify(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="Source or header in C that strapgen generated, or a folder of a system."
+            metavar="FILE",
+            help="Source or header in C that strapgen generated, or a folder with a system or two speeds.",
         ),
     ],
     *,
+    algorithms: Annotated[
+        list[str] | None,
+        option(
+            "--algorithm",
+            metavar="FILE",
+            help="Your own algorithm that the header names; it runs as a program, and only if you name it here.",
+            panel="Input",
+        ),
+    ] = None,
+    run_differing: RunDiffering = False,
     source: SampleSource,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
     """Verify that a generated C file is what its header says.
 
-    The exit status is 1 if it is not. The command in the header is run again, and every line that differs is shown.
-    Then the file itself is compiled and called on corners, on random input and along a run: in fixed point it must
-    return the integers of the model, and stay within the certified bound of arithmetic with 40 digits. The run is a
-    cone, or what --motion or a recording says.
+    The exit status is 1 if it is not. The command in the header is read as data and generated again in memory, and
+    every line that differs is shown. A file in step is then compiled and called on corners, on random input and along a
+    run: in fixed point it must return the integers of the model, and stay within the certified bound of arithmetic with
+    40 digits. The run is a cone, or what --motion or a recording says.
 
-    Of a described system, a folder or the header of the whole, all files are compared, and every stage is called.
+    Of a described system, two speeds or a commit-late unit, given by its folder or the header of the whole, all files
+    are compared, and every stage is called.
 
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """
     output.check(file, source.increments_csv, source.rates_csv)
     from strapgen.experiments import verification
-    from strapgen.experiments.systems.verification import system_header
+    from strapgen.experiments.whole_verification import whole_header
     from strapgen.reports.verification import verification_report
 
-    header = system_header(file)
+    header = whole_header(file)
     if header is not None:
-        from strapgen.cli.systems.verifying import verified_system
-
-        return verified_system(header, source, output, request_of)
-    request = request_of(file)
+        if source.stated:
+            raise InputError("a motion or a recording goes with the file of one function")
+        output.check(header)
+        return _verify_whole(header, algorithms or [], run_differing, output)
+    request = header_command_of(file).request(algorithms or [])
     increments = None
     if source.stated:
         source.check()
         choice = request.choice
         increments = source.read(choice.increments_per_step, choice.previous, choice.ahead).increments
-    result = verification.verify(file, request, increments)
+    result = verification.verify(file, request, increments, run_differing=run_differing)
     output.report(verification_report(result))
     if not result.holds:
         raise typer.Exit(1)
 
 
-def request_of(file: Path) -> Request:
-    """Return what the command in the header of a generated file asks for."""
+def header_command_of(file: Path) -> HeaderCommand:
+    """Return the command in the header of a generated function."""
+    from strapgen.cli import header_command
     from strapgen.experiments import verification
     from strapgen.library.generated_files import command_of, text_of
 
     header, _ = verification.paths_of(file)
-    return read_command(command_of(text_of(header)) or "")
+    return header_command.read(command_of(text_of(header)) or "")
 
 
-def read_command(command: str) -> Request:
-    """Return what a command ``strapgen generate`` asks for.
+def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, output: Output) -> None:
+    """Verify the C of a system, of two speeds or of a commit-late unit; exit with 1 if it fails."""
+    from strapgen.cli import header_command
+    from strapgen.cli.progress import waiting
+    from strapgen.experiments.whole_verification import verify_whole
+    from strapgen.library.generated_files import command_of, text_of
+    from strapgen.reports.verification import whole_verification_report
 
-    Raises
-    ------
-    InputError
-        If it is another command.
-    """
-    from typer.main import get_command
-
-    from strapgen.cli.commands import generate
-    from strapgen.cli.fixed_options import FixedOptions
-    from strapgen.cli.options import KernelOptions
-    from strapgen.cli.source_options import SourceOptions
-
-    words = shlex.split(command)
-    if words[:2] != ["strapgen", "generate"]:
-        raise InputError(
-            f"'{command}' does not generate one function; verify takes the files of strapgen generate, and so "
-            "each loop of an algorithm in two speeds"
-        )
-    alone = typer.Typer()
-    alone.command(cls=PlainCommand)(generate.generate)
-    stated = get_command(alone).make_context("generate", words[2:]).params
-
-    def group(kind: type[Any]) -> Any:
-        values = {field.name: stated[field.name] for field in fields(kind)}
-        return kind(**{name: None if value == () else value for name, value in values.items()})
-
-    return generate.request(
-        stated["algorithm"], group(KernelOptions), stated["target"], group(FixedOptions), group(SourceOptions)
-    )
+    with waiting(f"verifying {header.name}"):
+        sources = header_command.read(command_of(text_of(header)) or "").whole(algorithms)
+        commands = {
+            name: command_of(text) or "" for name, text in sources.step_files.items() if name.endswith(".h")
+        }
+        stages = {
+            name: header_command.read(command).request(algorithms)
+            for name, command in commands.items()
+            if command.startswith("strapgen generate ")
+        }
+        result = verify_whole(header, sources, stages, run_differing=run_differing)
+    output.report(whole_verification_report(result))
+    if not result.holds:
+        raise typer.Exit(1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,9 @@ from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import waiting
 from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.window_file import WindowArgument, window_of
+
+if TYPE_CHECKING:
+    from strapgen.ir.sources import Sources
 
 __all__ = ["app", "generate"]
 
@@ -62,13 +65,7 @@ def generate(
     Example: strapgen window generate window-7-7 --target c --out out/late
     """
     check_format(format)
-    from strapgen.library import commit_late_sources
-
-    rated = sample_hz if (fixed.max_rate_deg_s, fixed.lsb) != (None, None) else None
-    settings = replace(fixed, sample_hz=rated).settings(1)
-    with waiting("generating"):
-        family = window_of(window)
-        sources = commit_late_sources.sources(family, algorithm, target, sample_hz, output.name, settings)
+    sources = generated(window, algorithm, target, sample_hz, fixed, output.name)
     files = sources.step_files
     if output.check:
         difference = output.compare(files)
@@ -88,3 +85,21 @@ def generate(
     typer.echo(f"{sources.function.name} for {target}")
     for path in written:
         typer.echo(f"  {path}")
+
+
+def generated(
+    window: str, algorithm: str, target: str, sample_hz: str | None, fixed: FixedOptions, name: str | None
+) -> Sources:
+    """Return the sources that the options ask for.
+
+    Raises
+    ------
+    InputError
+        If options do not go together.
+    """
+    from strapgen.library import commit_late_sources
+
+    rated = sample_hz if (fixed.max_rate_deg_s, fixed.lsb) != (None, None) else None
+    settings = replace(fixed, sample_hz=rated).settings(1)
+    with waiting("generating"):
+        return commit_late_sources.sources(window_of(window), algorithm, target, sample_hz, name, settings)

@@ -1,4 +1,4 @@
-"""Holds the generated C of a described system to its command: the text of every file, and what its stages compute."""
+"""Holds the files of a command that generates several functions to it: their text, and what the functions compute."""
 
 from __future__ import annotations
 
@@ -7,27 +7,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapgen.experiments.verification import Verification, differing_lines, verify
+from strapgen.experiments.verification import Verification, differing_lines, present_runs, verify
+from strapgen.ir.sources import Sources
 from strapgen.library.generated_files import command_of, text_of
 from strapgen.library.generation import Request
 from strapgen.support.exceptions import InputError
 
-_COMMAND = "strapgen system "
+#: What the commands begin with that generate several functions and a whole that calls them.
+_COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ")
 _VERSION = re.compile(r'_VERSION "(.*)"')
 
 
 @dataclass(frozen=True)
-class SystemVerification:
-    """What the generated files of a system were found to be.
+class WholeVerification:
+    """What the generated files of a whole were found to be.
 
     Parameters
     ----------
     header : Path
         Header of the whole.
     files : int
-        Number of files that its command generates.
+        Number of files that were compared.
     differences : tuple of str
-        What differs from them, a line of text each; empty if nothing does.
+        What differs from generated files, a line of text each; empty if nothing does.
     stages : tuple of Verification
         The function of each stage, held to its contract.
     """
@@ -43,8 +45,8 @@ class SystemVerification:
         return not self.differences and all(stage.holds for stage in self.stages)
 
 
-def system_header(place: Path) -> Path | None:
-    """Return the header of a system's C: in a folder, or the named file; None for a file of another kind.
+def whole_header(place: Path) -> Path | None:
+    """Return the header of a whole: in a folder, or the named file; None for a file of another kind.
 
     Raises
     ------
@@ -53,40 +55,43 @@ def system_header(place: Path) -> Path | None:
     """
     if not place.is_dir():
         header = place.with_suffix(".h")
-        return header if place.suffix in (".c", ".h") and _is_system(header) else None
-    headers = sorted(path for path in place.glob("*.h") if _is_system(path))
+        return header if place.suffix in (".c", ".h") and _is_whole(header) else None
+    headers = sorted(path for path in place.glob("*.h") if _is_whole(path))
     if len(headers) != 1:
         names = ", ".join(path.name for path in headers) or "none"
         raise InputError(
-            f"{place} holds {names} of the headers of strapgen system; a folder with one is needed"
+            f"{place} holds {names} of the headers of a system, of two speeds or of a commit-late unit; a folder with "
+            "one is needed"
         )
     return headers[0]
 
 
-def _is_system(header: Path) -> bool:
+def _is_whole(header: Path) -> bool:
     if not header.is_file():
         return False
-    text = text_of(header)
-    return (command_of(text) or "").startswith(_COMMAND) and "_runs_h" not in text[:4000]
+    command = command_of(text_of(header)) or ""
+    return command.startswith(_COMMANDS) and not command.endswith(" --with-runs")
 
 
-def verify_system(
-    header: Path, generated: Mapping[str, str], stages: Mapping[str, Request]
-) -> SystemVerification:
-    """Compare the files of a system with generated ones, and hold its stages to their contracts.
+def verify_whole(
+    header: Path, sources: Sources, stages: Mapping[str, Request], *, run_differing: bool = False
+) -> WholeVerification:
+    """Compare the files of a whole with generated ones, and hold its stages to their contracts.
 
     Parameters
     ----------
     header : Path
         Header of the whole.
-    generated : mapping of str to str
-        The text that its command generates, by file name.
+    sources : Sources
+        What its command generates.
     stages : mapping of str to Request
         What generates each stage, by the name of its header.
+    run_differing : bool, optional
+        Whether stages that differ are compiled and run too.
 
     Returns
     -------
-    SystemVerification
+    WholeVerification
 
     Raises
     ------
@@ -94,22 +99,25 @@ def verify_system(
         If a stage in step does not compile.
     """
     folder, lines = header.parent, []
+    generated = sources.step_files
     if header.name not in generated:
         first = next(name for name in generated if name.endswith(".h"))
         lines.append(f"{header}: other options: the command in it generates {first}")
-    for name, text in generated.items():
-        path = folder / name
-        if path.is_file():
-            here = text_of(path)
-            lines += differing_lines(path, here, text, _reason(here, text))
+    here = {name: text_of(folder / name) for name in generated if (folder / name).is_file()}
+    here |= {name: text for name, text in present_runs(folder, sources).items() if text}
+    expected = [*generated, *(present_runs(folder, sources))]
+    for name in expected:
+        text = sources.files[name]
+        if name in here:
+            lines += differing_lines(folder / name, here[name], text, _reason(here[name], text))
         else:
-            lines.append(f"{path}: is not there")
+            lines.append(f"{folder / name}: is not there")
     checked = tuple(
-        verify(folder / name, request)
+        verify(folder / name, request, run_differing=run_differing)
         for name, request in stages.items()
         if all((folder / name).with_suffix(ending).is_file() for ending in (".h", ".c"))
     )
-    return SystemVerification(header, len(generated), tuple(lines), checked)
+    return WholeVerification(header, len(expected), tuple(lines), checked)
 
 
 def _reason(here: str, generated: str) -> str:
