@@ -117,7 +117,7 @@ def test_what_does_not_go_with_a_system_is_refused_in_one_line(file, log, tmp_pa
         (f"strapdown dcm --increments-csv {log}", "--fast-cycles is missing"),
         (f"evidence {file} --method rk4 --tool z3", "--method does not go"),
         (f"evidence {file} --lsb-rad 1 --tool z3", "--lsb-rad does not go"),
-        (f"verify {tmp_path}", "holds none of the headers of strapgen system"),
+        (f"verify {tmp_path}", "holds none of the headers of a system"),
     ]:
         status, out, err = says(command, capsys)
         assert (status, out, err.count("\n")) == (2, "", 1) and said in err, (command, err)

@@ -34,8 +34,8 @@ def folder(tmp_path: Path, capsys) -> Path:
     return tmp_path
 
 
-def verified(path: Path, capsys) -> tuple[int, dict]:
-    status, out, _ = says(["verify", str(path), "--format", "json"], capsys)
+def verified(path: Path, capsys, *more: str) -> tuple[int, dict]:
+    status, out, _ = says(["verify", str(path), "--format", "json", *more], capsys)
     return status, json.loads(out)
 
 
@@ -106,7 +106,7 @@ def test_a_change_is_found_with_its_line(ending, old, new, reason, computes, fol
     line = changed(path, old, new)
     if computes is None:  # the command in the header asks for a function with more parameters
         computes, line = True, 4
-    status, data = verified(path, capsys)
+    status, data = verified(path, capsys, "--run-differing")
     assert status == 1 and not data["holds"] and not data["in_step"]
     assert data["differences"][0].startswith(f"{path}:{line}: {reason}: ")
     assert bool(data["wrong_calls"]) is not computes
@@ -120,7 +120,7 @@ def test_floating_point_is_held_to_its_bound(target, tmp_path, capsys):
     status, data = verified(path, capsys)
     assert status == 0 and 0.5 < data["max_ulp"] < data["bound_ulp"]
     changed(path, r"A_12 \* C_11", "A_21 * C_11")
-    status, data = verified(path, capsys)
+    status, data = verified(path, capsys, "--run-differing")
     assert status == 1 and data["wrong_calls"] and data["max_ulp"] > data["bound_ulp"]
 
 
@@ -141,7 +141,7 @@ def test_a_file_is_compared_as_a_back_end_in_its_own_formats(folder, capsys):
     assert status == 0 and row["backend"] == f"{folder / NAME}.c"
     assert 0 < row["max_abs_rad"] < row["bound_rad"] < 1e-6
     changed(folder / f"{NAME}.c", r"sigma_x = d1_x \+ d2_x", "sigma_x = d1_x + d2_y")
-    assert says([*line.split(), "--fail-above", "1e-7"], capsys)[0] == 1
+    assert says([*line.split(), "--fail-above", "1e-7", "--run-differing"], capsys)[0] == 1
     status, _, error = says(line.replace("euler", "dcm", 1).split(), capsys)
     assert status == 2 and "is euler-rk4-2, and dcm-rk4-2 is compared" in error
 

@@ -174,6 +174,7 @@ def _drop_output() -> None:
 
 
 def _fail(message: str) -> None:
+    message = "".join(letter if letter.isprintable() else " " for letter in message)
     line = " ".join(word if len(word) <= _LONGEST_WORD else f"{word[:_CUT]}..." for word in message.split())
     sys.stderr.write(f"strapgen: {line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + '...'}\n")
     sys.exit(2)

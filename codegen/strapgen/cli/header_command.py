@@ -87,7 +87,10 @@ class HeaderCommand:
             return two_speed.generated(values["algorithm"], values["sculling"], values["target"], fixed)
         if self.name == "window generate":
             return window_generate.generated(
-                *(values[name] for name in ("window", "algorithm", "target", "sample_hz")),
+                values["window"],
+                values["algorithm"],
+                values["target"],
+                values["sample_hz"],
                 fixed,
                 values["name"],
             )
@@ -97,7 +100,7 @@ class HeaderCommand:
         for stage in system_file.read(built_in.file_of(values["file"])).stages:
             _require_named(stage.kernel, algorithms)
         fit, needs, command = system.fitted_stages(
-            *(values[name] for name in ("file", "target", "sample_hz", "cpu")), fixed
+            values["file"], values["target"], values["sample_hz"], values["cpu"], fixed
         )
         return system.unit(fit, needs, bounds(fit), command)
 
@@ -151,21 +154,21 @@ def _values(name: str, words: list[str], text: str) -> dict[str, Any]:
         stated.setdefault(key, []).append(value)
     if argument not in stated:
         raise InputError(f"the header's command names nothing to generate: {text}")
-    for key, given in stated.items():
-        values[key] = _value(_kind(parameters[key].annotation), key, given, text)
+    for key, words_of in stated.items():
+        values[key] = _value(_kind(parameters[key].annotation), key, words_of, text)
     _require_file(name, values)
     return values
 
 
-def _value(kind: Any, key: str, given: list[str], text: str) -> Any:
+def _value(kind: Any, key: str, words: list[str], text: str) -> Any:
     """Return the words of one parameter as a value of its type."""
     if kind is list:
-        return given
-    if len(given) > 1:
-        raise InputError(f"the header's command states {key.replace('_', '-')} {len(given)} times: {text}")
+        return words
+    if len(words) > 1:
+        raise InputError(f"the header's command states {key.replace('_', '-')} {len(words)} times: {text}")
     if kind is bool:
         return True
-    return _regular(given[0]) if kind is Path else given[0]
+    return _regular(words[0]) if kind is Path else words[0]
 
 
 def _require_file(name: str, values: Mapping[str, Any]) -> None:
@@ -187,7 +190,7 @@ def _spellings(annotation: Any) -> tuple[str, ...]:
     info = annotation.__metadata__[0]
     if not isinstance(info, OptionInfo):
         return ()
-    return (info.default, *(info.param_decls or ()))
+    return str(info.default), *(info.param_decls or ())
 
 
 def _kind(annotation: Any) -> Any:

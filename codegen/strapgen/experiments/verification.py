@@ -96,8 +96,13 @@ def paths_of(file: Path) -> tuple[Path, Path]:
     for path in (file, *pair):
         if not path.is_file():
             raise InputError(f"{path} is not there; a function has a header and a source in one folder")
-        if command_of(text_of(path)) is None:
+        command = command_of(text_of(path))
+        if command is None:
             raise InputError(f"{path} does not say by which command strapgen generated it")
+        if command.endswith(" --with-runs"):
+            raise InputError(
+                f"{path} holds loops over runs; they are verified with the file of their function"
+            )
     return pair
 
 
@@ -218,11 +223,16 @@ def differing_lines(path: Path, text: str, new: str, reason: str) -> Iterator[st
         if kind == "equal":
             continue
         for k in range(max(b - a, d - c)):
-            was = lines[0][a + k].strip() if a + k < b else "nothing"
+            was = _shown(lines[0][a + k]) if a + k < b else "nothing"
             expected = lines[1][c + k].strip() if c + k < d else "nothing"
             yield f"{path}:{min(a + k, max(b - 1, a)) + 1}: {reason}: {was}; generated: {expected}"
     if text != new and lines[0] == lines[1]:
         yield f"{path}:{len(lines[0])}: edited: ends of lines; generated: ends of lines of Unix"
+
+
+def _shown(line: str) -> str:
+    """Return a line of a file without characters that would act on a terminal."""
+    return "".join(character if character.isprintable() else "?" for character in line.strip())
 
 
 def _reason(header: str, generated: str) -> str:

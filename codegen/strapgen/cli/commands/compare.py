@@ -97,8 +97,7 @@ def compare(
     requests = {path: header_command_of(path).request([algorithm]) for path in files or ()}
     most = limit("--fail-above", fail_above)
     source.check()
-    _check_fixed(fixed, {*names, reference})
-    fixed.check_pulse(source.pulse_arcsec)
+    _check_fixed(fixed, {*names, reference}, source.pulse_arcsec)
 
     import numpy as np
 
@@ -199,10 +198,11 @@ def _backends(text: str | None, reference: str, files: list[Path] | None) -> lis
     return names
 
 
-def _check_fixed(fixed: FixedOptions, backends: set[str]) -> None:
-    """Refuse options of fixed point that no back end of the run uses."""
+def _check_fixed(fixed: FixedOptions, backends: set[str], pulse: str | None) -> None:
+    """Refuse options of fixed point that no back end of the run uses, and two scales of a gyro."""
     from strapgen.backends import BACKENDS
 
+    fixed.check_pulse(pulse)
     fixed_point = [name for name, entry in BACKENDS.items() if entry.fixed]
     if not backends & {*fixed_point}:
         for name in fixed.stated:

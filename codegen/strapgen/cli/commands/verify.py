@@ -40,7 +40,7 @@ def verify(
         list[str] | None,
         option(
             "--algorithm",
-            metavar="FILE",
+            metavar="NAME",
             help="Your own algorithm that the header names; it runs as a program, and only if you name it here.",
             panel="Input",
         ),
