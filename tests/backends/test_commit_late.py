@@ -523,7 +523,7 @@ def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window,
     """Against double precision from the same integers, on samples that are drawn and on those of motions."""
     filters, settings = family(window), Settings.of(carry="full", **counts)
     late = parts(filters, algorithm, "c-fixed", settings)
-    bound, unit = float(late.fixed.now_error), float(late.step.fixed.inputs[1].unit)
+    bound, unit = float(late.fixed.now_errors.running), float(late.step.fixed.inputs[1].unit)
     most = late.fixed.limit * unit
     fixed = CommitLate(window, algorithm, "c-fixed32", settings=settings)
     double = CommitLate(window, algorithm, "c")
@@ -584,7 +584,7 @@ def test_the_committed_attitude_stays_within_the_bounds_of_its_steps(carry):
         double.push(sample)
         largest = max(largest, apart(fixed.attitude, double.attitude))
     # The start has P steps by other filters, each with a share of the bound of now, as a length of half the angle.
-    start = 2 * float(late.fixed.now_error) * P / L
+    start = 2 * float(late.fixed.now_errors.running) * P / L
     bound = start + late.step.fixed.angle_accumulation.bound(commits)
     assert commits == 497
     assert 0 < largest < bound

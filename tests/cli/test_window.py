@@ -15,6 +15,8 @@ from gathering import each
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
+from strapgen.cli.commands import window
+from strapgen.support.exceptions import InputError
 
 FOLDER = Path(windows.__file__).parent / "window_filters"
 
@@ -246,3 +248,18 @@ def test_what_cannot_be_shown_is_refused_in_one_line(words, message, run, tmp_pa
     (tmp_path / "wrong.toml").write_text(text.replace(str(WINDOWS["window-3-3"].filters[1][0]), "1/7"))
     status, said, warned = run(words)
     assert (status, said) == (2, "") and message in warned and warned.count("\n") == 1
+
+
+def test_now_noise_of_a_brief_is_that_of_an_increment(tmp_path):
+    """0.12 deg in a root of an hour is 2e-4 deg in an increment of 10 ms; 100 deg/s turn 1 deg in it."""
+    brief = tmp_path / "brief.toml"
+    brief.write_text(
+        "max_rate_deg_s = 100\n[gyro]\nsample_hz = 100\nnoise_deg_sqrt_h = 0.12\n[budget]\ndrift_deg_h = 1\n[processor]\n"
+    )
+    assert window._now_noise(str(brief)) == Fraction(2, 10_000)
+    assert window._now_noise("3e-4") == Fraction(3, 10_000)
+    brief.write_text(
+        "max_rate_deg_s = 100\n[gyro]\nsample_hz = 100\n[budget]\ndrift_deg_h = 1\n[processor]\n"
+    )
+    with pytest.raises(InputError, match="noise_deg_sqrt_h is 0"):
+        window._now_noise(str(brief))

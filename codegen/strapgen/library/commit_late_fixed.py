@@ -95,14 +95,14 @@ def functions(
         bits,
     )
     _require_room(fixed, inputs)
-    error = commit_late_bounds.now_error(
+    errors = commit_late_bounds.now_errors(
         filters,
         fixed,
-        generated_sources.program(choices[1]),
-        interface_of(rotation),
+        (generated_sources.program(choices[0]), generated_sources.program(choices[1])),
+        (interface, interface_of(rotation)),
         _truncation(choices[0]),
     )
-    return (step, rotation, normalization), replace(fixed, now_error=error), filters
+    return (step, rotation, normalization), replace(fixed, now_errors=errors), filters
 
 
 def _of_rotation(filters: LateFilters, interface: Interface) -> Settings:

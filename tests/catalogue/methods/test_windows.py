@@ -346,3 +346,14 @@ def test_taps_are_short(name):
     window = WINDOWS[name]
     for row in window.filters[1:]:
         assert all((tap * 2**60).denominator == 1 for tap in row[:1])
+
+
+def test_gyro_series_is_the_inverse_of_its_denominator_to_every_power():
+    gyro = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
+    series = window_conditions.gyro_series(gyro, 12)
+    x = gyro.sample_hz / (2 * window_conditions.PI * gyro.bandwidth_hz)
+    denominator = [Fraction(1), 2 * gyro.damping * x, x**2]
+    product = [
+        sum((denominator[j] * series[k - j] for j in range(min(k, 2) + 1)), Fraction(0)) for k in range(12)
+    ]
+    assert product == [1, *[0] * 11]

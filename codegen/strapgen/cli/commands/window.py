@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -90,7 +91,12 @@ class Band(BandOptions):
     ] = "0"
     now_noise: Annotated[
         str,
-        option("--now-noise", metavar="RATIO", help="The same for the filters of the attitude of now."),
+        option(
+            "--now-noise",
+            metavar="RATIO",
+            help="The same for the filters of the attitude of now; or the file of a brief, of whose gyro it is the "
+            "noise at the largest rate.",
+        ),
     ] = "3e-4"
     start_noise: Annotated[
         str,
@@ -200,7 +206,7 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
         ),
         gyro,
         not_negative("--noise", band.noise),
-        not_negative("--now-noise", band.now_noise),
+        _now_noise(band.now_noise),
         band.densities(radians),
         rotation,
         checks.count(
@@ -210,6 +216,22 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
         not_negative("--start-noise", band.start_noise),
         increments,
     )
+
+
+def _now_noise(value: str) -> Fraction:
+    """Return the noise of an increment by the rate times the sampling interval: a ratio, or that of a brief's gyro."""
+    if not value.endswith(".toml"):
+        return not_negative("--now-noise", value)
+    from strapgen.experiments.selection.brief import read_brief
+
+    brief = read_brief(Path(value))
+    if not brief.gyro.noise_deg_sqrt_h or not brief.max_rate_deg_s:
+        raise InputError(
+            f"--now-noise {value}: the gyro's noise_deg_sqrt_h is 0; a brief with noise is needed"
+        )
+    # A random walk of N deg in a root of an hour is N / 60 in a root of a second.
+    increment = brief.gyro.noise_deg_sqrt_h / 60 / math.sqrt(brief.gyro.sample_hz)
+    return Fraction(f"{increment * brief.gyro.sample_hz / brief.max_rate_deg_s:.3e}")
 
 
 def _title(name: str | None) -> str:

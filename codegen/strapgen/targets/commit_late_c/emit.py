@@ -197,7 +197,7 @@ def _in_fixed_point(
         "residuals": [{"place": place, "fresh": word.fresh} for place, word in enumerate(feedback)],
         "normalized_residuals": bool(normalization.fixed.residuals),
         "every": NORMALIZED_EVERY,
-        "now_error": decimal_above(fixed.now_error),
+        "now_errors": [decimal_above(error) for error in fixed.now_errors],
         "state_argument": state,
         "sample_argument": samples,
         "type": f"int{state.format.word}_t",

@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 #: Taps as integers.
 Integers = tuple[int, ...]
 #: Commits from one normalization of the state to the next.
 NORMALIZED_EVERY = 1024
+
+
+class NowErrors(NamedTuple):
+    """Bounds of the distance of the attitude of now from the exact filters and steps on the same integers.
+
+    They are lengths of the difference of the state, of a row for a matrix. The integers are those of the committed
+    attitude and of the samples that are held.
+
+    Parameters
+    ----------
+    running : Fraction
+        With L intervals waiting.
+    start : Fraction
+        With up to p + L, before as many samples are there as filters take.
+    gap : Fraction
+        While a lost sample waits to be restored.
+    """
+
+    running: Fraction = Fraction(0)
+    start: Fraction = Fraction(0)
+    gap: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
@@ -31,8 +53,8 @@ class FixedFilters:
         The filters of a lost sample, and of one whose sum with the next is known.
     restoring_shift : int
         Bits by which their sums are shifted down.
-    now_error : Fraction
-        Bound of the distance of the attitude of now from exact arithmetic, see `library.commit_late_bounds`.
+    now_errors : NowErrors
+        Bounds of the distance of the attitude of now from exact arithmetic, see `library.commit_late_bounds`.
     """
 
     limit: int
@@ -43,4 +65,4 @@ class FixedFilters:
     shifts: Integers
     restoring: tuple[Integers, Integers]
     restoring_shift: int
-    now_error: Fraction = Fraction(0)
+    now_errors: NowErrors = field(default_factory=NowErrors)
