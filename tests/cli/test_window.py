@@ -253,9 +253,8 @@ def test_what_cannot_be_shown_is_refused_in_one_line(words, message, run, tmp_pa
 def test_now_noise_of_a_brief_is_that_of_an_increment(tmp_path):
     """0.12 deg in a root of an hour is 2e-4 deg in an increment of 10 ms; 100 deg/s turn 1 deg in it."""
     brief = tmp_path / "brief.toml"
-    brief.write_text(
-        "max_rate_deg_s = 100\n[gyro]\nsample_hz = 100\nnoise_deg_sqrt_h = 0.12\n[budget]\ndrift_deg_h = 1\n[processor]\n"
-    )
+    head, tail = "max_rate_deg_s = 100\n[gyro]\nsample_hz = 100\n", "[budget]\ndrift_deg_h = 1\n[processor]\n"
+    brief.write_text(f"{head}noise_deg_sqrt_h = 0.12\n{tail}")
     assert window._now_noise(str(brief)) == Fraction(2, 10_000)
     assert window._now_noise("3e-4") == Fraction(3, 10_000)
     brief.write_text(
