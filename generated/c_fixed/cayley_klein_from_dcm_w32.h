@@ -49,7 +49,7 @@ extern "C" {
  *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     converted[4]: Cayley-Klein parameters, body to reference, scalar first; next_s, next_x,
  *         next_y, next_z; format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625
- *         to 1.0625); error at most 4.32192e-09, 4.6406 of the last place.
+ *         to 1.0625); error at most 4.32192e-09, 4.6407 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_s, next_x,
  *   next_y, next_z from -1.0625 to 1.0625.

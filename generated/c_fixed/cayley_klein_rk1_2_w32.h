@@ -19,7 +19,7 @@
  * rows.
  *
  * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (1.3598e-09 N), times exp(0.0897247 N), in the length of the state.
+ * increments is at most (1.35981e-09 N), times exp(0.0897248 N), in the length of the state.
  *
  * A proper state is of length 1; the range of the output is wider than that of the input because
  * it holds for every input in its range. Normalize it before, with the function of `strapgen
@@ -65,7 +65,7 @@ extern "C" {
  *         to 1073741824 (-0.125 to 0.125).
  * out     next[4]: Cayley-Klein parameters, body to reference, scalar first, after the step;
  *         next_s, next_x, next_y, next_z; format Q1.30, unit 2^-30; range -1996488705 to
- *         1996488705 (-1.85938 to 1.85938); error at most 8.36735e-10, 0.8984 of the last
+ *         1996488705 (-1.85938 to 1.85938); error at most 8.36736e-10, 0.8985 of the last
  *         place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */

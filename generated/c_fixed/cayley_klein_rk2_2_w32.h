@@ -70,7 +70,7 @@ extern "C" {
  *         to 536870912 (-0.125 to 0.125).
  * out     next[4]: Cayley-Klein parameters, body to reference, scalar first, after the step;
  *         next_s, next_x, next_y, next_z; format Q1.30, unit 2^-30; range -1782579201 to
- *         1782579201 (-1.66016 to 1.66016); error at most 7.36236e-10, 0.7905 of the last
+ *         1782579201 (-1.66016 to 1.66016); error at most 7.36236e-10, 0.7906 of the last
  *         place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */

@@ -72,7 +72,7 @@ extern "C" {
  *         to 536870912 (-0.125 to 0.125).
  * out     next[4]: Cayley-Klein parameters, body to reference, scalar first, after the step;
  *         next_s, next_x, next_y, next_z; format Q1.30, unit 2^-30; range -1660026881 to
- *         1660026881 (-1.54602 to 1.54602); error at most 7.8254e-10, 0.8402 of the last
+ *         1660026881 (-1.54603 to 1.54603); error at most 7.8254e-10, 0.8403 of the last
  *         place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */

@@ -69,11 +69,11 @@ extern "C" {
  *         (-0.125 to 0.125).
  * out     next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the
  *         call; next_beta_x, next_beta_y, next_beta_z; format Q1.30, unit 2^-30 rad; range
- *         -1207959553 to 1207959553 (-1.125 to 1.125); error at most 4.65661e-10, 0.5000 of
- *         the last place.
+ *         -1207959553 to 1207959553 (-1.12501 to 1.12501); error at most 4.65662e-10, 0.5000
+ *         of the last place.
  * out     next_coning[3]: coning correction since the slow cycle began, after the call;
  *         next_coning_x, next_coning_y, next_coning_z; format Q-2.33, unit 2^-33 rad; range
- *         -1073741824 to 1073741824 (-0.125 to 0.125); error at most 1.17022e-10, 1.0052 of
+ *         -1073741824 to 1073741824 (-0.125 to 0.125); error at most 1.17022e-10, 1.0053 of
  *         the last place.
  * out     next_previous_increment[3]: angle increment of the fast cycle before, after the call;
  *         next_past_x, next_past_y, next_past_z; format Q-2.33, unit 2^-33 rad; range

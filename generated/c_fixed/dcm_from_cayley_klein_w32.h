@@ -46,7 +46,7 @@ extern "C" {
  *         format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     attitude[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30,
  *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625); error at most
- *         4.65661e-10, 0.5000 of the last place.
+ *         4.65662e-10, 0.5000 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: C_11, C_12, C_13,
  *   C_21, C_22, C_23, C_31, C_32, C_33 from -1.0625 to 1.0625.

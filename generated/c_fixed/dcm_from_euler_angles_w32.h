@@ -43,10 +43,10 @@ extern "C" {
 
 /* One call.
  * in      angles[3]: Euler angles: roll, pitch, heading; roll, pitch, heading; format Q2.29, unit
- *         2^-29 rad; range -1686629857 to 1686629857 (-3.14159 to 3.14159).
+ *         2^-29 rad; range -1686629857 to 1686629857 (-3.1416 to 3.1416).
  * out     attitude[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30,
  *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625); error at most
- *         6.00286e-09, 6.4455 of the last place.
+ *         6.00286e-09, 6.4456 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: C_12, C_13, C_22,
  *   C_23 from -1.0625 to 1.0625.

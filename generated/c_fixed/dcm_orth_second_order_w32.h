@@ -47,7 +47,7 @@ extern "C" {
  *         format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     orthonormalized[9]: direction cosine matrix, body to reference, orthonormalized;
  *         next_11, ..., next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688
- *         (-1.0625 to 1.0625); error at most 4.81515e-08, 51.7023 of the last place.
+ *         (-1.0625 to 1.0625); error at most 4.81516e-08, 51.7024 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_11, next_12,
  *   next_13, next_21, next_22, next_23, next_31, next_32, next_33 from -1.0625 to 1.0625.

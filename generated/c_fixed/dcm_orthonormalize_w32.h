@@ -48,7 +48,7 @@ extern "C" {
  *         format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     orthonormalized[9]: direction cosine matrix, body to reference, orthonormalized;
  *         next_11, ..., next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688
- *         (-1.0625 to 1.0625); error at most 1.10024e-08, 11.8137 of the last place.
+ *         (-1.0625 to 1.0625); error at most 1.10024e-08, 11.8138 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits:
  *   inverse_length_1_radicand, inverse_length_2_radicand, inverse_length_3_radicand from 2 to

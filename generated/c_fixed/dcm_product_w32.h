@@ -51,7 +51,7 @@ extern "C" {
  *         2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     next[9]: direction cosine matrix, body to reference, after the step; next_11, ...,
  *         next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to
- *         1.0625); error at most 4.65661e-10, 0.5000 of the last place.
+ *         1.0625); error at most 4.65662e-10, 0.5000 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_11, next_12,
  *   next_13, next_21, next_22, next_23, next_31, next_32, next_33 from -1.0625 to 1.0625.

@@ -19,7 +19,7 @@
  * rows.
  *
  * Over a run of N steps without orthonormalization the distance from exact arithmetic on the same
- * increments is at most (1.8561e-09 N), times exp(0.331773 N), in the length of a row.
+ * increments is at most (1.85611e-09 N), times exp(0.331774 N), in the length of a row.
  *
  * A proper state is orthogonal with rows of length 1; the range of the output is wider than that
  * of the input because it holds for every input in its range. Normalize it before, with the
@@ -66,7 +66,7 @@ extern "C" {
  *         to 1073741824 (-0.125 to 0.125).
  * out     next[9]: direction cosine matrix, body to reference, after the step; next_11, ...,
  *         next_33; format Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to
- *         1.0625); error at most 9.60426e-10, 1.0312 of the last place.
+ *         1.0625); error at most 9.60427e-10, 1.0313 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_11, next_12,
  *   next_13, next_21, next_22, next_23, next_31, next_32, next_33 from -1.0625 to 1.0625.

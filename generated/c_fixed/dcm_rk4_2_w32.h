@@ -77,8 +77,8 @@ extern "C" {
  *         of the body rate; d1_x, ..., d2_z; format Q-1.32, unit 2^-32 rad; range -536870912
  *         to 536870912 (-0.125 to 0.125).
  * out     next[9]: direction cosine matrix, body to reference, after the step; next_11, ...,
- *         next_33; format Q1.30, unit 2^-30; range -2030515543 to 2030515543 (-1.89106 to
- *         1.89106); error at most 1.03842e-09, 1.1150 of the last place.
+ *         next_33; format Q1.30, unit 2^-30; range -2030515543 to 2030515543 (-1.89107 to
+ *         1.89107); error at most 1.03842e-09, 1.1150 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */
 int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t next[9]);

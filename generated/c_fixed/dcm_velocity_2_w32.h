@@ -59,7 +59,7 @@ extern "C" {
  * in      angle_sum[3]: sum of the angle increments since the slow cycle began; beta_x, beta_y,
  *         beta_z; format Q1.30, unit 2^-30 rad; range -1073741824 to 1073741824 (-1 to 1).
  * out     transformed[3]: velocity increment of the slow cycle, navigation axes; v_x, v_y, v_z;
- *         format Q6.25, unit 2^-25 m/s; range -2139095042 to 2139095042 (-63.75 to 63.75);
+ *         format Q6.25, unit 2^-25 m/s; range -2139095042 to 2139095042 (-63.7501 to 63.7501);
  *         error at most 3.86499e-08, 1.2969 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */

@@ -52,10 +52,10 @@ extern "C" {
  * in      state[9]: direction cosine matrix, body to reference; C_11, ..., C_33; format Q1.30,
  *         unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * in      previous[3]: the angles before; last_roll, last_pitch, last_heading; format Q2.29, unit
- *         2^-29 rad; range -1686629857 to 1686629857 (-3.14159 to 3.14159).
+ *         2^-29 rad; range -1686629857 to 1686629857 (-3.1416 to 3.1416).
  * out     next[3]: Euler angles: roll, pitch, heading; found_roll, found_pitch, found_heading;
- *         format Q2.29, unit 2^-29 rad; range -1686629858 to 1686629858 (-3.14159 to 3.14159);
- *         error at most 6.12424e-09, 3.2879 of the last place.
+ *         format Q2.29, unit 2^-29 rad; range -1686629858 to 1686629858 (-3.1416 to 3.1416);
+ *         error at most 6.12425e-09, 3.2880 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits: next_pitch_distance
  *   from 0.5 to 2; apart_distance from 0.5 to 8.

@@ -47,7 +47,7 @@ extern "C" {
  *         Q1.30, unit 2^-30; range -1140850688 to 1140850688 (-1.0625 to 1.0625).
  * out     next[4]: Euler parameters, body to reference, scalar last, after the step; next_x,
  *         next_y, next_z, next_s; format Q1.30, unit 2^-30; range -1613406519 to 1613406519
- *         (-1.5026 to 1.5026); error at most 2.93949e-09, 3.1563 of the last place.
+ *         (-1.50261 to 1.50261); error at most 2.93949e-09, 3.1563 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range,
  * 2 if it is too far from a proper one, so that something leaves its limits:
  *   inverse_norm_radicand from 0.5 to 2.

@@ -70,7 +70,7 @@ extern "C" {
  *         to 536870912 (-0.125 to 0.125).
  * out     next[4]: Euler parameters, body to reference, scalar last, after the step; next_x,
  *         next_y, next_z, next_s; format Q1.30, unit 2^-30; range -1634820097 to 1634820097
- *         (-1.52254 to 1.52254); error at most 7.54687e-10, 0.8103 of the last place.
+ *         (-1.52255 to 1.52255); error at most 7.54687e-10, 0.8104 of the last place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */
 int euler_rk4_2_w32(const int32_t state[4], const int32_t increments[6], int32_t next[4]);

@@ -73,15 +73,16 @@ extern "C" {
  *         -1073741824 to 1073741824 (-1 to 1).
  * out     next_angle_sum[3]: sum of the angle increments since the slow cycle began, after the
  *         call; next_beta_x, next_beta_y, next_beta_z; format Q1.30, unit 2^-30 rad; range
- *         -1207959553 to 1207959553 (-1.125 to 1.125); error at most 4.65661e-10, 0.5000 of
- *         the last place.
+ *         -1207959553 to 1207959553 (-1.12501 to 1.12501); error at most 4.65662e-10, 0.5000
+ *         of the last place.
  * out     next_velocity_sum[3]: sum of the velocity increments since the slow cycle began, after
  *         the call; next_u_x, next_u_y, next_u_z; format Q4.27, unit 2^-27 m/s; range
- *         -1207959553 to 1207959553 (-9 to 9); error at most 3.72529e-09, 0.5000 of the last
- *         place.
+ *         -1207959553 to 1207959553 (-9.00001 to 9.00001); error at most 3.7253e-09, 0.5000 of
+ *         the last place.
  * out     next_sculling[3]: sculling integral since the slow cycle began, after the call;
  *         next_eta_x, next_eta_y, next_eta_z; format Q3.28, unit 2^-28 m/s; range -1610612737
- *         to 1610612737 (-6 to 6); error at most 1.86265e-09, 0.5000 of the last place.
+ *         to 1610612737 (-6.00001 to 6.00001); error at most 1.86265e-09, 0.5000 of the last
+ *         place.
  * Returns 0; or, with the outputs left alone, 1 if an input lies outside its range.
  */
 int sculling_fast_2_w32(const int32_t angle_sum[3], const int32_t velocity_sum[3],
