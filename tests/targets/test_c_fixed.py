@@ -17,6 +17,7 @@ from gathering import each
 from strapgen import build, generate
 from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice
+from strapgen.ir.decimals import above, places_above
 from strapgen.ir.fixed_settings import Settings
 from strapgen.support.exceptions import InputError
 from strapgen.targets.c_fixed.statements import _noted
@@ -304,8 +305,8 @@ def test_the_header_states_format_unit_range_and_error():
         unit = f"2^-{argument.format.fraction}" + (" rad" if argument.signal.unit == "rad" else "")
         assert f"{argument.signal.name}[{argument.signal.size}]: {argument.signal.meaning};" in text
         assert f"format {argument.format}, unit {unit}; range {argument.low} to {argument.high} (" in text
-    worst = float(fixed.error_bounds["next"])
-    assert f"error at most {worst:.6g}, {worst * 2**30:.4f} of the last place" in text
+    worst = fixed.error_bounds["next"]
+    assert f"error at most {above(worst)}, {places_above(worst * 2**30)} of the last place" in text
     assert "Over a run of N steps rounding turns the attitude by at most" in text
     assert "--max-rate-deg-s 400 --step 0.01 --rounding nearest --carry full --drift-allowance 1/16" in text
 

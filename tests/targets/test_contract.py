@@ -25,7 +25,7 @@ from strapgen.targets.contract import argument_text, value_text
         # What saturates stores 1 itself as a place less.
         (
             Settings(word=16, state="q15"),
-            "format Q0.15, unit 2^-15; range -32768 to 32767 (-1 to 0.999969)",
+            "format Q0.15, unit 2^-15; range -32768 to 32767 (-1 to 0.99997)",
             "saturates at both ends; error at most 3.05176e-05, 1.0000 of the last place, where the exact value is "
             "from -1 to 1; beyond, at most the larger of this and its distance from the range",
         ),

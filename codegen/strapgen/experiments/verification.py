@@ -21,6 +21,7 @@ from strapgen.backends.protocol import Backend
 from strapgen.backends.registry import backend_class
 from strapgen.backends.step_sources import StepSources
 from strapgen.experiments.vectors import MODEL, vectors_of_choice
+from strapgen.ir.decimals import float_above
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.sources import Sources
@@ -275,7 +276,7 @@ def _fixed(
             worst = max(worst, exact.error(values[:2], values[2:]))
             state, feedback = np.asarray(expected[0]), expected_feedback
     bound = max(max(a.errors) / a.format.unit for a in sources.fixed.outputs)
-    return wrong, calls, worst, float(bound)
+    return wrong, calls, worst, float_above(bound)
 
 
 def _called(of: CFixedEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
@@ -349,7 +350,7 @@ def _bound(sources: Sources) -> float | None:
     known = sources.rounding
     if known is None or not known.errors or known.conditions:
         return None
-    return float(max(known.worst.values()))
+    return float_above(max(known.worst.values()))
 
 
 def _inside(row: CallVector, sources: Sources) -> bool:

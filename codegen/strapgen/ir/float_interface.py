@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from strapgen.ir.decimals import above, float_above, float_below
 from strapgen.ir.fixed_interface import RoundingAccumulation
 from strapgen.support.brief import short_repr
 
@@ -112,7 +112,7 @@ class RoundingBounds:
     def _in_words(self) -> str:
         if self.reason:
             return f"none known in {self.number}: {self.reason}"
-        worst = ", ".join(f"{name} {float(error):.2e}" for name, error in self.worst.items())
+        worst = ", ".join(f"{name} {above(error, 3, 'e')}" for name, error in self.worst.items())
         return f"of a call in {self.number}: {worst}"
 
     @property
@@ -126,15 +126,16 @@ class RoundingBounds:
         return {name: max(errors) for name, errors in self.errors.items()}
 
     def as_data(self) -> dict[str, Any]:
-        """Return the bounds for a reader of JSON, as floats rounded up; None where no bound is known."""
+        """Return the bounds for a reader of JSON, as floats on the safe side; None where no bound is known."""
         adds_up = self.accumulation
         return {
-            "inputs": {condition.value: float(condition.high) for condition in self.inputs},
-            "conditions": {c.value: [float(c.low), float(c.high)] for c in self.conditions},
+            "inputs": {condition.value: float_below(condition.high) for condition in self.inputs},
+            "conditions": {c.value: [float_above(c.low), float_below(c.high)] for c in self.conditions},
             "functions": list(self.functions),
-            "errors": {name: [_up(error) for error in errors] for name, errors in self.errors.items()}
+            "errors": {name: [float_above(error) for error in errors] for name, errors in self.errors.items()}
             or None,
-            "run": adds_up and {"per_step": _up(adds_up.per_step), "growth": _up(adds_up.growth - 1)},
+            "run": adds_up
+            and {"per_step": float_above(adds_up.per_step), "growth": float_above(adds_up.growth - 1)},
             "reason": self.reason or None,
         }
 
@@ -168,9 +169,3 @@ class RoundingBounds:
             adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
             data["reason"],
         )
-
-
-def _up(value: Fraction) -> float:
-    """Return a float that is not below a number."""
-    near = float(value)
-    return near if Fraction(near) >= value else math.nextafter(near, math.inf)

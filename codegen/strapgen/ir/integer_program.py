@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
+from strapgen.ir.decimals import above, float_above, float_below
 from strapgen.ir.fixed_interface import ErrorFeedback, Interface
 from strapgen.ir.formats import Format
 from strapgen.ir.program import Program
@@ -264,7 +265,7 @@ class FixedProgram:
         formats = ", ".join(
             f"{a.signal.name} {a.format}" for a in (*self.interface.inputs, *self.interface.outputs)
         )
-        bounds = ", ".join(f"{name} {float(bound):.2e}" for name, bound in self.error_bounds.items())
+        bounds = ", ".join(f"{name} {above(bound, 3, 'e')}" for name, bound in self.error_bounds.items())
         return f"{self.name}: {self.program.title}\n{formats}\nerror bounds of a call: {bounds}"
 
     @property
@@ -315,14 +316,20 @@ class FixedProgram:
         return {
             "settings": self.interface.settings.as_dict(),
             "formats": {name: str(format_) for name, format_ in self.formats.items()},
-            "ranges": {name: [float(low), float(high)] for name, (low, high) in self.ranges.items()},
-            "error_bound": {name: float(bound) for name, bound in self.error_bounds.items()},
-            "error_bound_by_element": {name: float(error) for pairs in elements for name, error in pairs},
+            "ranges": {
+                name: [float_below(low), float_above(high)] for name, (low, high) in self.ranges.items()
+            },
+            "error_bound": {name: float_above(bound) for name, bound in self.error_bounds.items()},
+            "error_bound_by_element": {
+                name: float_above(error) for pairs in elements for name, error in pairs
+            },
             "integer_operations": self.operations,
-            "accumulation": adds_up and {name: float(value) for name, value in asdict(adds_up).items()},
+            "accumulation": adds_up and {name: float_above(value) for name, value in asdict(adds_up).items()},
             "angle_accumulation": as_angle
             and {
-                name: float(value) if isinstance(value, Fraction) else value
+                name: (float_below if name in ("shortest", "start") else float_above)(value)
+                if isinstance(value, Fraction)
+                else value
                 for name, value in asdict(as_angle).items()
             },
         }

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 from strapgen.experiments.verification import Verification
 from strapgen.experiments.whole_verification import WholeVerification
+from strapgen.ir.decimals import places_above
 from strapgen.reports.report import Report
 
 #: Why there are no figures of calls.
@@ -64,5 +66,5 @@ def _text(result: Verification) -> str:
 def _calls(result: Verification) -> str:
     """Return what the calls of a function returned."""
     right = f"{result.calls - result.wrong} of {result.calls} calls return what they must"
-    bound = "" if result.bound_ulp is None else f", certified {result.bound_ulp:.4f}"
+    bound = "" if result.bound_ulp is None else f", certified {places_above(Fraction(result.bound_ulp))}"
     return f"{right}; error {result.max_ulp:.4f} of the last place{bound}"

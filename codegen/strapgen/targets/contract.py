@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from fractions import Fraction
 
+from strapgen.ir.decimals import above, below, places_above
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
 from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.formats import Format
@@ -22,10 +22,10 @@ def argument_text(argument: Argument) -> str:
         parts = [f"format {argument.format}, unit {_power(argument.format.fraction, signal.unit)}"]
     else:
         parts = [_counts_text(argument, argument.sensor)]
-    limits = f"{_number(argument.low * unit)} to {_number(argument.high * unit)}"
+    limits = f"{below(argument.low * unit)} to {above(argument.high * unit)}"
     parts.append(f"range {argument.low} to {argument.high} ({limits})")
     worst = max(argument.errors)
-    places = f"{_number(worst)}, {float(worst / unit):.4f} of the last place"
+    places = f"{above(worst)}, {places_above(worst / unit)} of the last place"
     if worst and argument.saturates:
         parts.append(
             f"saturates at both ends; error at most {places}, where the exact value is from -1 to 1; beyond, at "
@@ -87,18 +87,14 @@ def _power(fraction: int, unit: str) -> str:
     return f"2^{-fraction}" if unit == "1" else f"2^{-fraction} {unit}"
 
 
-def _number(value: Fraction) -> str:
-    return f"{float(value):.6g}"
-
-
 def accumulation_text(accumulation: RoundingAccumulation, program: Program, state: str = "") -> str:
     """Return the bound of a run of N steps in words; `state` names a state that saturates."""
     what = "in the length of a row" if len(program.inputs[0].shape) == 2 else "in the length of the state"
     growth = accumulation.growth - 1
-    stretched = f", times exp({_number(growth)} N)" if growth else ""
-    once = f"{_number(accumulation.once)} + " if accumulation.once else ""
+    stretched = f", times exp({above(growth)} N)" if growth else ""
+    once = f"{above(accumulation.once)} + " if accumulation.once else ""
     only = ", as long as exact arithmetic keeps every element of the state from -1 to 1" if state else ""
-    return f"({once}{_number(accumulation.per_step)} N){stretched}, {what}{only}"
+    return f"({once}{above(accumulation.per_step)} N){stretched}, {what}{only}"
 
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
@@ -157,7 +153,7 @@ def guards_text(values: tuple[Value, ...]) -> str:
     names: dict[tuple[str, str], list[str]] = {}
     for value in values:
         unit = Fraction(2) ** -value.fraction
-        limits = _number(value.offset + value.low * unit), _number(value.offset + value.high * unit)
+        limits = below(value.offset + value.low * unit), above(value.offset + value.high * unit)
         names.setdefault(limits, []).append(value.name)
     return "; ".join(f"{', '.join(held)} from {low} to {high}" for (low, high), held in names.items())
 
@@ -186,29 +182,14 @@ def value_text(value: Value, word: int) -> str:
     """Return format, range and error bound of a value in words, and the offset that is not stored."""
     unit = Fraction(2) ** -value.fraction
     format_ = Format(word * (1 + value.wide), value.fraction)
-    error = f"error {_outward(value.error, up=True, digits=2)}" if value.error else "exact"
-    low, high = _outward(value.low * unit, up=False), _outward(value.high * unit, up=True)
+    error = f"error {above(value.error, 2)}" if value.error else "exact"
+    low, high = below(value.low * unit, 3), above(value.high * unit, 3)
     offset = (
         f"; stands for {value.name} {'-' if value.offset > 0 else '+'} {abs(value.offset)}"
         if value.offset
         else ""
     )
     return f"{format_}, {low} .. {high}, {error}{offset}"
-
-
-def decimal_above(value: Fraction) -> str:
-    """Return a decimal number of six digits that is at least a value, and hardly more."""
-    return _outward(value, up=True, digits=6)
-
-
-def _outward(value: Fraction, up: bool, digits: int = 3) -> str:
-    """Return a number with few digits, rounded up or down."""
-    if not value:
-        return "0"
-    place = math.floor(math.log10(abs(value))) - digits + 1
-    above, below = value.numerator * 10 ** max(0, -place), value.denominator * 10 ** max(0, place)
-    integer = -(-above // below) if up else above // below
-    return f"{integer * 10 ** max(0, place) / 10 ** max(0, -place):.{digits}g}"
 
 
 def exact_text(value: Fraction) -> str:

@@ -13,13 +13,13 @@ from fractions import Fraction
 from itertools import zip_longest
 from typing import ClassVar
 
+from strapgen.ir.decimals import above
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.support.version import VERSION
-from strapgen.targets.contract import decimal_above
 from strapgen.targets.printer import ExactPrinter
 
 #: The sentence that begins the block in a header.
@@ -111,8 +111,7 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
     ensures = [
         (
             f"|{name(argument)}[{k}]{_unit(argument)} - {text}|",
-            f" <= {decimal_above(argument.errors[k])}"
-            + (f" where -1 <= {text} <= 1" if argument.saturates else ""),
+            f" <= {above(argument.errors[k])}" + (f" where -1 <= {text} <= 1" if argument.saturates else ""),
         )
         for argument, texts in zip(interface.outputs, _results(fixed.program), strict=True)
         for k, text in enumerate(texts)
@@ -151,7 +150,7 @@ def of_program(program: Program, function: str, command: str, rounding: Rounding
         for element, text, error in zip_longest(range(len(texts)), texts, bounds):
             name = f"{result.signal.name}[{element}]"
             if error:
-                ensures.append((f"|{name} - {_summand(text)}|", f" <= {decimal_above(error)}"))
+                ensures.append((f"|{name} - {_summand(text)}|", f" <= {above(error)}"))
             else:
                 ensures.append((f"{name} = {text}", ", rounded" if error is None else ""))
     return _contract(function, command, [*requires, *lets], ensures, [])

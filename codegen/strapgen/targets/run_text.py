@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
+from functools import partial
 
 from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
+from strapgen.ir.decimals import above, below
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.program import Program
 from strapgen.targets.contract import accumulation_text
 
+#: Bounds are written with four digits.
+_above, _below = partial(above, digits=4), partial(below, digits=4)
 #: Steps from one normalization to the next in the examples, unless fewer are proved.
 _APART = 1000
 #: Units of the last place by which an element of an orthonormalization is off in the examples.
@@ -110,18 +113,3 @@ def _runs(stated: str) -> list[tuple[int, str]]:
 def _angle(value: float) -> str:
     """Return a bound of an angle, unless it says nothing."""
     return f"{_above(Fraction(value))} rad" if value < math.pi else "no bound"
-
-
-def _above(value: Fraction, digits: int = 4) -> str:
-    """Return a number that is not below a value, in few digits."""
-    return _decimal(value, digits, ROUND_CEILING)
-
-
-def _below(value: Fraction, digits: int = 4) -> str:
-    """Return a number that is not above a value, in few digits."""
-    return _decimal(value, digits, ROUND_FLOOR)
-
-
-def _decimal(value: Fraction, digits: int, rounding: str) -> str:
-    quotient = Context(digits, rounding).divide(Decimal(value.numerator), Decimal(value.denominator))
-    return f"{float(quotient):.{digits}g}"

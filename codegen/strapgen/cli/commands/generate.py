@@ -13,6 +13,7 @@ from strapgen.cli.options import KernelOptions, OptionalAlgorithm, listed, optio
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
+from strapgen.ir.decimals import above, places_above
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -199,8 +200,8 @@ def _text(sources: Sources, target: str, written: list[Path]) -> str:
         bound, unit = max(output.errors), output.format.unit
         useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
         lines.append(
-            f"  {output.signal.name}: {output.format}, error at most {float(bound):.4g}, "
-            f"{float(bound / unit):.4f} of the last place"
+            f"  {output.signal.name}: {output.format}, error at most {above(bound, 4)}, "
+            f"{places_above(bound / unit)} of the last place"
             + (": of the size of the value, which certifies nothing" if useless else "")
         )
     if sources.rounding is not None:
@@ -213,7 +214,7 @@ def _rounding_lines(rounding: RoundingBounds) -> list[str]:
     if rounding.reason:
         return [f"  no error bound is known: {rounding.reason}"]
     return [
-        f"  {name}: error at most {float(bound):.4g}, {float(bound / rounding.unit):.4f} of the last place of 1"
+        f"  {name}: error at most {above(bound, 4)}, {places_above(bound / rounding.unit)} of the last place of 1"
         if bound
         else f"  {name}: exact"
         for name, bound in rounding.worst.items()

@@ -13,6 +13,7 @@ import numpy as np
 from strapgen.backends.evaluators import Array
 from strapgen.backends.systems import SystemMemory, SystemRunner
 from strapgen.backends.systems.compiled import CompiledSystem
+from strapgen.ir.decimals import float_above
 from strapgen.ir.signals import Signal
 from strapgen.support.exceptions import InputError
 from strapgen.systems.bounds import bounds
@@ -93,7 +94,7 @@ def agreement(
                 largest[name] = max(largest[name], float(difference.max(initial=0)))
                 if name in share:
                     share[name] = max(share[name], _share(difference, certified[name]))
-    worst = {name: float(max(errors)) for name, errors in certified.items()}
+    worst = {name: float_above(max(errors)) for name, errors in certified.items()}
     return PassAgreement(count, largest, worst, share, dict(limits.reasons))
 
 

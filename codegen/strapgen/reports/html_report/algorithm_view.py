@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from strapgen.evidence.subjects import Subject
 from strapgen.experiments.dossier.algorithm import AlgorithmDossier
+from strapgen.ir.decimals import above, below
 from strapgen.ir.integer_program import FixedProgram, used_by
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.reports.evidence import EvidencePage
@@ -139,10 +140,13 @@ def _signals(known: AlgorithmDossier) -> Iterable[SignalRow]:
     for direction, signal in (*(("in", signal) for signal in known.kernel.inputs), *outputs):
         fixed: dict[str, str] = {}
         if (argument := arguments.get(signal.name)) is not None:
-            low, high = (float(end * argument.unit) for end in (argument.low, argument.high))
-            bound = float(max(argument.errors))
-            fixed = {"format": str(argument.format), "range": f"{low:.6g} to {high:.6g}"}
-            fixed["bound"] = "" if direction == "in" else f"{bound:.4g}" if bound else "exact"
+            low, high, bound = (
+                argument.low * argument.unit,
+                argument.high * argument.unit,
+                max(argument.errors),
+            )
+            fixed = {"format": str(argument.format), "range": f"{below(low)} to {above(high)}"}
+            fixed["bound"] = "" if direction == "in" else above(bound, 4) if bound else "exact"
         yield SignalRow(
             direction,
             signal.name,
@@ -166,8 +170,8 @@ def _values(fixed: FixedProgram) -> Iterable[tuple[str, str, str, str]]:
         if value.name in inputs and not used_by(value):
             continue
         low, high = ranges[value.name]
-        error = f"{float(value.error):.3g}" if value.error else "exact"
-        yield value.name, str(formats[value.name]), f"{float(low):.6g} to {float(high):.6g}", error
+        error = above(value.error, 3) if value.error else "exact"
+        yield value.name, str(formats[value.name]), f"{below(low)} to {above(high)}", error
 
 
 def _files(files: dict[str, str]) -> tuple[CodeFile, ...]:

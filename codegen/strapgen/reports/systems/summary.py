@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict
+from fractions import Fraction
 from typing import Any
 
+from strapgen.ir.decimals import above, float_above
 from strapgen.ir.signals import Signal
 from strapgen.reports.report import Report
 from strapgen.reports.table import ERROR, Column, TextTable
@@ -69,7 +71,7 @@ def bound_lines(fit: Fitted, errors: SystemBounds) -> list[str]:
     result = []
     if known:
         bounds = ", ".join(
-            f"{name} {float(max(errors.errors[name])):.3e} {_unit(fit, name)}".rstrip() for name in known
+            f"{name} {above(max(errors.errors[name]), 4, 'e')} {_unit(fit, name)}".rstrip() for name in known
         )
         result.append(
             "Error of one pass through all rates, at most, against exact arithmetic on the same memory and samples: "
@@ -124,7 +126,7 @@ def _cells(fit: Fitted, errors: SystemBounds) -> Iterator[dict[str, Any]]:
             **_about(fit, cell.name, cell.signal),
             "samples": cell.samples,
             "initial": [float(value) for value in cell.initial],
-            "error": None if bounds is None else float(max(bounds, default=0)),
+            "error": None if bounds is None else float_above(max(bounds, default=Fraction(0))),
             "no_bound": errors.reasons.get(cell.name),
         }
 
@@ -137,7 +139,7 @@ def _about(fit: Fitted, name: str, signal: Signal) -> dict[str, Any]:
         "frame": signal.frame,
         "shape": list(signal.shape),
         "format": None if argument is None else str(argument.format),
-        "range": None if largest is None else float(largest),
+        "range": None if largest is None else float_above(Fraction(largest)),
     }
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 
+from strapgen.ir.decimals import above, below
 from strapgen.ir.float_interface import Condition, RoundingBounds
 from strapgen.ir.program import Program
-from strapgen.targets.contract import decimal_above
 
 
 def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
@@ -70,19 +69,21 @@ def rounding_text(
     if bounds.accumulation is not None:
         row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
         growth = bounds.accumulation.growth - 1
-        stretched = f" exp({decimal_above(growth)} N)" if growth else ""
-        text += f"; the {row} after N steps is at most {decimal_above(bounds.accumulation.per_step)} N{stretched} long"
+        stretched = f" exp({above(growth)} N)" if growth else ""
+        text += (
+            f"; the {row} after N steps is at most {above(bounds.accumulation.per_step)} N{stretched} long"
+        )
     return f"{text}. This holds for {_conditions(bounds, flag, library)}"
 
 
 def _errors(bounds: RoundingBounds) -> str:
     """Return the largest error of every output."""
     parts = [
-        f"{name} is off by at most {decimal_above(worst)}" if worst else f"{name} is exact"
+        f"{name} is off by at most {above(worst)}" if worst else f"{name} is exact"
         for name, worst in bounds.worst.items()
     ]
     if len(parts) == 1:
-        parts[0] += f", {decimal_above(bounds.worst.popitem()[1] / bounds.unit)} units in the last place of 1"
+        parts[0] += f", {above(bounds.worst.popitem()[1] / bounds.unit)} units in the last place of 1"
     return ", ".join(parts)
 
 
@@ -90,9 +91,9 @@ def _conditions(bounds: RoundingBounds, flag: str, library: str) -> str:
     """Return what the bounds hold for."""
     sizes: dict[str, list[str]] = {}
     for condition in bounds.inputs:
-        sizes.setdefault(f"up to {_plain(condition.high)}", []).append(condition.value)
+        sizes.setdefault(f"up to {below(condition.high)}", []).append(condition.value)
     for condition in bounds.conditions:
-        limits = f"from {_plain(condition.low)} to {_plain(condition.high)}"
+        limits = f"from {above(condition.low)} to {below(condition.high)}"
         sizes.setdefault(limits, []).append(condition.value)
     parts = [f"{', '.join(names)} {size}" for size, names in sizes.items()]
     if bounds.functions:
@@ -100,7 +101,3 @@ def _conditions(bounds: RoundingBounds, flag: str, library: str) -> str:
         parts.append(f"{names} of {library} within a unit in the last place")
     parts += ["IEEE 754, each operation rounded to the nearest", *filter(None, [flag])]
     return "; ".join(parts)
-
-
-def _plain(value: Fraction) -> str:
-    return f"{float(value):.6g}"

@@ -9,12 +9,12 @@ from typing import TypeVar
 
 from strapgen.catalogue.methods.late_filters import NEXT, SHORT, LateFilters
 from strapgen.catalogue.methods.lost_samples import REACH
+from strapgen.ir.decimals import above
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Function, Sources
 from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import CPrinter, real_of
 from strapgen.targets.commit_late_c.fixed_filters import NORMALIZED_EVERY, FixedFilters
-from strapgen.targets.contract import decimal_above
 from strapgen.targets.rendering import render
 
 _Tap = TypeVar("_Tap", int, Fraction)
@@ -197,7 +197,7 @@ def _in_fixed_point(
         "residuals": [{"place": place, "fresh": word.fresh} for place, word in enumerate(feedback)],
         "normalized_residuals": bool(normalization.fixed.residuals),
         "every": NORMALIZED_EVERY,
-        "now_errors": [decimal_above(error) for error in fixed.now_errors],
+        "now_errors": [above(error) for error in fixed.now_errors],
         "state_argument": state,
         "sample_argument": samples,
         "type": f"int{state.format.word}_t",
