@@ -345,7 +345,7 @@ BAD = {
     "generate euler --target c-fixed --lsb 0.0175dps": "--lsb is a rate a count; --sample-hz is missing",
     "generate euler --target c-fixed --lsb 0.0175 --sample-hz 100": "lsb is '0.0175'; a number with its unit is needed",
     "generate euler --target c-fixed --lsb 1dpx --sample-hz 100": "lsb is '1dpx'; a number with its unit is needed",
-    "generate euler --target c-fixed --lsb xdps --sample-hz 100": "lsb is 'x'; a finite number is needed",
+    "generate euler --target c-fixed --lsb xdps --sample-hz 100": "lsb is 'xdps'; a number with its unit is needed",
     "generate euler --target c-fixed --lsb 1dps --lsb-rad 1 --sample-hz 9": "--lsb and --lsb-rad are both given",
     "generate euler --target c-fixed --lsb 3e-6rad --sample-hz 9": "an angle a count; --lsb-rad takes it",
     "generate euler --target c-fixed --lsb 1dps --sample-hz 9": "rad (--sample-hz 9, lsb 1dps); from 1e-11 to 4 is",
@@ -397,7 +397,6 @@ BAD = {
     f"compare euler --fail-above much {CONSTANT}": "fail-above is 'much'; a finite number is needed",
     f"compare euler --backends numpy,c --carry full {CONSTANT}": "--carry is for fixed-point back ends, and none",
     f"compare euler --format yaml {CONSTANT}": "format 'yaml' is not known; allowed: text, json, csv",
-    f"compare euler {EVEN}": "--rates-csv needs --rate-unit",
     f"compare error-matrix {CONSTANT}": "algorithm 'error-matrix' is no attitude step",
     "compare euler --motion constant --step 1 --duration 2": "motion constant needs parameters",
     "compare euler --motion constant --set x_deg_s=1 --step 1": "--motion needs --duration in s",
@@ -529,7 +528,7 @@ BAD = {
     # simulate: what goes with what
     "simulate euler": "one of --motion, --increments-csv, --rates-csv is needed; none given",
     f"simulate euler {CONSTANT} {EVEN} --rate-unit deg/s": "is needed; --motion and --rates-csv given",
-    f"simulate euler {EVEN}": "--rates-csv needs --rate-unit deg/s or rad/s",
+    f"simulate euler {EVEN} --rate-unit rad/s": "--rate-unit rad/s contradicts the header",
     f"simulate euler {EVEN} --rate-unit rpm": "rate unit 'rpm' is not known; allowed: rad/s, deg/s",
     f"simulate euler {EVEN} --rate-unit deg/s --step 1": "--step goes with --motion, not with --rates-csv",
     f"simulate euler {EVEN} --rate-unit deg/s --duration 1": "--duration goes with --motion",
@@ -546,9 +545,9 @@ BAD = {
     "simulate euler --increments-csv none.csv": "none.csv cannot be read (No such file or directory)",
     "simulate euler --increments-csv .": "cannot be read (Is a directory)",
     "simulate euler --increments-csv nan.csv": "nan.csv, line 3: column 3 is 'nan'; a finite number is needed",
-    "simulate euler --rates-csv nan.csv --rate-unit rad/s": "nan.csv, line 3: column 3 is 'nan'",
+    "simulate euler --rates-csv nan.csv --columns t,dx,dy,dz --rate-unit rad/s": "nan.csv, line 3: column 3 is 'nan'",
     "simulate euler --increments-csv gap.csv": "gap.csv, line 5: a gap of 0.97 s",
-    "simulate euler --rates-csv gap.csv --rate-unit rad/s --resample-hz 100": "gap.csv, line 5: a gap of 0.97 s",
+    "simulate euler --rates-csv gap.csv --columns t,dx,dy,dz --rate-unit rad/s --resample-hz 100": "line 5: a gap",
     f"simulate euler --rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s": "sample times are not even",
     f"simulate euler {EVEN} --rate-unit deg/s --resample-hz 0": "resample-hz is 0; a number above 0 is needed",
     f"simulate euler {EVEN} --rate-unit deg/s --resample-hz often": "resample-hz is 'often'; a finite number",
@@ -557,7 +556,7 @@ BAD = {
     f"simulate euler {EVEN} --rate-unit deg/s --record 500": "record 500 s is longer than the recording",
     f"simulate euler {EVEN} --rate-unit deg/s --orthonormalize 0": "orthonormalize is 0; a number above 0",
     "simulate dcm --increments-csv large.csv": "not finite",
-    "simulate dcm --rates-csv large.csv --rate-unit rad/s": "finite",
+    "simulate dcm --rates-csv large.csv --columns t,dx,dy,dz --rate-unit rad/s": "finite",
     # simulate: output
     f"simulate euler {CONSTANT} --out file/run.txt": "file cannot be written",
     f"simulate euler {CONSTANT} --out .": "is a folder; a file is to be written there",
@@ -712,7 +711,7 @@ def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
     from strapgen.backends import Backend
     from strapgen.cli.commands import simulate
 
-    Path("log.csv").write_text("".join(f"{k},0,0,0\n" for k in range(102)))
+    Path("log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(102)))
     monkeypatch.setattr(simulate, "_MOST_RECORDS", 2_000_000 if "motion" in source else 50)
     with monkeypatch.context() as patch:
         patch.setattr(Backend, "propagate", None)  # the run does not begin
@@ -724,7 +723,7 @@ def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
     assert (stop.value.code, said.out, said.err) == (2, "", told)
     if "motion" not in source:
         with pytest.raises(SystemExit) as stop:
-            main(shlex.split(f"simulate euler {source} --record 4"))
+            main(shlex.split(f"simulate euler {source} --record 0.4"))
         assert stop.value.code == 0 and capsys.readouterr().out.count("\n") == 1 + 26
 
 
@@ -751,7 +750,10 @@ def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
             for c in ("derive eulr", "simulate euler --increments-csv nan.csv")
         ),
         f"simulate dcm --motion constant --set x_deg_s=1e300 {TIMES}",
-        pytest.param("simulate dcm --rates-csv large.csv --rate-unit rad/s", marks=pytest.mark.long),
+        pytest.param(
+            "simulate dcm --rates-csv large.csv --columns t,dx,dy,dz --rate-unit rad/s",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_so_it_is_for_a_process(command, folder):

@@ -99,4 +99,4 @@ def test_one_option_is_the_same_in_every_command_that_shares_its_group():
                 if p.name in inspect.get_annotations(SampleSource)
             ]
     assert shown["simulate"] == shown["compare"]
-    assert len(shown["simulate"]) == 11
+    assert len(shown["simulate"]) == 16

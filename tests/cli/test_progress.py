@@ -74,7 +74,7 @@ def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_p
     from strapgen.cli import main
     from strapgen.simulation import recording
 
-    (tmp_path / "log.csv").write_text("".join(f"{k},0,0,0\n" for k in range(5)))
+    (tmp_path / "log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(4)))
     stream = Terminal()
 
     def slowly(function, text):

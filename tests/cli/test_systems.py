@@ -57,7 +57,9 @@ def test_simulate_shows_the_errors_of_a_system(file, tmp_path, capsys):
 
 
 def test_a_recording_gives_attitude_and_outputs(file, log, tmp_path, capsys):
-    status, out, _ = says(f"simulate {file} --rates-csv {log} --rate-unit rad/s --format json", capsys)
+    status, out, _ = says(
+        f"simulate {file} --rates-csv {log} --columns t,dx,dy,dz --rate-unit rad/s --format json", capsys
+    )
     assert status == 0 and json.loads(out)["sample_hz"] == 100
     status, out, err = says(f"strapdown two-speed-euler --increments-csv {log} --format json", capsys)
     assert (status, err) == (0, "")

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.simulation import recorded_columns
-from strapgen.simulation.recorded_columns import Columns, SampleIntervals, largest_magnitude, parts
+from strapgen.simulation.recorded import recorded_columns
+from strapgen.simulation.recorded.recorded_columns import Columns, SampleIntervals, largest_magnitude, parts
 from strapgen.support.exceptions import InputError
 
 

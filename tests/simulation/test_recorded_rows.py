@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tempfile
 import tracemalloc
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +13,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.simulation import recorded_columns, recorded_rows, recording
-from strapgen.simulation.recorded_rows import LineNumbers, read_rows
+from strapgen.simulation import recording
+from strapgen.simulation.recorded import recorded_columns, recorded_rates, recorded_rows
+from strapgen.simulation.recorded.recorded_header import ColumnLayout, named_layout
+from strapgen.simulation.recorded.recorded_rows import LineNumbers, read_rows
 from strapgen.support import delimited
 from strapgen.support.exceptions import InputError
 
 NAMES = ("t", "dx", "dy", "dz")
 
 
-def outcome(path: Path, names: tuple[str, ...] | None = NAMES) -> object:
+def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
+    """Return the layout of a file of increments, whose times are in s."""
+    layout = named_layout(header, width, NAMES, ("s", "rad", "rad", "rad"))
+    return replace(layout, time_unit="s")
+
+
+def outcome(path: Path) -> object:
     """Return what a file holds, or why it is refused."""
     try:
-        rows = read_rows(path, names)
+        rows, _ = read_rows(path, find)
     except InputError as error:
         return str(error)
     count = len(rows.time)
@@ -37,17 +47,17 @@ ROWS = st.lists(PLAIN, min_size=3, max_size=6).map(",".join) | st.sampled_from(
 )
 
 
-@given(st.lists(ROWS, max_size=30), st.sampled_from(["\n", "\r\n", "\r"]), st.booleans())
-def test_a_block_is_read_as_its_rows_are(lines, end, is_named):
+@given(st.lists(ROWS, max_size=30), st.sampled_from(["\n", "\r\n", "\r"]))
+def test_a_block_is_read_as_its_rows_are(lines, end):
     path = Path(tempfile.gettempdir()) / f"rows-{np.random.default_rng().integers(1 << 60)}.csv"
     good = [f"{k},{k},{k},{k}" for k in range(4)]
     path.write_bytes(end.join([*good, *lines, *good, ""]).encode())
     try:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(delimited, "_BLOCK", 3)
-            by_block = outcome(path, NAMES if is_named else None)
+            by_block = outcome(path)
             patch.setattr(recorded_rows._Reading, "_plain", lambda self, block: None)
-            assert outcome(path, NAMES if is_named else None) == by_block
+            assert outcome(path) == by_block
     finally:
         path.unlink()
 
@@ -62,8 +72,8 @@ def test_most_blocks_are_read_by_numpy(tmp_path, monkeypatch):
         "_plain",
         lambda self, block: taken.append(numbers := plain(self, block)) or numbers,
     )
-    rows = read_rows(path, NAMES)
-    assert len(taken) == 10 and all(numbers is not None for numbers in taken)
+    rows, _ = read_rows(path, find)
+    assert len(taken) == 11 and all(numbers is not None for numbers in taken)
     assert rows.values.tolist() == [[1, 2, 3]] * 100
     assert [rows.lines[k] for k in (0, 8, 9, 99)] == [2, 10, 11, 101]
 
@@ -84,7 +94,7 @@ def test_line_numbers_come_back(blocks):
 @pytest.fixture
 def on_disk(monkeypatch):
     monkeypatch.setattr(recorded_columns, "_IN_MEMORY", 1000)
-    for module in (recorded_columns, recording):
+    for module in (recorded_columns, recorded_rates):
         monkeypatch.setattr(module, "PART", 1000)
     monkeypatch.setattr(delimited, "_BLOCK", 1000)
 
@@ -148,6 +158,6 @@ def test_points_of_the_grid_on_last_rows_of_parts_have_the_bits_of_all_at_once(r
     rates = rng.normal(size=(200, 3)).tolist()
     path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
     at_once = recording.read_rates(path, "rad/s", 64).increments
-    for module in (recorded_columns, recording):
+    for module in (recorded_columns, recorded_rates):
         monkeypatch.setattr(module, "PART", 4)
     np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).increments, at_once)

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -53,3 +54,12 @@ def waiting(title: str) -> Iterator[None]:
     finally:
         done.set()
         shown.join()
+
+
+def say_unused(file: Path, unused: int, of_step: int, step: str = "step") -> None:
+    """Say on stderr that increments at the end of a recording fill no step."""
+    if unused:
+        verb = "increment at the end fills" if unused == 1 else "increments at the end fill"
+        import typer
+
+        typer.echo(f"strapgen: {file}: {unused} {verb} no {step} of {of_step} and is left out", err=True)

@@ -7,9 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import typer
 
 from strapgen.cli.options import option
+from strapgen.cli.progress import say_unused, waiting
+from strapgen.cli.sensor_options import SensorFile, force_of, read_errors, with_errors
 from strapgen.simulation.rate_motions.motion_files import is_file
 from strapgen.support.exceptions import InputError
 
@@ -21,7 +25,6 @@ if TYPE_CHECKING:
     from strapgen.simulation.sensor_errors.instruments import InstrumentErrors
 
 _Text = str | None
-Recorded = TypeVar("Recorded", bound="Recording")
 
 #: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
@@ -34,17 +37,6 @@ MotionSettings = Annotated[
         "--set",
         metavar="KEY=VALUE...",
         help="Parameters of the motion; strapgen list motions shows their names.",
-        panel="Input",
-    ),
-]
-
-#: The option of sensor errors, for every command that runs an algorithm.
-SensorFile = Annotated[
-    str | None,
-    option(
-        "--errors",
-        metavar="FILE",
-        help="TOML file of sensor errors, or a class: ins-0.1, ins-1, ahrs or midcourse.  [default: no errors]",
         panel="Input",
     ),
 ]
@@ -96,12 +88,56 @@ class SampleSource:
         option(
             "--rates-csv",
             metavar="FILE",
-            help="CSV file of rates, in place of a motion: the first four columns are the time in s and three rates.",
+            help="CSV file of rates, in place of a motion; its header names the time, three rates and their units.",
         ),
     ] = None
     rate_unit: Annotated[
-        _Text, option("--rate-unit", metavar="UNIT", help="Unit of the rates in --rates-csv: deg/s or rad/s.")
+        _Text,
+        option(
+            "--rate-unit",
+            metavar="UNIT",
+            help="Unit of the rates in --rates-csv where the header has none: rad/s, deg/s, dps or mdps.",
+        ),
     ] = None
+    columns: Annotated[
+        _Text,
+        option(
+            "--columns",
+            metavar="NAME,...",
+            help="Names or numbers of the columns in --rates-csv where the header leaves them open: the time and three "
+            "rates, or with --sample-hz the rates.",
+        ),
+    ] = None
+    time_unit: Annotated[
+        _Text,
+        option(
+            "--time-unit",
+            metavar="UNIT",
+            help="Unit of the times in --rates-csv where the header has none: s, ms, us or ns.",
+        ),
+    ] = None
+    sample_hz: Annotated[
+        _Text,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Samples of the gyro in a second, in place of times in --rates-csv.",
+        ),
+    ] = None
+    bridge_gaps: Annotated[
+        bool,
+        option(
+            "--bridge-gaps",
+            help="With --resample-hz, take the rate in --rates-csv as linear across gaps too, and say where.",
+        ),
+    ] = False
+    drop_repeated: Annotated[
+        bool,
+        option(
+            "--drop-repeated",
+            help="Leave out rows of --rates-csv with the time of the row before, and say so.",
+        ),
+    ] = False
     resample_hz: Annotated[
         _Text,
         option(
@@ -133,7 +169,7 @@ class SampleSource:
     @property
     def stated(self) -> bool:
         """Whether any of the options is stated."""
-        return any(getattr(self, field.name) is not None for field in fields(self))
+        return any(getattr(self, field.name) not in (None, False) for field in fields(self))
 
     def check(self, of_system: bool = False) -> None:
         """Check that there is one source of increments, with the options that go with it and no others.
@@ -165,10 +201,17 @@ class SampleSource:
         ]:
             raise InputError(f"--motion needs {missing[0]} in s")
         if self.rates_csv is None:
-            rates = {"--rate-unit": self.rate_unit, "--resample-hz": self.resample_hz}
+            names = (
+                "rate_unit",
+                "resample_hz",
+                "columns",
+                "time_unit",
+                "sample_hz",
+                "bridge_gaps",
+                "drop_repeated",
+            )
+            rates = {f"--{name.replace('_', '-')}": getattr(self, name) or None for name in names}
             _refuse(rates, "--rates-csv", chosen[0])
-        elif self.rate_unit is None:
-            raise InputError("--rates-csv needs --rate-unit deg/s or rad/s")
 
     @property
     def file(self) -> Path:
@@ -239,16 +282,26 @@ class SampleSource:
 
     def recording(self) -> Recording:
         """Read the recorded data."""
-        from strapgen.cli.progress import waiting
         from strapgen.simulation import recording
 
         errors = self.sensor_errors()
         with waiting(f"reading {self.file.name}"):
             data = (
-                recording.read_rates(self.rates_csv or "", self.rate_unit or "", self.resample_hz)
+                recording.read_rates(
+                    self.rates_csv or "",
+                    self.rate_unit,
+                    self.resample_hz,
+                    columns=self.columns,
+                    time_unit=self.time_unit,
+                    sample_hz=self.sample_hz,
+                    bridge_gaps=self.bridge_gaps,
+                    drop_repeated=self.drop_repeated,
+                )
                 if self.increments_csv is None
                 else recording.read_increments(self.increments_csv)
             )
+        for remark in data.remarks:
+            typer.echo(f"strapgen: {self.file}: {remark}", err=True)
         return with_errors(data, errors)
 
     def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
@@ -305,38 +358,10 @@ class SampleSource:
             raise InputError(
                 f"the recording holds {len(data.increments)} increments; a step needs {samples + beside}"
             )
+        say_unused(self.file, len(data.increments) - beside - steps * samples, samples)
         increments = windows(data.increments[: beside + steps * samples], samples, beside)
         length = data.interval * samples
         return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
-
-
-def read_errors(source: str | None) -> InstrumentErrors | None:
-    """Return the errors that --errors names; None without it."""
-    if source is None:
-        return None
-    from strapgen.simulation.sensor_errors.error_file import read
-
-    return read(source)
-
-
-def with_errors(data: Recorded, errors: InstrumentErrors | None) -> Recorded:
-    """Return a recording as sensors with errors measure what it holds."""
-    if errors is None:
-        return data
-    from strapgen.simulation.sensor_errors.measured_motions import measured_recording
-
-    return measured_recording(data, errors)
-
-
-def force_of(text: str | None) -> tuple[float, float, float]:
-    """Return a specific force of the command line in m/s^2."""
-    from strapgen.support import checks
-
-    parts = ["0"] * 3 if text is None else text.split(",")
-    if len(parts) != 3:
-        raise InputError(f"--specific-force is {text!r}; three numbers with commas between are needed")
-    x, y, z = (Fraction(checks.number("specific-force", part)) for part in parts)
-    return float(x), float(y), float(z)
 
 
 def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:

@@ -7,17 +7,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from strapgen.support import checks
+from strapgen.support import checks, units
 from strapgen.support.exceptions import InputError
 
-#: pi to 50 decimals: what it leaves out of a scale is below 1e-50 of it.
-_PI = Fraction(314159265358979323846264338327950288419716939937510, 10**50)
-#: Units of a rate a count, each with the rate in rad/s and the name that people read.
-_RATES = {
-    "mdps": (_PI / 180000, "mdeg/s"),
-    "dps": (_PI / 180, "deg/s"),
-    "rad/s": (Fraction(1), "rad/s"),
-}
 #: The unit of an angle a count.
 _ANGLE = "rad"
 #: Bits of a count where none are stated: those of nearly all gyros.
@@ -71,21 +63,20 @@ class Sensor:
             If it is no number with one of these units, or a rate comes without an interval.
         """
         text = str(lsb).strip()
-        unit = next((unit for unit in (*_RATES, _ANGLE) if text.endswith(unit)), None)
-        if unit is None:
+        digits, unit = units.split(text)
+        name = units.spelled(unit)
+        if name != _ANGLE and name not in units.RATES:
             raise InputError(
-                f"lsb is {text!r}; a number with its unit is needed: {', '.join(_RATES)} for a rate a count, "
+                f"lsb is {text!r}; a number with its unit is needed: mdps, dps, deg/s or rad/s for a rate a count, "
                 "as 0.0175dps, or rad for an angle"
             )
-        value = checks.number("lsb", text.removesuffix(unit), positive=True)
-        digits = text.removesuffix(unit).strip()
-        if unit == _ANGLE:
+        value = checks.number("lsb", digits, positive=True)
+        if name == _ANGLE:
             return cls(value, f"{digits} rad", f"--lsb-rad {digits}")
         if interval is None:
             raise InputError(f"lsb {text} is a rate; --sample-hz is missing, which makes it an angle")
-        rate, name = _RATES[unit]
-        angle = value * rate * interval
-        stated = f"{heard} --lsb {digits}{unit}".strip()
+        angle = value * units.RATES[name] * interval
+        stated = f"{heard} --lsb {digits}{name if ' ' in unit else unit}".strip()
         return cls(angle, f"{digits} {name} * {_decimal(interval)} s", stated)
 
     @property

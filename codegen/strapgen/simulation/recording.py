@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,31 +13,42 @@ from numpy.typing import NDArray
 from strapgen.backends import Backend
 from strapgen.backends.increments import StepWindows
 from strapgen.simulation.history import History as History
-from strapgen.simulation.recorded_columns import (
-    PART,
-    Columns,
+from strapgen.simulation.recorded.recorded_columns import (
     SampleIntervals,
     largest_magnitude,
-    parts,
     release,
 )
-from strapgen.simulation.recorded_rows import LineNumbers, RecordedRows, read_rows
-from strapgen.simulation.runs import require_finite
-from strapgen.support import checks, stages
+from strapgen.simulation.recorded.recorded_header import (
+    ColumnLayout,
+    Stated,
+    known_unit,
+    named_layout,
+    rates_layout,
+)
+from strapgen.simulation.recorded.recorded_rates import (
+    GAP,
+    gap_remarks,
+    grid_points,
+    integrals,
+    resampled,
+    without_repeated,
+)
+from strapgen.simulation.recorded.recorded_rows import LineNumbers, RecordedRows, read_rows
+from strapgen.simulation.runs import require_finite, require_proper
+from strapgen.support import checks, stages, units
 from strapgen.support.brief import short_repr
 from strapgen.support.exceptions import InputError, InputTypeError
 
 Array = NDArray[np.float64]
 
 #: Units of recorded rates, and their factor to rad/s.
-RATE_UNITS = {"rad/s": 1.0, "deg/s": math.radians(1)}
+RATE_UNITS = {name: float(factor) for name, factor in units.RATES.items()}
 
-_INCREMENT_COLUMNS = ("t", "dx", "dy", "dz")
-_INERTIAL_COLUMNS = (*_INCREMENT_COLUMNS, "dvx", "dvy", "dvz")
+#: Names of columns, and their units.
+_INCREMENT_COLUMNS = {"t": "s", "dx": "rad", "dy": "rad", "dz": "rad"}
+_INERTIAL_COLUMNS = {**_INCREMENT_COLUMNS, "dvx": "m/s", "dvy": "m/s", "dvz": "m/s"}
 #: Largest relative departure of an interval from the median in an even recording.
 _EVEN = 1e-3
-#: From this multiple of the median on, an interval is a gap in which the motion is not known.
-_GAP = 10
 
 
 @dataclass(frozen=True)
@@ -51,11 +63,14 @@ class Recording:
         Sampling interval in s.
     increments : array, (N, 3)
         Angle increments in rad, body axes.
+    remarks : tuple of str, optional
+        What was left out of the file or taken in place of what it lacks, a sentence each.
     """
 
     start: float
     interval: float
     increments: Array
+    remarks: tuple[str, ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
 
@@ -84,7 +99,9 @@ class InertialRecording(Recording):
     __repr__ = short_repr
 
 
-def _checked_intervals(path: Path, rows: RecordedRows) -> tuple[SampleIntervals, float]:
+def _checked_intervals(
+    path: Path, rows: RecordedRows, bridged: bool = False
+) -> tuple[SampleIntervals, float]:
     """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
     time, lines = rows.time, rows.lines
     if not math.isfinite(float(time[-1]) - float(time[0])):
@@ -95,13 +112,15 @@ def _checked_intervals(path: Path, rows: RecordedRows) -> tuple[SampleIntervals,
         raise InputError(
             f"{path}, line {lines[worst + 1]}: "
             f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
+            + ("; --drop-repeated leaves out rows with the same time" if shortest == 0 else "")
         )
     median = intervals.median()
     longest, widest = intervals.longest
-    if longest > _GAP * median:
+    if longest > GAP * median and not bridged:
         raise InputError(
             f"{path}, line {lines[widest + 1]}: a gap of {longest:.6g} s; "
-            f"the median interval is {median:.6g} s, and up to {_GAP} times that is allowed"
+            f"the median interval is {median:.6g} s, and up to {GAP} times that is allowed; --bridge-gaps with "
+            "--resample-hz takes the rate as linear across it"
         )
     return intervals, median
 
@@ -181,9 +200,13 @@ def read_inertial(path: str | Path) -> InertialRecording:
     return InertialRecording(start, interval, *map(np.ascontiguousarray, np.hsplit(values, 2)))
 
 
-def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, Array]:
+def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, float, Array]:
     """Return the time at which the first increment begins, the interval, and the increments."""
-    rows = read_rows(path, names)
+
+    def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
+        return named_layout(header, width, [*columns], [*columns.values()])
+
+    rows, _ = read_rows(path, find)
     intervals, median = _checked_intervals(path, rows)
     _require_even(path, intervals, median, rows.lines, "increments are needed at even times")
     interval = float((rows.time[-1] - rows.time[0]) / intervals.count)
@@ -191,104 +214,94 @@ def _even_increments(path: Path, names: tuple[str, ...]) -> tuple[float, float, 
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
-def read_rates(path: str | Path, unit: str, resample_hz: float | str | None = None) -> Recording:
+def read_rates(
+    path: str | Path,
+    unit: str | None = None,
+    resample_hz: float | str | None = None,
+    *,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    sample_hz: float | str | None = None,
+    bridge_gaps: bool = False,
+    drop_repeated: bool = False,
+) -> Recording:
     r"""Read a file of body rates and integrate them, with linear interpolation between samples.
 
     Parameters
     ----------
     path : path
-        Comma-separated values: time in s and the rates about x, y, z in the first four columns, with or without a
-        header; further columns are ignored.
-    unit : str
-        Unit of the rates, a key of `RATE_UNITS`.
+        A table with commas, semicolons, tabs or blanks between cells. A header names the columns of the time and of
+        three rates, with their units if it states any: ``time [ms],gx [deg/s],gy [deg/s],gz [deg/s]``. Without one
+        there are four columns: time in s, and the rates.
+    unit : str, optional
+        Unit of the rates, a key of `RATE_UNITS`, where the header has none.
     resample_hz : number, optional
         Frequency of an even grid to integrate over, needed if the times are not even.
+    columns : str, optional
+        Names or numbers of the columns, with commas between, where the header leaves them open: the time and three
+        rates, or with `sample_hz` the rates alone.
+    time_unit : str, optional
+        "s", "ms", "us" or "ns", where the header has none.
+    sample_hz : number, optional
+        Sampling rate in Hz, in place of a column of times.
+    bridge_gaps : bool, optional
+        Whether the rate is linear across gaps too; it needs `resample_hz`.
+    drop_repeated : bool, optional
+        Whether rows are left out whose time is that of the row before.
 
     Returns
     -------
     Recording
+        Its `remarks` say what was bridged and left out.
 
     Raises
     ------
     InputError
-        If the file cannot be read, a value is no finite number, there is a gap, or the times are not even and there
-        is no `resample_hz`; the message names the line.
+        If the file cannot be read, its columns or units are open or contradict what is stated, a value is no finite
+        number, there is a gap, or the times are not even and there is no `resample_hz`; the message names the line.
 
     Examples
     --------
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t,x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n")
+    >>> _ = log.write_text("t [s],x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n")
     >>> read_rates(log, "rad/s").increments[:, 2]
     array([2., 3.])
     >>> read_rates(log, "rad/s", resample_hz=2).increments[:, 2]
     array([0.75, 1.25, 1.5 , 1.5 ])
     """
     path = checks.path("path", path)
-    factor = RATE_UNITS[checks.choice("rate unit", unit, RATE_UNITS)]
-    rows = read_rows(path, None)
+    if unit is not None:
+        unit = known_unit("rate unit", unit, units.RATES)
+    if time_unit is not None:
+        time_unit = known_unit("time unit", time_unit, units.TIMES)
+    if bridge_gaps and resample_hz is None:
+        raise InputError("bridge_gaps needs resample_hz, an even grid for the rate across a gap")
+    stated = Stated(unit, columns, time_unit, sample_hz)
+    rows, layout = read_rows(path, lambda header, width: rates_layout(header, width, stated), sample_hz)
+    if layout.unit is None:
+        raise InputError(
+            f"{path} states no unit of the rates; --rate-unit is needed, {', '.join(RATE_UNITS)}"
+        )
+    factor = RATE_UNITS[layout.unit]
+    remarks: list[str] = []
+    if drop_repeated:
+        rows = without_repeated(path, rows, remarks)
     time, lines = rows.time, rows.lines
-    intervals, median = _checked_intervals(path, rows)
+    intervals, median = _checked_intervals(path, rows, bridge_gaps)
+    if bridge_gaps:
+        remarks += gap_remarks(rows, median)
     if resample_hz is None:
         _require_even(path, intervals, median, lines, "resample_hz integrates them over an even grid")
         interval = float((time[-1] - time[0]) / intervals.count)
-        increments = _integrals(rows, factor)
+        increments = integrals(rows, factor)
     else:
         interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
-        increments = _resampled(rows, factor, interval, _points(path, time, resample_hz, interval))
-    recording = Recording(float(time[0]), interval, increments)
+        increments = resampled(rows, factor, interval, grid_points(path, time, resample_hz, interval))
+    recording = Recording(float(time[0]), interval, increments, remarks=tuple(remarks))
     if not math.isfinite(recording.largest):
         raise InputError(f"{path}: the integral of a rate is beyond the range of double")
     return recording
-
-
-def _points(path: Path, time: Array, resample_hz: float | str, interval: float) -> int:
-    """Return the number of intervals of an even grid over a recording."""
-    ratio = (float(time[-1]) - float(time[0])) / interval * (1 + 1e-12)
-    if ratio > checks.MOST:
-        raise InputError(f"resample_hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
-    count = math.floor(ratio)
-    if count < 1:
-        raise InputError(
-            f"resample_hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
-        )
-    return count
-
-
-def _integrals(rows: RecordedRows, factor: float) -> Array:
-    """Return the integrals of rates from each row to the next."""
-    increments = Columns(3)
-    for first, part in parts(rows.values, 1):
-        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
-        increments.append((rates[1:] + rates[:-1]) / 2 * np.diff(time)[:, None])
-    release(rows.time)
-    return increments.array()
-
-
-def _resampled(rows: RecordedRows, factor: float, interval: float, count: int) -> Array:
-    """Return the integrals of rates over an even grid of so many intervals."""
-    begin, end, last = float(rows.time[0]), float(rows.time[-1]), len(rows.time) - 1
-    increments, angle, before, done = Columns(3), np.zeros((1, 3)), np.zeros((0, 3)), 0
-    for first, part in parts(rows.values, 1):
-        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
-        gaps = np.diff(time)
-        pieces = (rates[1:] + rates[:-1]) / 2 * gaps[:, None]
-        slopes = np.diff(rates, axis=0) / gaps[:, None]
-        angles = np.cumsum(np.vstack([angle, pieces]), axis=0)
-        angle = angles[-1:]
-        while done <= count:
-            grid = np.minimum(begin + interval * np.arange(done, min(done + PART, count + 1)), end)
-            if first + len(gaps) < last:  # the rest lies in the parts to come
-                grid = grid[grid < time[-1]]
-            if not len(grid):
-                break
-            row = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(gaps) - 1)
-            inside = (grid - time[row])[:, None]
-            there = angles[row] + inside * (rates[row] + inside / 2 * slopes[row])
-            increments.append(np.diff(np.vstack([before, there]), axis=0))
-            before, done = there[-1:], done + len(grid)
-    release(rows.time)
-    return increments.array()
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
@@ -360,6 +373,7 @@ def propagate(
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
+    require_proper(backend, states, time)
     return History(time, states, step, unused, backend.elements)
 
 

@@ -98,6 +98,27 @@ def drift_between(computed: Any, other: Any) -> Array:
     return drift
 
 
+#: Largest length of an attitude: methods change it by far less where a step turns by a fraction of a rad.
+LARGEST_LENGTH = 1.5
+
+
+def require_proper(backend: Backend, states: Any, time: Array) -> None:
+    """Refuse an attitude whose length has left 1 by more than small rotations make it."""
+    if not backend.sources.function.inputs[0].constraint:
+        return
+    values = np.asarray(states, np.float64)
+    lengths = np.sqrt(np.square(values).sum(axis=tuple(range(1, values.ndim)))) / np.linalg.norm(
+        backend.identity
+    )
+    wrong = np.flatnonzero((lengths > LARGEST_LENGTH) | (lengths < 1 / LARGEST_LENGTH))
+    if len(wrong):
+        place = int(wrong[0])
+        raise InputError(
+            f"the length of the attitude is {lengths[place]:.3g} at {time[place]:.6g} s, where 1 is needed: steps turn "
+            "too far for the method; are the units of rate and time right? If they are, orthonormalize restores it"
+        )
+
+
 def require_finite(backend: Backend, states: Any, time: Array) -> None:
     """Refuse a run whose states are beyond the range of its back end.
 

@@ -53,7 +53,9 @@ def blocks(path: Path) -> Iterator[list[str]]:
         raise _no_table(path, error) from None
 
 
-def rows(path: Path, lines: Iterator[str], first: int = 1) -> Iterator[tuple[int, list[str]]]:
+def rows(
+    path: Path, lines: Iterator[str], first: int = 1, separator: str = ","
+) -> Iterator[tuple[int, list[str]]]:
     """Yield the cells of each row with the number of the line at which it ends.
 
     Parameters
@@ -64,13 +66,15 @@ def rows(path: Path, lines: Iterator[str], first: int = 1) -> Iterator[tuple[int
         From `blocks`.
     first : int, optional
         Number of the first of these lines.
+    separator : str, optional
+        Character between cells.
 
     Raises
     ------
     InputError
         If the lines are no table, or a row has too many cells.
     """
-    reader = csv.reader(lines)
+    reader = csv.reader(lines, delimiter=separator)
     try:
         for row in reader:
             if len(row) > MOST_CELLS:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm, one
+from strapgen.cli.progress import say_unused
 from strapgen.cli.run_options import RunOptions, RunOutput
 from strapgen.cli.sample_source import SampleSource
 from strapgen.support import checks
@@ -190,6 +191,7 @@ def _on_recording(
             history = whole_recordings.propagate_whole(choice, backend.name, data, *options)
         else:
             history = recording.propagate(backend, data, *options)
+    say_unused(source.file, history.unused, choice.increments_per_step)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = step_facts(backend, choice) | {"source": str(source.file)} | source.facts
     replace(output, format=output.format or "csv").report(

@@ -10,7 +10,8 @@ from strapgen.cli.course_options import CourseOutput, CycleCounts, Start
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import OneBackend, StrapdownAlgorithm, option
-from strapgen.cli.sample_source import SensorFile, read_errors, with_errors
+from strapgen.cli.progress import say_unused
+from strapgen.cli.sensor_options import SensorFile, read_errors, with_errors
 from strapgen.systems.built_in import is_system
 
 
@@ -73,6 +74,9 @@ def strapdown(
             settings=settings,
             frame=frame,
         )
+    say_unused(
+        increments, covered.unused, counts["fast_cycles"] * counts.get("slow_cycles", 1), "navigation cycle"
+    )
     facts = {
         "algorithm": f"{algorithm} in two speeds",
         "backend": backend,

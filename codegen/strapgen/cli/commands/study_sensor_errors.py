@@ -12,7 +12,8 @@ from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, one, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.sample_source import SampleSource, force_of
+from strapgen.cli.sample_source import SampleSource
+from strapgen.cli.sensor_options import force_of
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from strapgen.cli.sample_source import read_errors, with_errors
+from strapgen.cli.sensor_options import read_errors, with_errors
 from strapgen.cli.systems.running import described_along, facts_of, refuse_options, runner_of
 from strapgen.support.exceptions import InputError
 

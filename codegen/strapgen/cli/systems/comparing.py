@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapgen.cli.sample_source import force_of
+from strapgen.cli.sensor_options import force_of
 from strapgen.cli.systems.running import described_along, described_at, recorded, refuse_options
 from strapgen.support import checks
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from strapgen.cli.sample_source import force_of
+from strapgen.cli.sensor_options import force_of
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 

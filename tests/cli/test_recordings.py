@@ -1,0 +1,187 @@
+"""Recordings as loggers write them, from the command line: read by names and units, or refused with the option."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from strapgen.cli import main
+
+DATA = Path(__file__).parents[1] / "data" / "recordings"
+#: A turn of 36 deg/s about z, in rad/s.
+RATE = "0.628318530717959"
+
+
+def simulated(arguments: list[str], capsys, tmp_path: Path) -> tuple[int, np.ndarray | None, str]:
+    """Return the status, the last attitude and what is said on stderr."""
+    out = tmp_path / "attitude.csv"
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", "euler", "--rates-csv", *arguments, "--out", str(out)])
+    said = capsys.readouterr().err
+    last = np.array(out.read_text().split("\n")[-2].split(","), float) if out.is_file() else None
+    return int(stop.value.code or 0), last, said
+
+
+@pytest.mark.parametrize("method", ["rk4", "coning-compressed"])
+@pytest.mark.parametrize("name", ["time_in_ms", "accelerometer_first", "index_first", "two_comment_lines"])
+def test_recording_is_read_by_its_header(name, method, capsys, tmp_path):
+    """It turns by 180 deg in 5 s."""
+    arguments = [str(DATA / f"{name}.csv"), "--rate-unit", "rad/s", "--method", method]
+    status, last, said = simulated(arguments, capsys, tmp_path)
+    assert status == 0 and "left out" not in said
+    np.testing.assert_allclose(last, [5, 0, 0, 1, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "refusal", "options", "said"),
+    [
+        (
+            "dropout",
+            "line 603: a gap of 0.064 s",
+            ["--bridge-gaps", "--resample-hz", "250"],
+            "a gap of 0.064 s before line 603, from 2.4 s on, is bridged: the rate is taken as linear",
+        ),
+        (
+            "twice_the_same",
+            "--drop-repeated",
+            ["--drop-repeated"],
+            "1 row with the time of the row before left out",
+        ),
+    ],
+)
+def test_refusal_names_the_option_that_helps(name, refusal, options, said, capsys, tmp_path):
+    arguments = [str(DATA / f"{name}.csv"), "--rate-unit", "rad/s"]
+    status, last, error = simulated(arguments, capsys, tmp_path)
+    assert (status, last, error.count("\n")) == (2, None, 1) and refusal in error and options[0] in error
+    status, last, error = simulated([*arguments, *options], capsys, tmp_path)
+    assert status == 0 and said in error
+    np.testing.assert_allclose(last, [5, 0, 0, 1, 0], atol=1e-9)
+
+
+def test_increment_left_over_is_said(capsys, tmp_path):
+    arguments = [str(DATA / "one_left_over.csv"), "--rate-unit", "rad/s"]
+    status, last, said = simulated(arguments, capsys, tmp_path)
+    assert status == 0 and last[0] == pytest.approx(0.18)
+    assert "1 increment at the end fills no step of 2 and is left out" in said
+
+
+#: Headers and rows of loggers, from which 1 s at 36 deg/s about z is read.
+LOGS = {
+    "phyphox": (
+        '"Time (s)","Gyroscope x (rad/s)","Gyroscope y (rad/s)","Gyroscope z (rad/s)"',
+        "{s},0,0,{rad}",
+    ),
+    "euroc": (
+        "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2]",
+        "{ns},0,0,{rad},9.8",
+    ),
+    "dps": ("t_ms,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps", "{ms},0,0,1,0,0,{deg}"),
+    "blackbox": (
+        "loopIteration, time (us), gyroADC[0] (deg/s), gyroADC[1], gyroADC[2]",
+        "{k},{us},0,0,{deg}",
+    ),
+    "semicolons": ("zeit;time [s];gyr_x [deg/s];gyr_y [deg/s];gyr_z [deg/s]", "x;{comma};0,0;0,0;36,0"),
+    "tabs": (
+        "timestamp (us)\tangular_velocity_x\tangular_velocity_y\tangular_velocity_z (°/s)",
+        "{us}\t0\t0\t{deg}",
+    ),
+    "blanks": ("% a comment\ntime omega_x omega_y omega_z", "{s}  0 0   {rad}"),
+}
+STATED = {"blanks": ["--rate-unit", "rad/s"]}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_log_is_read_by_names_and_units(name, capsys, tmp_path):
+    header, row = LOGS[name]
+    rows = [
+        row.format(
+            k=k,
+            s=f"{k / 100:.2f}",
+            ms=10 * k,
+            us=10_000 * k,
+            ns=10_000_000 * k,
+            rad=RATE,
+            deg=36,
+            comma=f"{k / 100:.2f}".replace(".", ","),
+        )
+        for k in range(101)
+    ]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([header, *rows, ""]), encoding="utf-8")
+    status, last, _ = simulated([str(log), *STATED.get(name, [])], capsys, tmp_path)
+    assert status == 0
+    half = np.deg2rad(18)
+    np.testing.assert_allclose(last, [1, 0, 0, np.sin(half), np.cos(half)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (
+            "t [s],gx [deg/s],gy [deg/s],gz [deg/s]\n0,0,0,1\n0.1,0,0,1\n",
+            ["--rate-unit", "rad/s"],
+            "contradicts",
+        ),
+        ("t [ms],gx,gy,gz\n0,0,0,1\n10,0,0,1\n", ["--rate-unit", "rad/s", "--time-unit", "s"], "is in ms"),
+        ("t,gx,gy,gz\n0,0,0,1\n0.1,0,0,1\n", [], "--rate-unit is needed"),
+        ("t,gx,gy,gz\n0,0,0,1\n4000,0,0,1\n", ["--rate-unit", "rad/s"], "--time-unit s, ms, us or ns"),
+        ("0,0,0,1\n4000,0,0,1\n", ["--rate-unit", "rad/s"], "--sample-hz the sampling rate"),
+        ("0,0,0,1,9\n0.1,0,0,1,9\n", ["--rate-unit", "rad/s"], "--columns says by their numbers"),
+        ("t,acc_x,acc_y,acc_z\n0,0,0,1\n0.1,0,0,1\n", ["--rate-unit", "rad/s"], "no rates about three axes"),
+        ("t,ax,ay,az,x,y,z\n0,0,0,1,0,0,1\n", ["--rate-unit", "rad/s"], "--columns NAME"),
+        ("t,gx [m/s^2],gy,gz\n0,0,0,1\n0.1,0,0,1\n", ["--rate-unit", "rad/s"], "no rates about three axes"),
+        ("time,seconds,x,y,z\n0,0,0,0,1\n", ["--rate-unit", "rad/s"], "several columns of time"),
+        ("t,x,y,z\n0,0,0,1\n0,1,0,0,0,0,1,0\n", ["--rate-unit", "rad/s"], "line 3: 8 columns; 4 are needed"),
+        ("t,x,y,z\n0,0,0,1\n0.1,0,0\n", ["--rate-unit", "rad/s"], "line 3: 3 columns; 4 are needed"),
+        ("t,gx,gy,gz\n0,0,0,1\n0.1,0,0,1\n", ["--rate-unit", "rpm"], "rate unit 'rpm' is not known"),
+        (
+            "t,gx,gy,gz\n0,0,0,1\n",
+            ["--rate-unit", "rad/s", "--columns", "t,gx"],
+            "names 2 columns; 4 are needed",
+        ),
+        (
+            "t,gx,gy,gz\n0,0,0,1\n0.1,0,0,1\n",
+            ["--rate-unit", "rad/s", "--bridge-gaps"],
+            "--bridge-gaps needs",
+        ),
+    ],
+)
+def test_open_meaning_is_refused_in_one_line(text, options, said, capsys, tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text(text)
+    status, last, error = simulated([str(log), *options], capsys, tmp_path)
+    assert (status, last, error.count("\n")) == (2, None, 1) and said in error
+
+
+def test_sampling_rate_stands_in_place_of_times(capsys, tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("PacketCounter,Gyr_X,Gyr_Y,Gyr_Z\n" + "".join(f"{k},0,0,36\n" for k in range(1000, 1101)))
+    status, last, _ = simulated([str(log), "--rate-unit", "dps", "--sample-hz", "100"], capsys, tmp_path)
+    assert status == 0
+    np.testing.assert_allclose(last, [1, 0, 0, np.sin(np.deg2rad(18)), np.cos(np.deg2rad(18))], atol=1e-9)
+
+
+@pytest.mark.parametrize("state", ["euler", "dcm"])
+def test_attitude_whose_length_has_left_1_is_not_written(state, capsys, tmp_path):
+    """Steps of 6 rad, as of times in ms that are read as s, with a method that does not hold the length."""
+    log, out = tmp_path / "log.csv", tmp_path / "o.csv"
+    log.write_text(
+        "t [s],gx [rad/s],gy [rad/s],gz [rad/s]\n" + "".join(f"{10 * k},0,0,0.6\n" for k in range(9))
+    )
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", state, "--method", "rk2", "--rates-csv", str(log), "--out", str(out)])
+    said = capsys.readouterr().err
+    assert stop.value.code == 2 and said.count("\n") == 1 and not out.exists()
+    assert "the length of the attitude is" in said or "increments" in said
+
+
+@pytest.mark.parametrize("unit", ["deg/s", "dps", "rad/s", "mdps", "rad s^-1", "°/s"])
+def test_units_of_a_rate_have_their_spellings(unit, capsys, tmp_path):
+    log = tmp_path / "log.csv"
+    size = {"rad": RATE, "mdp": "36000"}.get(unit[:3], "36")
+    log.write_text("t,gx,gy,gz\n" + "".join(f"{k / 100},0,0,{size}\n" for k in range(101)))
+    status, last, _ = simulated([str(log), "--rate-unit", unit], capsys, tmp_path)
+    assert status == 0
+    np.testing.assert_allclose(last[3:], [np.sin(np.deg2rad(18)), np.cos(np.deg2rad(18))], atol=1e-9)
