@@ -8,7 +8,8 @@
  *
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C: x
  *     / sqrt(x . x).
- * The state must not be zero.
+ * The state must not be zero, which has no direction: in floating point the result is then no
+ * number.
  * Integer operations of one call: 7 add, 8 multiply, 4 shift, 1 divide, 1 sqrt; 3 temporaries.
  *
  * A number in format Qm.n is an integer times 2^-n. Rounding: nearest. No sum or product on the

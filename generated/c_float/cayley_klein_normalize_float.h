@@ -7,7 +7,8 @@
  *
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C: x
  *     / sqrt(x . x).
- * The state must not be zero.
+ * The state must not be zero, which has no direction: in floating point the result is then no
+ * number.
  * Operations of one call: 3 add, 8 multiply, 1 divide, 1 sqrt; 1 temporaries.
  * Rounding: against exact arithmetic on the same inputs, next is off by at most 6.46138e-07,
  *     5.4202 units in the last place of 1. This holds for state up to 1.0625; the radicand in

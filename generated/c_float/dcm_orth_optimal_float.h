@@ -7,8 +7,8 @@
  *
  * Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
  *     equation (B.1).
- * The determinant of the matrix must be above 0. Round-off grows with the fourth power of its
- * condition.
+ * The determinant of the matrix must be above 0: below 0 the result is the nearest reflection.
+ * Round-off grows with the fourth power of the condition.
  * Irrational constants are rounded to 80 digits, and once more to the format of the target.
  * Operations of one call: 85 add, 128 multiply, 1 divide, 5 sqrt, 1 negate, 1 select, 3 function;
  *     54 temporaries.

@@ -6,7 +6,7 @@ SPDX-License-Identifier: 0BSD
 
 Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C: x /
     sqrt(x . x)
-The state must not be zero.
+The state must not be zero, which has no direction: in floating point the result is then no number.
 """
 
 import numpy as np

@@ -6,8 +6,8 @@ SPDX-License-Identifier: 0BSD
 
 Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, appendix B,
     equation (B.1)
-The determinant of the matrix must be above 0. Round-off grows with the fourth power of its
-condition.
+The determinant of the matrix must be above 0: below 0 the result is the nearest reflection.
+Round-off grows with the fourth power of the condition.
 Irrational constants are rounded to 80 digits, and once more to the format of the target.
 """
 

@@ -7,6 +7,7 @@ import io
 import json
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from gathering import each
@@ -18,7 +19,7 @@ from strapgen.experiments import convergence
 from strapgen.experiments.convergence import Convergence, Rung, converge
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.fixed_settings import Settings
-from strapgen.reports.convergence import convergence_report, convergence_text
+from strapgen.reports.convergence import convergence_report, convergence_text, ladder_table
 from strapgen.support.exceptions import InputError
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.
@@ -185,3 +186,12 @@ def test_reports_have_every_figure():
     data = json.loads(json.dumps(FOUND.as_dict()))
     assert (data["observed_order"], data["predicted_order"], data["method_order"]) == (4.0, 4, 6)
     assert math.isclose(data["rungs"][2]["slope"], 4.0)
+
+
+def test_rows_tell_the_methods_of_one_kernel_apart():
+    """Kernels of a user may have one name for all methods; the label tells them apart as the text does."""
+    path = str(Path(__file__).parents[2] / "examples" / "modified_rodrigues.py")
+    coning = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    steps = [catalogue.choose_step(path, TABLEAUX[name]) for name in ("rk2", "rk4")]
+    outcomes = [converge(step, coning, ["1/8", "1/16"], 1) for step in steps]
+    assert len({row[-1] for row in ladder_table(*outcomes).rows}) == 2

@@ -145,14 +145,14 @@ def test_real_array_keeps_what_it_can():
     assert checks.real_array("increments", np.ones((2, 3), np.float32), (3,)).dtype == np.float64
     assert checks.real_array("increments", np.ones((3, 2)).T, (3,)).flags.c_contiguous
     assert checks.real_array("time", 1.5, ()).shape == ()
+    whole = checks.real_array("increments", [[1, 2, 3]], (3,))
+    assert whole.dtype == np.float64 and whole.tolist() == [[1.0, 2.0, 3.0]]
     assert checks.real_array("increments", np.empty((0, 3)), (3,)).shape == (0, 3)
 
 
-@each("value", [[1, 2, 3], [True] * 3, ["a"] * 3, [1j] * 3, [None] * 3, None, "abc"])
+@each("value", [[True] * 3, ["a"] * 3, [1j] * 3, [None] * 3, None, "abc"])
 def test_array_of_another_type(value):
-    with pytest.raises(
-        InputTypeError, match=r"^rate (has|holds .*) dtype .*; a floating-point dtype is needed"
-    ):
+    with pytest.raises(InputTypeError, match=r"^rate has dtype .*; numbers are needed"):
         checks.real_array("rate", value, (3,))
 
 

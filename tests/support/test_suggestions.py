@@ -62,9 +62,6 @@ CALLS = {
     "record_every is array([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]]); a whole number": lambda: (
         strapgen.backend("dcm").propagate(Z, np.eye(3))
     ),
-    "state holds whole numbers, of dtype int64; a floating-point dtype is needed: numpy.asarray(state, float)": (
-        lambda: strapgen.backend("euler").step(np.array([0, 0, 0, 1]), Z[0])
-    ),
     "got 1 input; 2 are needed: state, transition": lambda: strapgen.evaluator("dcm-product")([1.0]),
     "got 0 inputs; 1 is needed: computed": lambda: strapgen.evaluator("dcm-orthonormalize")(),
     "max_rate_deg_s and step go together; step is missing": lambda: strapgen.Settings.of(max_rate_deg_s=1),

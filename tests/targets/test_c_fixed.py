@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from derived import FIXED_POINT, quantized
+from derived import FIXED_POINT, program, quantized
 from fixed_inputs import corners_and_random
 from gathering import each
 
@@ -428,3 +428,17 @@ def test_no_undefined_behaviour(word, methods, tmp_path, rng):
         assert set(said.values()) == {said["plain"]}
 
     agree(rng=rng)
+
+
+def test_header_names_arguments_as_the_prototype_does():
+    """A scalar has the name of its only element, which the array must not have."""
+    choice = Choice("imu-compensate")
+    inputs = program(choice).inputs
+    assert any(signal.elements == ("cycle_rate",) for signal in inputs)
+    settings = Settings(ranges={signal.name: Fraction(1) for signal in inputs if signal.bound is None})
+    files = generate(quantized(choice, settings), "c-fixed").files
+    header = files["imu_compensate_w32.h"]
+    prototype = header[header.rindex("\nint ") :]
+    stated = re.findall(r"^ \* (?:in|out) +(\w+)\[", header, flags=re.MULTILINE)
+    assert "cycle_rate_words" in stated
+    assert all(f" {name}[" in prototype for name in stated)

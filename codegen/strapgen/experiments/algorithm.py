@@ -119,7 +119,8 @@ class AttitudeAlgorithm:
         Parameters
         ----------
         motion : str or Motion, optional
-            A motion, or the name of one whose parameters follow as keywords, such as ``a_deg_s=10``.
+            A motion, or the name of one whose parameters follow as keywords, such as ``a_deg_s=10``; by default coning
+            with all three parameters at 10 deg/s.
         step, duration : number, optional
             In s; the step divides the duration. Decimals are exact.
         backend : str, optional
@@ -148,6 +149,8 @@ class AttitudeAlgorithm:
         """
         if isinstance(motion, Motion) and parameters:
             raise InputError(f"{', '.join(parameters)} belong to the name of a motion, not to a Motion")
+        if motion == "coning" and not parameters:
+            parameters = dict.fromkeys(("a_deg_s", "b_deg_s", "g_deg_s"), 10)
         profile = motion if isinstance(motion, Motion) else motions.motion(motion, **parameters)
         return simulate(self.backend(backend, settings), profile, step, duration, orthonormalize, record)
 

@@ -250,6 +250,7 @@ def _order(choice: Choice) -> Finding:
         return Finding("order", None, text, ladder.observed)
     off = abs(ladder.observed - ladder.predicted)
     text = f"observed {ladder.observed:.3f}, stated {ladder.predicted}"
+    text += "; the claim is too low" if ladder.observed - ladder.predicted > ORDER_WITHIN else ""
     return Finding("order", off <= ORDER_WITHIN, text, ladder.observed, ORDER_WITHIN)
 
 

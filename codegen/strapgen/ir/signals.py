@@ -116,6 +116,23 @@ class Signal:
         """Number of elements."""
         return len(self.elements)
 
+    @property
+    def identity(self) -> tuple[Fraction, ...] | None:
+        """The elements for no rotation; None for what is no attitude with the labels of one.
+
+        Examples
+        --------
+        >>> parameters = Signal.labelled("state", "a", "sxyz", constraint="unit")
+        >>> list(map(str, parameters.identity)), Signal.vector("row", "r", constraint="unit").identity
+        (['1', '0', '0', '0'], None)
+        """
+        if self.constraint == "rotation" and self.shape == (3, 3):
+            return tuple(Fraction(k % 4 == 0) for k in range(9))
+        labels = [element.rpartition("_")[2] for element in self.elements]
+        if self.constraint == "unit" and sorted(labels) == ["s", "x", "y", "z"]:
+            return tuple(Fraction(label == "s") for label in labels)
+        return None
+
     def as_dict(self) -> dict[str, Any]:
         """Return the signal as plain JSON data."""
         return asdict(self) | {"bound": None if self.bound is None else str(self.bound)}

@@ -19,6 +19,7 @@ _COLUMNS = (
     Column("used"),
     Column("observed_order", spec=".3f"),
     Column("predicted_order"),
+    Column("label", "<"),
 )
 
 
@@ -58,7 +59,9 @@ def convergence_report(outcomes: Sequence[Convergence], title: str) -> Report:
     """Return outcomes as a report, whose table has a row for every step of every algorithm."""
     return Report(
         lambda: convergence_text(outcomes, title),
-        lambda: [one.as_dict() for one in outcomes],
+        lambda: [
+            {**one.as_dict(), "label": name} for name, one in zip(labels(outcomes), outcomes, strict=True)
+        ],
         lambda: ladder_table(*outcomes),
     )
 
@@ -68,9 +71,9 @@ def ladder_table(*outcomes: Convergence) -> TextTable:
     rows = [
         (
             *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
-            *(one.observed, one.predicted),
+            *(one.observed, one.predicted, name),
         )
-        for one in outcomes
+        for name, one in zip(labels(outcomes), outcomes, strict=True)
         for rung in one.rungs
     ]
     return TextTable(_COLUMNS, rows)

@@ -13,6 +13,7 @@ from strapgen import backends, catalogue
 from strapgen.backends.increments import pulses
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.system import DescribedSystem
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.systems.wiring import Description
 
@@ -95,9 +96,14 @@ def cycles_of(system: DescribedSystem, seconds: Fraction) -> int:
     Raises
     ------
     InputError
-        If the time holds no whole number of cycles of all rates.
+        If the time holds no whole number of cycles of all rates, or too many.
     """
     cycles = seconds * system.sample_hz
+    if cycles > checks.MOST:
+        raise InputError(
+            f"a duration of {float(seconds):.3g} s has too many cycles of {float(1 / system.sample_hz):g} s; "
+            f"up to {checks.MOST:,} are run"
+        )
     if cycles.denominator != 1 or cycles % system.cycle or not cycles:
         raise InputError(
             f"{float(seconds):g} s are no whole number of cycles of the slowest rate, "

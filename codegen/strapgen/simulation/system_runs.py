@@ -22,6 +22,8 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 Array = NDArray[np.float64]
+#: From this departure of the rows' scalar products from those of orthogonal ones on, a matrix is no rotation.
+_NO_ROTATION = 0.5
 #: Largest denominator of the rate of a recording in Hz.
 _DENOMINATOR = 1000
 
@@ -70,14 +72,46 @@ def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Arra
     runner : SystemRunner
     start : array, (3, 3), or None
         Attitude to begin with in place of that of the description.
+
+    Raises
+    ------
+    InputError
+        If that is no rotation.
     """
     memory = runner.begin()
     cell = attitude_output(runner.system)
-    if start is None:
-        return memory, matrices(cell.signal, [float(value) for value in cell.initial])[0]
-    value = start if cell.signal.size == 9 else evaluator(f"{_parameters(cell.signal)}-from-dcm")(start)
-    runner.set(memory, cell.name, value)
-    return memory, start
+    if start is not None:
+        value = start if cell.signal.size == 9 else evaluator(f"{_parameters(cell.signal)}-from-dcm")(start)
+        runner.set(memory, cell.name, value)
+    begin = matrices(cell.signal, [float(value) for value in cell.initial])[0] if start is None else start
+    require_rotations(cell.name, np.asarray(begin)[None], np.zeros(1))
+    return memory, begin
+
+
+def require_rotations(name: str, values: Array, time: Array) -> None:
+    """Refuse attitudes that are no rotations, which have no drift.
+
+    Parameters
+    ----------
+    name : str
+        That of the attitude, for the message.
+    values : array, (N, 3, 3)
+    time : array, (N,)
+        In s.
+
+    Raises
+    ------
+    InputError
+        If the rows of one are far from orthogonal ones of length 1.
+    """
+    off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = np.flatnonzero(~(off < _NO_ROTATION))
+    if len(wrong):
+        place = int(wrong[0])
+        raise InputError(
+            f"the attitude {name} is no rotation at {time[place]:.6g} s: its rows are {off[place]:.3g} from orthogonal "
+            "ones of length 1"
+        )
 
 
 def simulate_system(
@@ -90,8 +124,8 @@ def simulate_system(
 ) -> Run:
     """Run a system on a motion with a known attitude.
 
-    The truth is the attitude of the motion, after that at the start. The navigation frame rests, so that a system that
-    follows the rotation of the earth departs by that rotation.
+    The truth is the attitude of the motion, after `start` if that is stated, whatever the system begins with. The
+    navigation frame rests, so that a system that follows the rotation of the earth departs by that rotation.
 
     Parameters
     ----------
@@ -124,15 +158,21 @@ def simulate_system(
     memory, begin = begun(runner, start)
 
     def attitude(time: Array) -> Array:
-        return np.asarray(begin @ motion.attitude(time))
+        true = np.asarray(motion.attitude(time))
+        return true if start is None else start @ true
 
     angle, velocity = both_increments(motion, attitude, force, interval, cycles)
-    run = runner.run(samples(runner.fit.description, angle, velocity), memory)
-    states = matrices(cell.signal, run.values[cell.name])[thinning - 1 :: thinning]
+    records, seen = [], 0
+    for run in runner.blocks(samples(runner.fit.description, angle, velocity), memory):
+        values = run.values[cell.name]
+        records.append(values[(thinning - 1 - seen) % thinning :: thinning])
+        seen += len(values)
+    states = matrices(cell.signal, np.concatenate(records))
     if not np.isfinite(states).all():
         raise InputError(f"the attitude {cell.name} is not finite; the increments are too large")
     computed = np.concatenate([begin[None], states])
     time: Array = np.arange(len(computed), dtype=np.float64) * float(cycle * thinning)
+    require_rotations(cell.name, computed, time)
     true = attitude(time)
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
 

@@ -250,7 +250,7 @@ def require_consistent(users: Motion, duration: float | str | Fraction) -> None:
 
 def _functions(name: str) -> dict[str, Callable[..., Any]]:
     """Return the functions of a user's file."""
-    with _guarded(name):
+    with _guarded(name), packages.importing_beside(Path(name)):
         names = runpy.run_path(name, run_name=Path(name).stem)
     if callable(names.get(EXPRESSION)):
         if others := [function for function in FUNCTIONS if function in names]:

@@ -261,7 +261,7 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
     Raises
     ------
     InputTypeError
-        If it does not hold floating-point numbers.
+        If it does not hold real numbers.
     InputError
         If its last axes have another shape, or a value is not finite.
 
@@ -279,12 +279,9 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
     except ValueError:
         raise InputError(f"{what} has rows of different lengths; an array of numbers is needed") from None
     if array.dtype.kind in "iu":
-        raise InputTypeError(
-            f"{what} holds whole numbers, of dtype {array.dtype}; a floating-point dtype is needed: "
-            f"numpy.asarray({what.split()[0]}, float)"
-        )
+        array = array.astype(np.float64)
     if array.dtype.kind != "f":
-        raise InputTypeError(f"{what} has dtype {array.dtype}; a floating-point dtype is needed")
+        raise InputTypeError(f"{what} has dtype {array.dtype}; numbers are needed")
     if array.shape[array.ndim - len(tail) :] != tail or array.ndim < len(tail):
         needed = ", ".join(["...", *map(str, tail)])
         raise InputError(f"{what} has shape {array.shape}; ({needed}) is needed")

@@ -115,3 +115,18 @@ def guarded(label: str, duty: str, belongs: Callable[[Path], bool]) -> Iterator[
             where = f", line {line}" if file in label else f", {file}, line {line}"
         said = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
         raise InputError(f"{label}{where}: {type(error).__name__}: {said}") from error
+
+
+@contextlib.contextmanager
+def importing_beside(file: Path) -> Iterator[None]:
+    """Let a file import the modules beside it; forget them afterwards, since another file may have others of a name."""
+    folder, known = str(file.resolve().parent), {*sys.modules}
+    sys.path.insert(0, folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+        for module in {*sys.modules} - known:
+            origin = getattr(sys.modules[module], "__file__", None)
+            if origin is not None and Path(origin).resolve().is_relative_to(folder):
+                del sys.modules[module]

@@ -343,7 +343,24 @@ class KernelBuilder:
         return symbols(signal)
 
     def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
-        """Return the kernel; `rest` are further fields of `Kernel`."""
+        """Return the kernel; `rest` are further fields of `Kernel`.
+
+        Of an attitude step, `previous` and `ahead` go into its companions, where its back ends read them.
+
+        Raises
+        ------
+        InputError
+            If the companions state other numbers.
+        """
+        step = rest.get("companions")
+        if isinstance(step, Companions):
+            stated = {what: rest.pop(what) for what in ("previous", "ahead") if rest.get(what)}
+            for what, number in stated.items():
+                if getattr(step, what) not in (0, number):
+                    raise InputError(
+                        f"kernel {name}: {what} is {number}, and {getattr(step, what)} in its companions"
+                    )
+            rest["companions"] = replace(step, **stated)
         stages, outputs = (
             tuple(Stage(s.signal, tuple(self._real(x) for x in s.expressions)) for s in stages)
             for stages in (self.stages, self.outputs)

@@ -15,11 +15,6 @@ from strapgen.support import checks
 from strapgen.support.exceptions import InputError, InputTypeError
 from strapgen.systems.system_file import StageText
 
-_IDENTITIES = {
-    4: tuple(map(Fraction, (0, 0, 0, 1))),
-    9: tuple(map(Fraction, (1, 0, 0, 0, 1, 0, 0, 0, 1))),
-}
-
 
 @dataclass
 class Ports:
@@ -78,13 +73,23 @@ class Ports:
             return signal
         return next((state for state, output in self.states.items() if output == signal), None)
 
-    def identity(self, signal: Signal) -> tuple[Fraction, ...]:
-        """Return what a state is before the first cycle if the file does not say so: no rotation, or zero."""
+    def start(self, signal: Signal) -> tuple[Fraction, ...]:
+        """Return what a signal is before the first cycle if the file does not say so: no rotation, or zero.
+
+        Raises
+        ------
+        InputError
+            If it is a state that obeys a constraint, and there is no such start.
+        """
         step = self.program.companions
         if step is not None and signal.name == self.program.inputs[0].name:
             return step.identity
-        if signal.constraint and signal.size in _IDENTITIES:
-            return _IDENTITIES[signal.size]
+        if signal.identity is not None:
+            return signal.identity
+        if signal.constraint and signal.name in self.states:
+            raise InputError(
+                f"stage {self.name}: {signal.name} is of length 1, and zero is none; state it under initial"
+            )
         return (Fraction(0),) * signal.size
 
     def settled(self, signal: Signal) -> Signal:

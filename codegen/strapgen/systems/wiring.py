@@ -280,7 +280,7 @@ class _Wiring:
         if cell in self.cells or cell in self.described:
             raise InputError(f"stage {stage.name}: {name} would be called {cell} in code, which is taken")
         self.cells[cell] = Cell(
-            cell, stage.settled(signal), stage.identity(signal) if initial is None else initial
+            cell, stage.settled(signal), stage.start(signal) if initial is None else initial
         )
 
     def _connect(self, stage: Ports, name: str) -> None:

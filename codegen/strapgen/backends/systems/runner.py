@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -28,6 +28,8 @@ from strapgen.toolchain import compiler
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
 _EXACT_BITS = 53
+#: Cycles, about, whose outputs are held at a time.
+BLOCK = 1 << 14
 
 
 class SystemRunner(ABC):
@@ -174,7 +176,28 @@ class SystemRunner(ABC):
         """
         samples = self.samples(inputs)
         count = len(next(iter(samples.values())))
-        values, after = self._run(samples, count, (memory or self.begin()).copy())
+        return self._block(samples, count, (memory or self.begin()).copy())
+
+    def blocks(self, inputs: Mapping[str, Any], memory: SystemMemory | None = None) -> Iterator[SystemRun]:
+        """Run cycles as `run` does, and yield the outputs of some thousands at a time, whole cycles of all rates.
+
+        Parameters
+        ----------
+        inputs, memory
+            As for `run`.
+        """
+        samples = self.samples(inputs)
+        count = len(next(iter(samples.values())))
+        after = (memory or self.begin()).copy()
+        size = -(-BLOCK // self.system.cycle) * self.system.cycle
+        for first in range(0, count, size):
+            part = {name: rows[first : first + size] for name, rows in samples.items()}
+            run = self._block(part, min(size, count - first), after)
+            after = run.memory
+            yield run
+
+    def _block(self, samples: Mapping[str, Array], count: int, memory: SystemMemory) -> SystemRun:
+        values, after = self._run(samples, count, memory)
         shaped = {
             name: self.in_si(name, rows).reshape(-1, *self.system.cell(name).signal.shape)
             for name, rows in values.items()

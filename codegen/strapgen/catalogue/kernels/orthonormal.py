@@ -32,7 +32,9 @@ def _normalize(kinematics: Kinematics) -> Kernel:
         kinematics.orthonormalize,
         f"{kinematics.title}: normalization to length 1, exact",
         f"{THESIS}, chapter 3 C: x / sqrt(x . x)",
-        notes=("The state must not be zero.",),
+        notes=(
+            "The state must not be zero, which has no direction: in floating point the result is then no number.",
+        ),
     )
 
 
@@ -123,7 +125,8 @@ def dcm_optimal() -> Kernel:
         "Direction cosine matrix: the nearest rotation, least sum of squared differences",
         f"{THESIS}, appendix B, equation (B.1)",
         notes=(
-            "The determinant of the matrix must be above 0. Round-off grows with the fourth power of its condition.",
+            "The determinant of the matrix must be above 0: below 0 the result is the nearest reflection. "
+            "Round-off grows with the fourth power of the condition.",
         ),
     )
 

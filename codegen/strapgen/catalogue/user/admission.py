@@ -10,6 +10,7 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.derivation import companion as derived_companion
+from strapgen.catalogue.methods.samples import beside
 from strapgen.catalogue.names import RESERVED
 from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.program import RESOLUTION
@@ -218,6 +219,10 @@ def _require_beside(kernel: Kernel, previous: int, ahead: int, samples: int) -> 
         _refuse(kernel, f"{previous} of its {samples} increments are previous ones and {ahead} are ahead")
 
 
+#: What `increments_signal` says of samples from beside the step.
+_BESIDE = re.compile(r"; the (?:first|last) \d+ are those (?:before|after) the step")
+
+
 def _require_samples(kernel: Kernel, step: Companions) -> None:
     """Check the inputs of an attitude step: its state, and increments or rates at nodes."""
     names = [signal.name for signal in kernel.inputs]
@@ -229,6 +234,13 @@ def _require_samples(kernel: Kernel, step: Companions) -> None:
             "velocity_increments are needed",
         )
     _require_beside(kernel, step.previous, step.ahead, shape[0])
+    said = _BESIDE.findall(kernel.inputs[1].meaning)
+    if said and "".join(said) != beside(step.previous, step.ahead):
+        _refuse(
+            kernel,
+            f"its increments say{''.join(said).replace(';', ',')}, and it declares previous={step.previous}, "
+            f"ahead={step.ahead}; build.kernel(..., previous=..., ahead=...) must say the same",
+        )
     if names[1] == "increments":
         if step.nodes:
             _refuse(kernel, "it takes increments and has nodes; nodes go with turns")

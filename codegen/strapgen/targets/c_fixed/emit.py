@@ -139,6 +139,7 @@ def values_of(fixed: FixedProgram, name: str, target: str, printer: StatementPri
         "nearest": interface.settings.rounding == "nearest",
         "fresh": dict.fromkeys(f"UINT{fixed.word}_C({r.fresh})" for r in interface.residuals),
         "uses": printer.uses,
+        "memory": memory,
         "command": command,
         "contract": contract_lines.of_fixed(fixed, name, command, memory),
         "normalizing": contract.upkeep_text(fixed.program, interface, target),

@@ -204,6 +204,10 @@ class SensorGeometry:
         return tuple(basis)
 
 
+#: Largest component of an axis, which is a unit vector but for what its numbers are rounded to.
+_LARGEST = 2
+
+
 def geometry(axes: Any) -> SensorGeometry:
     """Return a geometry of rows of numbers, texts such as "2/3" among them.
 
@@ -225,7 +229,12 @@ def geometry(axes: Any) -> SensorGeometry:
 def _row(number: int, row: Any) -> Row:
     if not isinstance(row, list | tuple) or len(row) != 3 or any(isinstance(x, bool | list) for x in row):
         raise InputError(f"axis {number} is {row}; three numbers are needed")
-    return tuple(checks.number(f"a component of axis {number}", component) for component in row)
+    axis = tuple(checks.number(f"a component of axis {number}", component) for component in row)
+    if max(map(abs, axis)) > _LARGEST:
+        raise InputError(
+            f"axis {number} has a component of {float(max(map(abs, axis))):g}; a unit vector is needed"
+        )
+    return axis
 
 
 def _hexad() -> Iterator[Row]:
