@@ -8,13 +8,14 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 DOCS := .venv/.ready-for-docs
 
-.PHONY: help demo test test-long test-modules mutants check bench generate clean \
+.PHONY: help demo test test-lowest test-long test-modules mutants check bench generate clean \
   check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page \
   evidence-tools language-tools site-tools faults fuzz release-check docs docs-serve docs-check
 
 help:
 	@echo "make demo      set up, then a short tour: formulas, their C, a table on every back end"
 	@echo "make test      set up, with what tests need; run the test suite"
+	@echo "make test-lowest  the same with the lowest versions that pyproject.toml allows, in .venv-lowest"
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
 	@echo "make test-modules  list anew which compiled kernels the tests load"
 	@echo "make mutants   put the written faults and 240 drawn ones into copies of the code; half an hour a run, which goes on where the last one stopped"
@@ -97,6 +98,14 @@ test test-long: export PYTHONDONTWRITEBYTECODE =
 
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
+
+# uv resolves direct requirements to their lowest versions. An old Typer takes longer to print help.
+test-lowest:
+	$(PYTHON) -m venv .venv-lowest
+	.venv-lowest/bin/python -m pip install --disable-pip-version-check uv
+	.venv-lowest/bin/uv pip install --python .venv-lowest/bin/python --resolution lowest-direct -e '.[dev]'
+	.venv-lowest/bin/python -m pytest -n auto --dist worksteal -m "not long" \
+	  --deselect tests/cli/test_cli.py::test_help_is_quick
 
 test-long: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
@@ -195,5 +204,5 @@ docs-check: docs $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long --site docs/_build/html tests/test_site.py tests/test_try_page.py
 
 clean:
-	rm -rf docs/_build .venv .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist
+	rm -rf docs/_build .venv .venv-bench .venv-lowest .mypy_cache .ruff_cache .pytest_cache .hypothesis .mutants build dist
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -176,3 +176,30 @@ def test_git_ignores_no_file_of_the_examples():
     if done.returncode not in (0, 1):
         pytest.skip("no checkout")
     assert done.stdout.splitlines() == []
+
+
+def test_nothing_is_installed_by_a_name_that_no_index_has():
+    """Whoever registers it would run code in the user's build."""
+    install = steps()["Install strapgen"]
+    source = re.search(r"STRAPGEN_SOURCE: (\S+)", (EXAMPLE / "firmware.yml").read_text())[1]
+    assert source.startswith("./") and 'test -e "$STRAPGEN_SOURCE"' in install
+    names = re.compile(r"pip install (?:--?\S+ )*strapgen\b(?!\[)")
+    pages = [path for folder in ("docs", "examples", "templates") for path in (ROOT / folder).rglob("*.*")]
+    for path in [ROOT / "README.md", *pages]:
+        if path.suffix in (".md", ".yml", ".mk", ".j2", ".txt") and "_build" not in path.parts:
+            assert not names.search(path.read_text()), path
+
+
+@pytest.mark.parametrize(
+    ("options", "step"),
+    [
+        ("--max-rate-deg-s 400 --step 0.02", "0.02"),
+        ("--max-rate-deg-s 400 --sample-hz 200 --lsb 0.0175dps", "2/200"),
+        ("--sample-hz 100 --increments 4", "4/100"),
+    ],
+)
+def test_compared_run_has_the_step_of_the_options(options, step):
+    needed("make")
+    command = f"make -n -f {EXAMPLE / 'strapgen.mk'} attitude-compare ATTITUDE_OPTIONS='{options}'"
+    said = subprocess.run(shlex.split(command), capture_output=True, text=True, check=True).stdout
+    assert f"--step {step} --duration" in said

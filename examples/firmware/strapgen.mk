@@ -15,6 +15,10 @@ ATTITUDE_FOLDER ?= firmware
 ATTITUDE_SOURCES = $(filter-out %/main.c $(ATTITUDE_FOLDER)/test_%,$(wildcard $(ATTITUDE_FOLDER)/*.c))
 # The largest error on coning that the firmware may have, in rad.
 ATTITUDE_FAIL_ABOVE ?= 1e-7
+# The step of that run in s: that of the options, or as many samples of the gyro as a step takes, 2 unless they say.
+ATTITUDE_STEP ?= $(shell echo '$(ATTITUDE_OPTIONS)' | awk '{ n = 2; for (k = 1; k < NF; ++k) { \
+  if ($$k == "--step") s = $$(k + 1); if ($$k == "--sample-hz") f = $$(k + 1); if ($$k == "--increments") n = $$(k + 1) } \
+  if (s) print s; else if (f) printf "%d/%d\n", n, f; else print "0.01" }')
 
 .PHONY: attitude-generate attitude-check attitude-verify attitude-compare attitude-vectors attitude-vectors-m3
 
@@ -36,7 +40,7 @@ attitude-verify:
 attitude-compare:
 	$(STRAPGEN) compare $(ATTITUDE) $(addprefix --source ,$(ATTITUDE_SOURCES)) --reference exact \
 	  --fail-above $(ATTITUDE_FAIL_ABOVE) \
-	  --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.01 --duration 20
+	  --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step $(ATTITUDE_STEP) --duration 20
 
 # Fails if a call on this machine does not return the very integers of the vectors.
 attitude-vectors:

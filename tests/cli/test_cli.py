@@ -1316,3 +1316,12 @@ def test_generate_prints_the_error_bounds_of_floating_point(strapgen_says):
     assert "no error bound is known: atan2 jumps" in strapgen_says(
         "generate euler-angles-from-dcm --target c"
     )
+
+
+def test_generate_says_how_often_a_step_is_called(strapgen_says, tmp_path):
+    options = f"--target c-fixed --max-rate-deg-s 400 --sample-hz 200 --out {tmp_path}"
+    assert "a step takes 2 samples of the gyro: call it at 100 Hz" in strapgen_says(
+        f"generate euler {options}"
+    )
+    said = strapgen_says(f"generate euler --method rk1 --increments 1 {options}")
+    assert "call it at" not in said

@@ -13,6 +13,7 @@ import pytest
 from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import integrate
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
@@ -351,7 +352,7 @@ def test_resampling_keeps_the_whole_angle():
     uneven = read_rates(DATA / "rates_uneven.csv", "deg/s", "50")
     assert len(uneven.increments) == 200
     table = np.loadtxt(DATA / "rates_uneven.csv", delimiter=",", skiprows=1)[:, :4]
-    whole = np.radians(np.trapezoid(table[:, 1:], table[:, 0], axis=0))
+    whole = np.radians(integrate.trapezoid(table[:, 1:], table[:, 0], axis=0))
     np.testing.assert_allclose(uneven.increments.sum(axis=0), whole, rtol=0, atol=1e-13)
 
 

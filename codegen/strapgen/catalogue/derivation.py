@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.method_names import INTEGRATORS, VECTORS
+from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.shaped_coning import named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -130,6 +132,15 @@ def companion(kernel: Kernel, name: str) -> Kernel:
     return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
 
 
+@cache
+def _require_conditions(tableau: Tableau) -> None:
+    """Refuse a tableau that misses a condition of its order, a built-in one too."""
+    try:
+        tableaux.verify(tableau)
+    except InputError as error:
+        raise InputError(f"tableau {tableau.name}: {error}") from None
+
+
 def _method(method: AnyMethod) -> Method:
     """Load a method by its name, from its tableau or from its window."""
     from strapgen.catalogue.methods import coning, runge_kutta, windowed
@@ -140,11 +151,11 @@ def _method(method: AnyMethod) -> Method:
     window = named_window(method) if isinstance(method, (str, Window)) else None
     if window is not None:
         return windowed.method(window)
-    if isinstance(method, Tableau):
-        return runge_kutta.method(method)
+    tableau = method if isinstance(method, Tableau) else TABLEAUX.get(str(method))
+    if tableau is not None:
+        _require_conditions(tableau)
+        return runge_kutta.method(tableau)
     name = str(method)
-    if name in TABLEAUX:
-        return runge_kutta.method(TABLEAUX[name])
     family = INTEGRATORS[name]
     integrator: Method = import_module(f"{_PACKAGE}.methods.{family.module}").method(
         *(family.arguments or (family.order,))

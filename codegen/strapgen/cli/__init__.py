@@ -94,6 +94,8 @@ COMMANDS: dict[str, dict[str, Any]] = {
     },
 }
 
+#: With which shells ask for the words that may follow.
+_COMPLETING = "_STRAPGEN_COMPLETE"
 #: Most characters of a word that a message repeats, what is left of a longer one, and most characters of a message.
 _LONGEST_WORD, _CUT, _LONGEST_LINE = 300, 60, 2000
 
@@ -174,6 +176,10 @@ def _drop_output() -> None:
 
 
 def _fail(message: str) -> None:
+    if _COMPLETING in os.environ:
+        sys.exit(
+            0
+        )  # words that are not complete yet are no mistake, and a line would stand in the user's prompt
     message = "".join(letter if letter.isprintable() else " " for letter in message)
     line = " ".join(word if len(word) <= _LONGEST_WORD else f"{word[:_CUT]}..." for word in message.split())
     sys.stderr.write(f"strapgen: {line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + '...'}\n")

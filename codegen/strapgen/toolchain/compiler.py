@@ -12,6 +12,7 @@ import importlib.util
 import json
 import os
 import platform
+import re
 import shlex
 import shutil
 import sys
@@ -233,6 +234,10 @@ def _import_file(file: Path) -> Any:
     return module
 
 
+#: What compiled modules begin with: ELF, Mach-O of one and of several processors, and PE.
+_LIBRARIES = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
+
+
 def build_key(many: Iterable[Sources], flags: Sequence[str] | None = None) -> str:
     """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
     many = list(many)
@@ -349,10 +354,13 @@ def run_request(request: dict[str, Any]) -> tuple[Path | None, list[str]]:
         )
     built = Path(answer["path"] or request["folder"])
     if built.is_file():
-        return built, []
-    said = answer["said"].splitlines()
-    reasons = [line.strip() for line in said if "error" in line.lower()] or said[-1:] or ["no output file"]
-    return None, reasons
+        with built.open("rb") as file:
+            is_library = file.read(4).startswith(_LIBRARIES)
+        return (built, []) if is_library else (None, ["it reports success and writes no library"])
+    said = [line.strip() for line in answer["said"].splitlines() if line.strip()]
+    reasons = [line for line in said if "error" in line.lower()] or said[-1:]
+    status = re.search(r"exit (?:code|status) -?\d+", answer["failure"])
+    return None, reasons or [status[0] if status else " ".join(answer["failure"].split()) or "no output file"]
 
 
 def _library(name: str) -> str:

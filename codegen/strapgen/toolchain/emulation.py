@@ -66,7 +66,10 @@ def executed(
     folder = binary.parent
     bare_metal.write_start(processor, folder, _MAIN.format(declarations=declarations, call=call), "main.c")
     command = [processor.compiler, *processor.flags, *flags, *bare_metal.LINKING]
-    bare_metal.compiled([*command, "main.c", binary.name, "-lgcc", "-o", "program.elf"], folder)
+    # Roots and sines of floating point; integers need nothing but what the compiler brings.
+    library = ["-lm", "-lc"] if any(flag.startswith("--specs") for flag in flags) else []
+    libraries = ["-Wl,--start-group", *library, "-lgcc", "-Wl,--end-group"]
+    bare_metal.compiled([*command, "main.c", binary.name, *libraries, "-o", "program.elf"], folder)
     log = folder / "trace.log"
     one_by_one = ["-singlestep"] if _major_version(processor.emulator[0]) < 8 else ["-one-insn-per-tb"]
     command = [*processor.emulator, "-display", "none", "-serial", "none", "-monitor", "none", "-no-reboot"]

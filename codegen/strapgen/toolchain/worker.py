@@ -3,8 +3,8 @@
 Run as ``python -P worker.py``. Every line of standard input is a JSON object: the module's ``name``, the
 declarations ``cdef``, the ``header`` of its C text, the C ``sources``, ``libraries`` and ``flags``, the ``folder`` to
 work in and the ``environment``. For every line one is printed: an object with the ``path`` of the compiled module, or
-null, and what was ``said``. What setuptools and the compiler do to environment, folder and output stays in this
-process, and they are imported once.
+null, what was ``said``, and the ``failure``. What setuptools and the compiler do to environment, folder and output
+stays in this process, and they are imported once.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import json
 import os
 import sys
 import tempfile
-import traceback
 from functools import cache
 from typing import Any
 
@@ -31,15 +30,17 @@ def main() -> None:
         with tempfile.TemporaryFile("w+", errors="replace") as said:
             for stream in (1, 2):
                 os.dup2(said.fileno(), stream)
-            path = None
+            path, failure = None, ""
             try:
                 path = _compiled(request)
-            except BaseException:  # setuptools raises SystemExit too
-                traceback.print_exc()
+            except BaseException as error:  # setuptools raises SystemExit too
+                failure = f"{type(error).__name__}: {error}"
             sys.stdout.flush()
             sys.stderr.flush()
             said.seek(0)
-            print(json.dumps({"path": path, "said": said.read()}), file=answers, flush=True)
+            print(
+                json.dumps({"path": path, "said": said.read(), "failure": failure}), file=answers, flush=True
+            )
 
 
 def _compiled(request: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ import pytest
 import sympy as sp
 from gathering import each
 
+import strapgen
 from strapgen.catalogue import METHODS, STANDARD_METHODS
 from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.order_conditions import largest_residual
@@ -280,3 +281,10 @@ def test_what_cannot_be_read(tmp_path):
         read(tmp_path / "none.toml")
     with pytest.raises(InputError, match=r"cannot be read \(Is a directory\)"):
         read(tmp_path)
+
+
+def test_tableau_that_misses_a_condition_is_refused_where_it_is_used():
+    """Built in or an object of Python: no file is read that would be checked."""
+    wrong = replace(TABLEAUX["rk4"], name="wrong", weights=(Fraction(1, 4),) * 2 + (Fraction(1, 6),) * 2)
+    with pytest.raises(InputError, match=r"^tableau wrong: order 1: .* = 5/6, 1 is needed"):
+        strapgen.derive("euler", wrong)

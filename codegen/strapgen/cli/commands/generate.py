@@ -85,7 +85,7 @@ def generate(
         ]
         print_json(data if len(data) > 1 else data[0])
     else:
-        typer.echo("\n".join(_text(sources, task.target, place) for (task, sources), place in rows))
+        typer.echo("\n".join(_text(task, sources, place) for (task, sources), place in rows))
 
 
 def _names(target: str | None) -> list[str]:
@@ -191,11 +191,12 @@ def _check_alone(
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
 
 
-def _text(sources: Sources, target: str, written: list[Path]) -> str:
+def _text(task: Request, sources: Sources, written: list[Path]) -> str:
     """Return the operations and the files, in fixed point with the format and the error of every output."""
     counts = [f"{number} {kind}" for kind, number in sources.operations.items() if number]
     head = f"{', '.join(counts) or 'no operations'}, {sources.temporaries} temporaries"
-    lines = [f"{sources.kernel} for {target}: {head}", *(f"  {path}" for path in written)]
+    lines = [f"{sources.kernel} for {task.target}: {head}", *(f"  {path}" for path in written)]
+    lines += _call_rate(task)
     for output in sources.fixed.outputs if sources.fixed else ():
         bound, unit = max(output.errors), output.format.unit
         useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
@@ -207,6 +208,16 @@ def _text(sources: Sources, target: str, written: list[Path]) -> str:
     if sources.rounding is not None:
         lines += _rounding_lines(sources.rounding)
     return "\n".join(lines)
+
+
+def _call_rate(task: Request) -> list[str]:
+    """Return how often a step is called, if the sampling rate is stated and a step takes several samples."""
+    words = [] if task.settings is None else task.settings.stated.split()
+    count = task.choice.increments_per_step
+    if "--sample-hz" not in words or count < 2:
+        return []
+    hertz = checks.number("sample_hz", words[words.index("--sample-hz") + 1]) / count
+    return [f"  a step takes {count} samples of the gyro: call it at {float(hertz):g} Hz"]
 
 
 def _rounding_lines(rounding: RoundingBounds) -> list[str]:

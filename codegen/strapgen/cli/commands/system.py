@@ -112,9 +112,9 @@ def system(
     if format == "json":
         print_json({**system_data(fit, needs, errors), "files": [str(path) for path in written]})
         return
-    typer.echo(f"{sources.kernel} for {target}" if written else system_report(fit, needs, errors).text())
-    for path in written:
-        typer.echo(f"  {path}")
+    if written:
+        typer.echo("\n".join([f"{sources.kernel} for {target}", *(f"  {path}" for path in written), ""]))
+    typer.echo(system_report(fit, needs, errors).text())
 
 
 def _check_options(
