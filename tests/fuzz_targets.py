@@ -229,7 +229,7 @@ def seeds(name: str) -> list[bytes]:
         b"frequency_hz,density,angle_x_rad,angle_x_phase_rad\n5,0,1e-5,0\n10,1e-2,2e-5,0.1\n500,1e-2,0,3\n"
     )
     rows = b"t,dx,dy,dz,dvx,dvy,dvz\n0.1,0,0,1e-3,0,0,0.98\n0.2,0,0,2e-3,0,0,0.98\n0.3,1e-3,0,2e-3,0,0,0.98\n"
-    rates = b"t,x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n"
+    rates = b"t [s],x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n"
     header = (root / "generated" / "c_fixed" / "euler_product_w32.h").read_bytes()
     tableau = (Path(tableaux.__file__).parent / "butcher_tableaux" / "rk3.toml").read_bytes()
     window = (
