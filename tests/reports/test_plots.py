@@ -374,3 +374,16 @@ def test_a_screen_of_the_user_s_that_is_not_there_changes_nothing(tmp_path):
 def test_kinds_of_files_that_take_a_typesetting_system_are_refused():
     with pytest.raises(InputError, match=r"file type 'pgf' is not known; allowed: .*svg"):
         drawing.require_kind("run.pgf")
+
+
+@pytest.mark.parametrize("width", [4, 7, 15])
+def test_title_lies_inside_its_figure(width):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, 5), layout="constrained")
+    figure.subplots()
+    drawing.title(figure, "ratios of drifts, beside the figures of the thesis; " * 3)
+    figure.canvas.draw()
+    box = figure.get_window_extent()
+    words = figure._suptitle.get_window_extent()
+    assert box.x0 <= words.x0 and words.x1 <= box.x1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import os
+import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -103,9 +104,14 @@ def several_colours(count: int) -> list[str]:
     return [_SEVERAL[number % len(_SEVERAL)] for number in range(count)]
 
 
+#: Characters of a title on an inch.
+_CHARACTERS = 11.5
+
+
 def title(figure: Any, text: str) -> None:
-    """Write a title at the left of a figure."""
-    figure.suptitle(printable(text), fontsize=11, x=0.01, ha="left")
+    """Write a title at the left of a figure, on as many lines as its width needs."""
+    lines = textwrap.wrap(printable(text), int(figure.get_figwidth() * _CHARACTERS))
+    figure.suptitle("\n".join(lines), fontsize=11, x=0.01, ha="left")
 
 
 def printable(text: str) -> str:
