@@ -173,3 +173,10 @@ def test_a_reader_is_told_which_values_are_divided_by_powers_of_the_scale():
     told = _note(code, {"a_x": 1, "a_y": 1, "c": 2}, sensor)
     assert told.startswith(f"{start}. Powers of s are in the constants, and values are divided: ")
     assert told.endswith("c by s^2; a by s.")
+
+
+def test_count_at_the_largest_rate_is_inside_the_range():
+    """400 deg/s at 100 Hz are 22857.14 counts of 0.0175 deg/s: a gyro that rounds up says 22858."""
+    settings = Settings.of(max_rate_deg_s=400, sample_hz=100, lsb="0.0175dps", increments=2)
+    increments = quantized(Choice("euler", "rk4", 2), settings).interface.inputs[1]
+    assert (increments.low, increments.high) == (-22858, 22858)
