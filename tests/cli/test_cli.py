@@ -849,11 +849,17 @@ def test_unit_of_rates_matters(strapgen_says, tmp_path):
 
 
 @pytest.mark.long
-def test_increments_left_over_are_told(strapgen_says):
-    options = f"--increments 3 --increments-csv {DATA}/increments.csv"
-    assert json.loads(strapgen_says(f"simulate euler {options} --format json"))["unused_increments"] == 1
-    said = strapgen_says(f"simulate euler {options} --format text")
-    assert said.endswith("1 increments at the end make no whole step and were not used\n")
+def test_increments_left_over_are_told(capsys):
+    line = f"simulate euler --increments 3 --increments-csv {DATA}/increments.csv --format"
+    said = {}
+    for form in ("json", "text", "csv"):
+        with pytest.raises(SystemExit) as stop:
+            main([*line.split(), form])
+        assert stop.value.code == 0
+        said[form] = capsys.readouterr()
+        assert said[form].err.endswith("1 increment at the end fills no step of 3 and is left out\n")
+    assert json.loads(said["json"].out)["unused_increments"] == 1
+    assert said["text"].out.endswith("1 increments at the end make no whole step and were not used\n")
 
 
 @pytest.mark.long

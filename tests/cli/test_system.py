@@ -70,7 +70,9 @@ def test_every_file_says_which_command_makes_it(target, two, capsys):
     folder = Path("first") / target
     said = run(f"two.toml --target {target} --sample-hz 1600{word} --out {folder}", capsys)
     files = sorted(folder.iterdir())
-    assert [line.strip() for line in said.splitlines()[1:]] == [
+    listed, _, summary = said.partition("\n\n")  # rates, bounds and budget are said too
+    assert "All rates:" in summary
+    assert [line.strip() for line in listed.splitlines()[1:]] == [
         str(folder / path.name) for path in sorted(files, key=lambda path: said.index(path.name))
     ]
     for number, path in enumerate(files):

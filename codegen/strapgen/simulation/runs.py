@@ -107,9 +107,10 @@ def require_proper(backend: Backend, states: Any, time: Array) -> None:
     if not backend.sources.function.inputs[0].constraint:
         return
     values = np.asarray(states, np.float64)
-    lengths = np.sqrt(np.square(values).sum(axis=tuple(range(1, values.ndim)))) / np.linalg.norm(
-        backend.identity
-    )
+    with np.errstate(over="ignore"):  # a length beyond all numbers is refused too
+        lengths = np.sqrt(np.square(values).sum(axis=tuple(range(1, values.ndim)))) / np.linalg.norm(
+            backend.identity
+        )
     wrong = np.flatnonzero((lengths > LARGEST_LENGTH) | (lengths < 1 / LARGEST_LENGTH))
     if len(wrong):
         place = int(wrong[0])
