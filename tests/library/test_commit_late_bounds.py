@@ -232,3 +232,17 @@ def test_reset_begins_error_feedback_anew(rounding):
         assert model.push(sample, 0) == compiled.push(sample, 0)
         np.testing.assert_array_equal(model.attitude, compiled.attitude)
         np.testing.assert_array_equal(model.now(), compiled.now())
+
+
+def test_gap_inside_the_start_has_the_bound_of_the_start(monkeypatch):
+    filters = LateFilters(WINDOWS["window-3-3"], calm_start=True)
+    late = parts("window-3-3")
+    monkeypatch.setattr(commit_late_bounds, "_moved", lambda exact, integers, *_: {"groups": len(exact)})
+    monkeypatch.setattr(
+        commit_late_bounds, "_rounding", lambda _p, _i, moved: Fraction({7: 1, 10: 1000}[moved["groups"]])
+    )
+    monkeypatch.setattr(commit_late_bounds, "_stretch", lambda *_: Fraction(1))
+    monkeypatch.setattr(commit_late_bounds, "_row_length", lambda _: Fraction(1))
+    interfaces = interface_of(late.step), interface_of(late.rotation)
+    errors = commit_late_bounds.now_errors(filters, late.fixed, (None, None), interfaces, None)
+    assert errors.gap == errors.start == 1000 * (P + L)

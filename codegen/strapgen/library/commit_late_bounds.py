@@ -86,7 +86,9 @@ def now_errors(
     # The most wait in a gap at the end of the start: p intervals with fewer samples before them, those of the gap,
     # which have all samples, and L with fewer samples ahead.
     gap = [by_sets] * previous + [step] * REACH + [by_sets] * ahead
-    return NowErrors(_total([by_sets] * ahead), _total([by_short] * (previous + ahead)), _total(gap))
+    start = _total([by_short] * (previous + ahead))
+    # A sample that is lost before the end of the start waits among the intervals of the start.
+    return NowErrors(_total([by_sets] * ahead), start, max(start, _total(gap)))
 
 
 def _total(steps: Iterable[Advance]) -> Fraction:
