@@ -16,9 +16,9 @@ ATTITUDE_SOURCES = $(filter-out %/main.c $(ATTITUDE_FOLDER)/test_%,$(wildcard $(
 # The largest error on coning that the firmware may have, in rad.
 ATTITUDE_FAIL_ABOVE ?= 1e-7
 # The step of that run in s: that of the options, or as many samples of the gyro as a step takes, 2 unless they say.
-ATTITUDE_STEP ?= $(shell echo '$(ATTITUDE_OPTIONS)' | awk '{ n = 2; for (k = 1; k < NF; ++k) { \
-  if ($$k == "--step") s = $$(k + 1); if ($$k == "--sample-hz") f = $$(k + 1); if ($$k == "--increments") n = $$(k + 1) } \
-  if (s) print s; else if (f) printf "%d/%d\n", n, f; else print "0.01" }')
+attitude_option = $(patsubst --$(1)=%,%,$(filter --$(1)=%,$(subst --$(1) ,--$(1)=,$(ATTITUDE_OPTIONS))))
+attitude_samples = $(or $(call attitude_option,increments),2)/$(call attitude_option,sample-hz)
+ATTITUDE_STEP ?= $(or $(call attitude_option,step),$(if $(call attitude_option,sample-hz),$(attitude_samples)),0.01)
 
 .PHONY: attitude-generate attitude-check attitude-verify attitude-compare attitude-vectors attitude-vectors-m3
 
