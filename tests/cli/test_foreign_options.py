@@ -54,9 +54,8 @@ def test_a_fault_exits_with_1_and_names_its_cause(check):
     assert printed.endswith("\n\nlikely cause: correction of the wrong sign\n")
     (excerpt,) = re.findall(r"^```text\n(.*?)^```", DOCUMENT, flags=re.MULTILINE | re.DOTALL)
     assert all(part in printed for part in excerpt.split("...\n"))
-    assert said == (
-        f"strapgen: {PLACE}/wrong_sign.c fails: order, drift; likely cause: correction of the wrong sign\n"
-    )
+    fails = "coefficients, order, drift; likely cause: correction of the wrong sign"
+    assert said == f"strapgen: {PLACE}/wrong_sign.c fails: {fails}\n"
 
 
 def test_json_has_what_was_agreed(check, tmp_path):
@@ -71,7 +70,12 @@ def test_json_has_what_was_agreed(check, tmp_path):
         "holds": False,
         "cause": "state kept between runs",
     }
-    assert {*data} == {"file", "holds", "cause", "order", "drift_deg_h", "closed_form_deg_h"}
+    old, new = {"order", "drift_deg_h", "closed_form_deg_h"}, {"drift_by_axis_deg_h", "coefficient_ratio"}
+    assert {*data} == {"file", "holds", "cause", "coefficients", *old, *new}
+    assert data["coefficients"] == [
+        {"older": -1, "newer": 0, "seen": pytest.approx(1 / 12, abs=1e-6), "wanted": 1 / 12}
+    ]
+    assert data["coefficient_ratio"] == pytest.approx(1, abs=1e-5)
     assert all({*each} == {"name", "holds", "value"} for each in checks)
     assert [each["name"] for each in checks if each["holds"] is False] == ["runs"]
 
@@ -113,6 +117,13 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
             "sense 'body' is not known .did you mean body-to-reference or",
         ),
         (f"{PLACE}/correct.c {COMMAND} --scalar 1", "scalar '1' is not known; allowed: last, first"),
+        (f"{PLACE}/correct.c {COMMAND} --sample-hz 0", "--sample-hz is 0; a number above 0 is needed"),
+        (f"{PLACE}/correct.c {COMMAND} --sample-hz fast", "--sample-hz is 'fast'; a finite number is needed"),
+        (
+            f"{PLACE}/correct.c {COMMAND} --input angles",
+            "input 'angles' is not known; allowed: increments, rates, rates-at-ends",
+        ),
+        ("euler --sample-hz 100", "--sample-hz goes with a file in C"),
         (
             f"{PLACE}/correct.c {COMMAND} --precision half",
             "precision 'half' is not known; allowed: double, float",

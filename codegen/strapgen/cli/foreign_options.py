@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.options import option
+from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -55,8 +56,17 @@ class ForeignOptions:
         option(
             "--input",
             metavar="NAME",
-            help="What the samples are: increments in rad, or rates in rad/s, means over the sampling interval.  "
-            "[default: the name of the argument]",
+            help="What the samples are: increments in rad; rates in rad/s, means over the sampling interval; or "
+            "rates-at-ends in rad/s, those at the end of each interval.  [default: the name of the argument]",
+        ),
+    ] = None
+    sample_hz: Annotated[
+        _Text,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Samples in a second: dt and step follow from it, and rates from the increments.  "
+            "[default: 100]",
         ),
     ] = None
     init: Annotated[
@@ -70,7 +80,8 @@ class ForeignOptions:
     @property
     def stated(self) -> list[str]:
         """The options that the command line has."""
-        return [f"--{part.name}" for part in dataclasses.fields(self) if getattr(self, part.name) is not None]
+        names = [part.name for part in dataclasses.fields(self) if getattr(self, part.name) is not None]
+        return [f"--{name.replace('_', '-')}" for name in names]
 
     def step(self, file: str) -> ForeignStep:
         """Return the function of a file, compiled."""
@@ -94,4 +105,7 @@ class ForeignOptions:
         source = ForeignSource(
             Path(file), self.function, arguments, self.init or "", self.precision or "double"
         )
-        return ForeignStep(source, convention, takes)
+        if self.sample_hz is None:
+            return ForeignStep(source, convention, takes)
+        rate = checks.number("--sample-hz", self.sample_hz, positive=True)
+        return ForeignStep(source, convention, takes, 1 / rate)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from strapgen.experiments.conformance import Finding
@@ -51,6 +52,9 @@ def outcome_report(outcome: ForeignOutcome, function: str) -> Report:
             "closed_form_deg_h": outcome.closed_form_deg_h,
             "cause": outcome.cause,
             "checks": checks,
+            "drift_by_axis_deg_h": outcome.drift_by_axis_deg_h,
+            "coefficients": [asdict(coefficient) for coefficient in outcome.coefficients],
+            "coefficient_ratio": outcome.coefficient_ratio,
         }
 
     return Report(text, data, lambda: flat_table(checks))

@@ -66,6 +66,49 @@ def test_one_sample_of_delay_is_named():
     assert causes.cause(one_by_one(1, 1, distance=2)) == causes.LATE
 
 
+def test_a_correction_from_three_kept_samples_is_known_when_its_older_sample_is_late():
+    # It reads samples 1 to 4 before the call; no other correction has these coefficients, and its size is no multiple.
+    for form in FORMS:
+        table = dict.fromkeys(pairs(1), 0.0)
+        for (older, newer), c in design(1, 3, form).pairs.items():
+            if newer == 3:
+                table[older - 4, 0] = float(c)
+        assert causes.cause(Products(1, table, table)) == causes.LATE
+
+
+def test_coefficients_of_three_kept_samples_are_wanted_where_they_are_seen():
+    for form in FORMS:
+        for factor in (1, -1, 0.7):
+            seen = tables(1, 3, form, factor)
+            right = tables(1, 3, form)
+            assert causes.wanted(seen) == pytest.approx(right.at_once), (form, factor)
+            assert causes.standard_design(right).previous == 3
+
+
+def test_the_ratio_is_what_coning_needs():
+    for chosen in DESIGNS:
+        assert causes.ratio(tables(*chosen)) == pytest.approx(1, abs=1e-12)
+        assert causes.ratio(tables(*chosen, 0.96)) == pytest.approx(0.96, abs=1e-12)
+        assert causes.corrects_coning(tables(*chosen, 0.996))
+        assert not causes.corrects_coning(tables(*chosen, 0.994))
+
+
+def test_a_correction_about_one_axis_that_is_wrong_is_told_in_numbers():
+    right, wrong = (tables(1, 1, "compressed", factor).finally_ for factor in (1, -1))
+    mean = {pair: c / 3 for pair, c in right.items()}
+    products = Products(1, mean, mean, by_axis=(right, wrong, right))
+    assert causes.cause(products) == "the corrections about x, y, z differ: 1, -1, 1 of what is needed"
+    assert not causes.corrects_coning(Products(1, right, right, by_axis=(right, wrong, right)))
+
+
+def test_faults_that_make_up_a_known_size_are_no_known_fault():
+    # The moment is twice that of a right correction, but no coefficient is.
+    table = {pair: 0.0 for pair in pairs(1)} | {(-1, 0): -1 / 12, (-3, 0): 1 / 12}
+    assert causes.ratio(Products(1, table, table)) == pytest.approx(2)
+    said = causes.cause(Products(1, table, table))
+    assert said == "coefficients of no single fault that is known, 2 of what coning needs"
+
+
 @each("samples", [1, 2, 4])
 def test_samples_that_are_turned_one_by_one_are_known(samples):
     assert causes.cause(one_by_one(samples, 1)) is None
@@ -89,7 +132,7 @@ def test_samples_of_which_one_counts_more_are_told():
     assert said == "samples weighted by 3, -1 in place of 1"
 
 
-@pytest.mark.parametrize("error", [0.0002, -0.0002])
+@pytest.mark.parametrize("error", [0.00002, -0.00002])
 def test_the_error_of_a_probe_changes_no_name(error):
     for factor, cause in ((1, None), (0, causes.ABSENT), (-1, causes.WRONG_SIGN), (2, causes.FACTOR_TWO)):
         exact = tables(1, 1, "compressed", factor)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.experiments.foreign import causes as causes
 from strapgen.experiments.foreign.check import check_foreign
-from strapgen.experiments.foreign.cone import closed_form_deg_h
+from strapgen.experiments.foreign.cone import closed_form_deg_h, cone
+from strapgen.experiments.foreign.replacement import FIRST_ORDER
 from strapgen.experiments.foreign.runs import Convention, ForeignStep
 from strapgen.library import generated_sources
 from strapgen.reports.conformance import outcome_report
@@ -144,20 +146,6 @@ def example(name: str) -> ForeignStep:
     return ForeignStep(source, Convention("first"))
 
 
-@pytest.fixture
-def outcome(tmp_path: Path):
-    """Check a function that is given as text; its step is `step` unless told otherwise."""
-
-    def check(text: str, arguments: str, convention=PLAIN, file="a.c", name="step", init="", **more):
-        (tmp_path / file).write_text(text)
-        source = ForeignSource(
-            tmp_path / file, name, read_arguments(arguments), init, more.pop("precision", "double")
-        )
-        return check_foreign(ForeignStep(source, convention, **more))
-
-    return check
-
-
 def failed(outcome) -> list[str]:
     return [finding.name for finding in outcome.findings if finding.holds is False]
 
@@ -167,7 +155,7 @@ def test_the_right_example_holds():
     outcome = check_foreign(example("correct.c"))
     assert (outcome.holds, outcome.cause, failed(outcome)) == (True, None, [])
     assert outcome.order == pytest.approx(3, abs=0.05)
-    names = "calls scalar sense axes,at rest,delay,order drift symmetry norm runs"
+    names = "calls scalar sense axes,at rest,delay,rotation,coefficients,order drift symmetry norm runs"
     assert [finding.name for finding in outcome.findings] == names.replace(" ", ",").replace(
         "at,", "at "
     ).split(",")
@@ -184,9 +172,11 @@ def test_the_right_example_holds():
 def test_a_fault_is_seen_and_named(name):
     outcome = check_foreign(example(name))
     assert (outcome.holds, outcome.cause) == (False, FAULTS[name])
-    assert failed(outcome) == (["runs"] if name == "state_kept.c" else ["order", "drift"])
+    assert failed(outcome) == (["runs"] if name == "state_kept.c" else ["coefficients", "order", "drift"])
     data = json.loads(outcome_report(outcome, "integrator_update").written("json"))
-    assert list(data) == ["file", "holds", "order", "drift_deg_h", "closed_form_deg_h", "cause", "checks"]
+    old = ["file", "holds", "order", "drift_deg_h", "closed_form_deg_h", "cause", "checks"]
+    assert list(data) == [*old, "drift_by_axis_deg_h", "coefficients", "coefficient_ratio"]
+    assert math.hypot(*data["drift_by_axis_deg_h"]) == pytest.approx(outcome.drift_deg_h)
     assert {tuple(check) for check in data["checks"]} == {("name", "holds", "value")}
     # What the faults leave follows from the closed form: correction times factor.
     if name in ("correction_absent.c", "wrong_sign.c", "factor_two.c"):
@@ -251,12 +241,20 @@ def test_a_global_attitude_of_first_order(outcome, normalized):
     arguments = "rates[3], dt -> global q[4]"
     more = {"name": "update", "takes": "rates", "precision": "float"}
     checked = outcome(text, arguments, Convention("first"), init="reset", **more)
-    named = causes.ABSENT if normalized else f"{causes.ABSENT}; norm of the state not kept"
-    assert (checked.holds, checked.cause) == (False, named)
+    first = f"{FIRST_ORDER}: it turns by 2 atan(d/2) in place of d; {causes.ABSENT}"
+    if normalized:
+        assert (checked.holds, checked.cause) == (False, first)
+    else:
+        # A call makes the quaternion longer by the root of 1 + d^2 / 4.
+        increments = cone().increments(Fraction(1, 100), 6008, 1)
+        longer = np.prod(np.sqrt(1 + (increments**2).sum(axis=-1) / 4))
+        cause, _, length = checked.cause.partition("; the state's length is off: 1.00001 at first, ")
+        assert (checked.holds, cause) == (False, first)
+        assert float(length.split()[0]) == pytest.approx(longer, abs=1e-4)
     if normalized:
         started = text.replace("volatile float q[4];", "volatile float q[4] = {1, 0, 0, 0};")
         checked = outcome(started, arguments, Convention("first"), **more)
-        assert checked.cause == f"{causes.ABSENT}; {causes.STATE_KEPT}"
+        assert checked.cause == f"{first}; {causes.STATE_KEPT}"
         checked = outcome(text, arguments, Convention("last"), init="reset", **more)
         assert "the scalar part stands first, not last: --scalar first fits" in checked.cause
 
@@ -336,10 +334,13 @@ def test_what_does_not_go_together_is_refused(tmp_path):
     (tmp_path / "a.c").write_text("")
     source = ForeignSource(tmp_path / "a.c", "f", read_arguments("state[4], rates[3] -> next[4]"))
     with pytest.raises(
-        InputError, match="--input increments contradicts the argument rates; --input rates fits it"
+        InputError,
+        match="--input increments contradicts the argument rates; --input rates or rates-at-ends fits it",
     ):
         ForeignStep(source)
-    with pytest.raises(InputError, match="input 'angles' is not known; allowed: increments, rates"):
+    with pytest.raises(
+        InputError, match="input 'angles' is not known; allowed: increments, rates, rates-at-ends"
+    ):
         ForeignStep(source, takes="angles")
     with pytest.raises(InputError, match="scalar 'middle' is not known; allowed: last, first"):
         Convention("middle")

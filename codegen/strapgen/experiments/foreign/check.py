@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from fractions import Fraction
-from itertools import product
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import pipeline
-from strapgen.catalogue.methods.coning_coefficients import Design
-from strapgen.experiments.conformance import ORDER_WITHIN, Finding
-from strapgen.experiments.convergence import MOST_ERROR, Convergence, fitted
-from strapgen.experiments.foreign import causes
-from strapgen.experiments.foreign.cone import (
-    SAMPLES,
-    SAMPLING,
-    closed_form_deg_h,
-    cone,
-    drift_deg_h,
-    generated_drifts,
-    published_step,
-    seconds,
+from strapgen.experiments.conformance import Finding
+from strapgen.experiments.foreign import causes, ladder
+from strapgen.experiments.foreign.axes import (
+    DIRECTION_WITHIN,
+    SIZE_WITHIN,
+    convention_of,
+    fits,
+    in_words,
+    off,
+    sizes_in_words,
 )
 from strapgen.experiments.foreign.probes import (
     Directions,
@@ -34,32 +27,50 @@ from strapgen.experiments.foreign.probes import (
     product_segments,
     products,
 )
+from strapgen.experiments.foreign.rest import Rest, rest, rest_segments
+from strapgen.experiments.foreign.rotation import rotation, rotation_segments
 from strapgen.experiments.foreign.runs import (
-    SCALARS,
-    SENSES,
+    ENDS,
+    RATE_INPUTS,
     Convention,
     ForeignSegments,
     ForeignStep,
     Segment,
     SegmentRun,
+    departure,
+    lengths,
 )
-from strapgen.simulation.motions import GENERAL, Motion, motion
-from strapgen.simulation.runs import drift_between
+from strapgen.simulation.motions import motion
+from strapgen.toolchain.foreign_arguments import RATES
 
 Array = NDArray[np.float64]
 
-#: Steps in s of the ladder, by precision: rounding of single precision hides the errors of short ones.
-_LADDER = {"double": (8, 16, 32, 64, 128), "float": (1, 2, 4, 8, 16)}
-#: Largest difference from the order of theory in single precision, where few steps are left to measure it on.
-_ORDER_WITHIN_FLOAT = 0.5
-#: How much more than the worse of closed form and published steps a drift may be.
-_DRIFT_WITHIN = 1.2
-#: Largest difference of an answer to a rotation about an axis, in units of the rotation.
-_DIRECTION_WITHIN = 0.1
 #: Largest departure of C C' from the unit matrix that is no fault in itself.
 _NORM_WITHIN = 1e-4
 #: Units in the last place that rounding adds in a call.
 _UNITS_A_CALL = 64
+#: Largest component in rad of random increments.
+_RANDOM = 0.02
+#: Most coefficients that a line shows; those come first that differ most from what is wanted.
+_MOST_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class SeenCoefficient:
+    """The coefficient of the cross product of two samples, older times newer.
+
+    Parameters
+    ----------
+    older, newer : int
+        Samples of a call have the numbers from 0, those before it are negative.
+    seen, wanted : float
+        That of the function, and that of the published correction whose pattern is nearest.
+    """
+
+    older: int
+    newer: int
+    seen: float
+    wanted: float
 
 
 @dataclass(frozen=True)
@@ -78,6 +89,12 @@ class ForeignOutcome:
         The one that a published coning correction on the same samples leaves, in closed form.
     cause : str or None
         The likely cause of what fails; None if nothing does, or the cause is not known.
+    drift_by_axis_deg_h : tuple of float or None
+        The drift about x, y and z of the reference axes in deg/h; its length is the magnitude.
+    coefficients : tuple of SeenCoefficient
+        Those of cross products that are seen or wanted; none where samples are rates at instants.
+    coefficient_ratio : float or None
+        What they correct of the drift on coning to leading order, 1 if they are right.
     """
 
     file: str
@@ -86,6 +103,9 @@ class ForeignOutcome:
     drift_deg_h: float | None
     closed_form_deg_h: float | None
     cause: str | None
+    drift_by_axis_deg_h: tuple[float, ...] | None = None
+    coefficients: tuple[SeenCoefficient, ...] = ()
+    coefficient_ratio: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -120,8 +140,10 @@ class _Check:
         self.count = step.samples
         self.causes: list[str] = []
         self.order: float | None = None
-        self.drift: float | None = None
+        self.drift: Array | None = None
         self.closed: float | None = None
+        self.coefficients: tuple[SeenCoefficient, ...] = ()
+        self.ratio: float | None = None
 
     def outcome(self) -> ForeignOutcome:
         """Run all checks."""
@@ -129,20 +151,28 @@ class _Check:
         failed = any(finding.holds is False for finding in findings)
         cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
         return ForeignOutcome(
-            str(self.step.source.file), findings, self.order, self.drift, self.closed, cause
+            str(self.step.source.file),
+            findings,
+            self.order,
+            None if self.drift is None else float(np.linalg.norm(self.drift)),
+            self.closed,
+            cause,
+            None if self.drift is None else tuple(map(float, self.drift)),
+            self.coefficients,
+            self.ratio,
         )
 
     def findings(self) -> Iterator[Finding]:
         """Yield what is seen; after a fault that hides all others there is no more."""
-        first = self.step.run(direction_segments(self.count))
+        first = self.step.run(direction_segments(self.step))
         calls = self.calls(first)
         if calls.holds is False:
             yield calls
             return
-        convention, response = self.convention(directions(first.runs))
+        convention, response = convention_of(self.step, directions(self.step, first.runs))
         if convention is None:
             yield calls
-            yield self.failed("axes", _axes(response.finally_), _off(response))
+            yield self.failed("axes", in_words(self.step, response.steady), off(response))
             return
         everything = self.segments()
         done = self.step.run([segment for _, part in everything for segment in part], convention)
@@ -155,7 +185,7 @@ class _Check:
         for name, part in everything:
             runs[name] = done.runs[place : place + len(part)]
             place += len(part)
-        yield from self.measured(runs)
+        yield from self.measured(convention, runs)
 
     def failed(self, name: str, text: str, measured: float | None = None) -> Finding:
         """Return a finding whose text is its own cause."""
@@ -174,31 +204,17 @@ class _Check:
 
     # Conventions
 
-    def convention(self, declared: Directions) -> tuple[Convention | None, Directions]:
-        """Return the convention that fits the function, the declared one first; None if none does."""
-        if _fits(declared.finally_):
-            return self.step.convention, declared
-        scalars = SCALARS if self.step.source.arguments.elements == 4 else SCALARS[:1]
-        others = [Convention(scalar, sense) for scalar, sense in product(scalars, SENSES)]
-        ours = self.step.convention
-        others.sort(key=lambda other: (other.scalar != ours.scalar) + (other.sense != ours.sense))
-        for other in others:
-            done = self.step.run(direction_segments(self.count), other)
-            if not done.stopped:
-                response = directions(done.runs)
-                if _fits(response.finally_):
-                    return other, response
-        return None, declared
-
     def axes(self, known: Convention, response: Directions) -> Iterator[Finding]:
         """Yield the findings on scalar part, sense and axes of a function that follows a known convention."""
         declared = self.step.convention
         if self.step.source.arguments.elements == 4:
             yield self.fits("scalar", declared.scalar, known.scalar, "the scalar part stands")
         yield self.fits("sense", declared.sense, known.sense, "the attitude is")
-        if response.order_of_turns < response.other_order:
+        if off(response) > SIZE_WITHIN:
+            yield self.failed("axes", sizes_in_words(response.steady), off(response))
+        elif response.order_of_turns < response.other_order:
             text = "rotations about x, y and z are those of the body"
-            yield Finding("axes", True, text, _off(response), _DIRECTION_WITHIN)
+            yield Finding("axes", True, text, off(response), SIZE_WITHIN)
         else:
             text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
             yield self.failed("axes", text, response.order_of_turns)
@@ -215,110 +231,127 @@ class _Check:
     def segments(self) -> list[tuple[str, list[Segment]]]:
         """Return all segments of the measurements under their names."""
         generator = np.random.default_rng(1969)
-        increments = generator.uniform(-0.02, 0.02, (20, self.count, 3))
+        size = min(_RANDOM, self.step.most / 2)  # of a component, half as large as a vector may be
+        increments = generator.uniform(-size, size, (20, self.count, 3))
         return [
             ("runs", [Segment(increments, settled=False), Segment(increments, settled=False)]),
-            ("at rest", [Segment(np.zeros((10, self.count, 3)))]),
-            ("directions", direction_segments(self.count)),
-            ("products", product_segments(self.count)),
+            ("at rest", rest_segments(self.step)),
+            ("directions", direction_segments(self.step)),
+            ("rotation", rotation_segments(self.step)),
+            ("products", [] if self.step.takes == ENDS else product_segments(self.step)),
             ("symmetry", [Segment(increments), Segment(increments @ _frame().T)]),
-            ("order", [self.along(_general(), length, calls) for length, calls in self.ladder()]),
-            ("drift", [self.along(cone(), SAMPLING * self.count, SAMPLES // self.count)]),
+            ("order", ladder.ladder_segments(self.step)),
+            ("drift", ladder.drift_segments(self.step)),
         ]
 
-    def ladder(self) -> list[tuple[Fraction, int]]:
-        """Return step lengths in s, and the number of steps of each."""
-        lengths = [Fraction(1, n) for n in _LADDER[self.step.source.precision]]
-        return [(length, int(self.duration / length)) for length in lengths]
-
-    @property
-    def duration(self) -> int:
-        """Duration in s of the runs of the ladder."""
-        return 4 if self.step.source.precision == "float" else 1
-
-    def along(self, profile: Motion, length: Fraction, calls: int) -> Segment:
-        """Return the increments of a motion, those of calls before it included."""
-        increments = profile.increments(length, self.step.settling + calls, self.count)
-        return Segment(increments, float(length / self.count))
-
-    def aligned(self, run: SegmentRun, profile: Motion, length: Fraction) -> tuple[Array, Array]:
-        """Return computed and true matrices, equal at the end of the calls before the run."""
-        first = self.step.settling
-        true = profile.attitude(np.arange(first, len(run.relative)) * float(length))
-        relative = run.relative[first:]
-        return true[0] @ relative[0].T @ relative, true
-
-    def measured(self, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
+    def measured(self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
         """Yield what is measured on all segments."""
-        states = runs["at rest"][0].states
-        moved = float(np.abs(states - states[0]).max())
-        allowed = _UNITS_A_CALL * self.step.unit
-        text = f"without rotation the state {'stays as it is' if moved <= allowed else 'moves'}"
-        yield Finding("at rest", moved <= allowed, text, moved, allowed)
-        coefficients = products(runs["products"], self.count)
-        standard = causes.standard_design(coefficients)
-        yield self.delay(directions(runs["directions"]), coefficients)
-        holds = []
-        for finding in (self.ordered(runs["order"], standard), self.drifts(runs["drift"][0], standard)):
-            holds.append(finding.holds)
-            yield finding
-        if not all(holds) and (said := causes.cause(coefficients)) is not None:
-            self.causes.append(said)
+        still = rest(self.step, runs["at rest"])
+        yield self.at_rest(still)
+        runs = {name: tuple(run.unturned(still.frame) for run in part) for name, part in runs.items()}
+        response = directions(self.step, runs["directions"])
+        delay = self.delay(response)
+        coefficients = None
+        turned = rotation(self.step, convention, runs["rotation"])
+        if self.step.takes != ENDS and delay.holds and off(response) <= SIZE_WITHIN:
+            coefficients = products(self.step, runs["products"], exact=turned.order >= 3)
+            if causes.comes_late(coefficients):
+                delay = Finding("delay", False, "a later call corrects the samples of a call", delay.measured)
+        yield delay
+        self.causes.extend([turned.cause] if turned.cause else [])
+        yield Finding("rotation", turned.order >= 3, turned.text, turned.square)
+        distorted = still.strays or off(response) > SIZE_WITHIN
+        proved = 0 if distorted else turned.order if delay.holds else min(turned.order, 1)
+        yield from self.corrected(coefficients, proved, runs)
         yield self.symmetry(*runs["symmetry"])
-        yield self.norm(runs["drift"][0])
+        yield self.norm(convention, runs["drift"][0])
         yield self.repeated(*runs["runs"])
 
-    def delay(self, response: Directions, coefficients: Products) -> Finding:
-        """Return the finding on rotations and corrections that a later call adds."""
-        if not _fits(response.at_once):
-            return self.failed(
-                "delay", "rotation one sample late: a later call turns by the samples of a call"
-            )
-        if causes.comes_late(coefficients):
-            self.causes.append(causes.LATE)
-            return Finding("delay", False, "a later call corrects the samples of a call")
-        return Finding("delay", True, "a call turns by its own samples")
+    def at_rest(self, still: Rest) -> Finding:
+        """Return the finding on what happens without rotation."""
+        allowed = _UNITS_A_CALL * self.step.unit
+        text = f"without rotation the state {'stays as it is' if still.moved <= allowed else 'moves'}"
+        self.causes.extend(still.causes(float(self.step.interval * self.count)))
+        return Finding("at rest", still.moved <= allowed, text, still.moved, allowed)
 
-    def ordered(self, runs: tuple[SegmentRun, ...], standard: Design) -> Finding:
-        """Measure the order on a ladder of steps."""
-        profile, rungs = _general(), []
-        for (length, calls), run in zip(self.ladder(), runs, strict=True):
-            computed, true = self.aligned(run, profile, length)
-            error = float((np.linalg.norm(computed - true, axis=(-2, -1)) / math.sqrt(2)).max())
-            floor = 8 * self.step.unit * (calls + self.step.settling)
-            rungs.append((float(length), error, floor < error < MOST_ERROR))
-        theory = pipeline.derive(published_step("coning-compressed", standard)).order
-        ladder: Convergence = fitted(self.step.source.function, self.step.source.precision, theory, rungs)
-        self.order, needed = ladder.observed, ladder.predicted
-        assert needed is not None
-        words = f"a published correction has {needed}"
-        if self.order is None:
-            too_large = min(error for _, error, _ in rungs) > MOST_ERROR
-            return Finding("order", False if too_large else None, f"{ladder.hidden}; {words}")
-        within = _ORDER_WITHIN_FLOAT if self.step.source.precision == "float" else ORDER_WITHIN
-        return Finding(
-            "order",
-            self.order > needed - within,
-            f"observed {self.order:.3f}; {words}",
-            self.order,
-            needed - within,
-        )
+    def delay(self, response: Directions) -> Finding:
+        """Return the finding on a rotation that another call brings."""
+        lag, ends = response.lag, self.step.takes == ENDS
+        if abs(lag) <= DIRECTION_WITHIN if ends else fits(response.at_once):
+            return Finding("delay", True, "a call turns by its own samples", lag)
+        half = 0.5 if self.step.takes == RATES else -0.5
+        if (
+            self.step.takes in RATE_INPUTS
+            and abs(lag - half) < DIRECTION_WITHIN
+            and (said := self.other_rates())
+        ):
+            return self.failed("delay", said, lag)
+        size = "one sample" if abs(abs(lag) - 1) < DIRECTION_WITHIN else f"{abs(lag):.2g} samples"
+        return self.failed("delay", f"rotation {size} {'late' if lag > 0 else 'early'}", lag)
 
-    def drifts(self, run: SegmentRun, standard: Design) -> Finding:
-        """Measure the drift on a cone, beside the closed form and generated steps."""
-        length, duration = SAMPLING * self.count, seconds(self.count)
-        computed, true = self.aligned(run, cone(), length)
-        self.drift = drift_deg_h(drift_between(computed, true), duration)
-        self.closed = abs(closed_form_deg_h(standard))
-        generated = generated_drifts(standard)
-        best = min(generated, key=lambda name: generated[name])
-        rounding = math.degrees(4 * self.step.unit * float(duration / length)) / float(duration) * 3600
-        allowed = _DRIFT_WITHIN * max(self.closed, *generated.values()) + rounding
-        text = (
-            f"{self.drift:.4g} deg/h; closed form on {_samples(standard)} {self.closed:.4g}, "
-            f"{best} {generated[best]:.4g}"
+    def other_rates(self) -> str | None:
+        """Return the cause if the function is right for the other kind of rates, where it has no delay."""
+        other = ENDS if self.step.takes == RATES else RATES
+        checked = _Check(replace(self.step, takes=other))
+        holds = {finding.name: finding.holds for finding in checked.findings()}
+        if not holds.get("delay") or holds.get("order") is False:
+            return None
+        order = "" if checked.order is None else f", order {checked.order:.2f}"
+        said = (
+            "rates at instants are taken for means: its rates are those at the ends of the intervals"
+            if other == ENDS
+            else "means are taken for rates at instants: its rates are means over the intervals"
         )
-        return Finding("drift", self.drift <= allowed, text, self.drift, allowed)
+        return f"{said}; --input {other} fits{order}"
+
+    def corrected(
+        self,
+        coefficients: Products | None,
+        proved: int,
+        runs: dict[str, tuple[SegmentRun, ...]],
+    ) -> Iterator[Finding]:
+        """Yield the findings on the coning correction: its coefficients, the order, and the drift.
+
+        Without coefficients the order that is proved counts, as far as rounding hides the one that is measured.
+        """
+        if coefficients is None:
+            standard = causes.plain_design(self.count)
+        else:
+            standard = causes.standard_design(coefficients)
+            shown = self.shown(coefficients)
+            yield shown
+            proved = proved if shown.holds else min(proved, 2)
+        seen = ladder.ladder(self.step, runs["order"], standard)
+        if self.step.source.precision == "float":
+            order, self.order = ladder.order_in_float(self.step, seen, standard, proved)
+        else:
+            order, self.order = ladder.order_on_ladder(self.step, seen)
+        yield order
+        seen_design = None if coefficients is None else causes.seen_design(coefficients)
+        drift, self.drift, self.closed = ladder.drift_on_cones(
+            self.step, runs["drift"], standard, seen_design
+        )
+        yield drift
+
+    def shown(self, known: Products) -> Finding:
+        """Return the finding on the coefficients, and keep them beside those that are wanted."""
+        self.coefficients = tuple(
+            SeenCoefficient(older, newer, known.at_once[older, newer], value)
+            for (older, newer), value in causes.wanted(known).items()
+            if value or abs(known.at_once[older, newer]) > causes.LEAST
+        )
+        self.ratio = causes.ratio(known)
+        holds = causes.corrects_coning(known) and not causes.weights_off(known)
+        if (said := causes.cause(known)) is not None:
+            self.causes.append(said)
+        by_difference = sorted(self.coefficients, key=lambda each: -abs(each.seen - each.wanted))
+        parts = [
+            f"d{each.older} x d{each.newer} {each.seen:.4g} ({each.wanted:.4g})"
+            for each in by_difference[:_MOST_SHOWN]
+        ]
+        rest = f" and {len(by_difference) - _MOST_SHOWN} more" if len(by_difference) > _MOST_SHOWN else ""
+        text = f"seen (wanted): {', '.join(parts)}{rest}; {self.ratio:.3f} of what coning needs"
+        return Finding("coefficients", holds, text, self.ratio, causes.tolerance(known))
 
     def symmetry(self, plain: SegmentRun, turned: SegmentRun) -> Finding:
         """Turn all increments: the attitude must turn with them."""
@@ -329,13 +362,16 @@ class _Check:
         text = f"with all increments turned the attitude {says} with them"
         return Finding("symmetry", off <= allowed, text, off, allowed)
 
-    def norm(self, run: SegmentRun) -> Finding:
+    def norm(self, convention: Convention, run: SegmentRun) -> Finding:
         """Look at the length of the state along the cone."""
-        off = float(np.abs(run.matrices @ np.swapaxes(run.matrices, -1, -2) - np.eye(3)).max())
+        off = departure(run.states)
         allowed = max(_NORM_WITHIN, 4 * self.step.unit * len(run.matrices))
         text = f"on the cone C C' departs from the unit matrix by at most {off:.3g}"
         if off > allowed:
-            self.causes.append("norm of the state not kept")
+            size = lengths(run.states)
+            self.causes.append(
+                f"the state's length is off: {size[0]:.6g} at first, {size[-1]:.6g} in the end"
+            )
         return Finding("norm", off <= allowed, text, off, allowed)
 
     def repeated(self, first: SegmentRun, second: SegmentRun) -> Finding:
@@ -349,46 +385,6 @@ class _Check:
         return Finding("runs", False, f"{after} a second run differs from the first by {off:.3g}", off, 0.0)
 
 
-def _general() -> Motion:
-    return motion("coning", **GENERAL)
-
-
-def _samples(standard: Design) -> str:
-    before = f" and {standard.previous} before" if standard.previous else ""
-    return f"{standard.samples} sample{'s' if standard.samples > 1 else ''}{before}"
-
-
 def _frame() -> Array:
     """Return a rotation that takes no axis to an axis."""
     return motion("constant", x_rad_s=0.48, y_rad_s=-0.6, z_rad_s=0.64).attitude(1.0)
-
-
-def _fits(response: Array) -> bool:
-    return bool(np.abs(response - np.eye(3)).max() < _DIRECTION_WITHIN)
-
-
-def _off(response: Directions) -> float:
-    """Return the largest difference of an answer to a rotation about an axis, in units of the rotation."""
-    return float(np.abs(response.finally_ - np.eye(3)).max())
-
-
-def _axes(response: Array) -> str:
-    """Return in words how rotations about the axes come out."""
-    if not np.isfinite(response).all():
-        return "a small rotation gives no attitude near the one before it"
-    sizes = np.abs(response).max(axis=0)
-    if np.all(sizes < _DIRECTION_WITHIN):
-        return "a small rotation about an axis does not turn the attitude"
-    signs = np.where(np.abs(response) > sizes / 2, np.sign(response), 0)
-    one_each = np.array_equal(np.abs(signs).sum(axis=0), np.ones(3)) and np.array_equal(
-        np.abs(signs).sum(axis=1), np.ones(3)
-    )
-    factor = float(np.median(sizes))
-    if one_each and np.allclose(response, factor * signs, atol=_DIRECTION_WITHIN * factor):
-        names = [
-            ("-" if signs[:, k].sum() < 0 else "") + "xyz"[int(np.abs(signs[:, k]).argmax())]
-            for k in range(3)
-        ]
-        size = "" if abs(factor - 1) < _DIRECTION_WITHIN else f", {factor:.4g} times as large"
-        return f"rotations about x, y, z turn about {', '.join(names)}{size}"
-    return "a small rotation about an axis is wrong in size or axis"

@@ -27,7 +27,6 @@ def cone() -> Motion:
     Returns
     -------
     Motion
-        Its axis is that of `drift_deg_h`.
     """
     a, g = FREQUENCY * math.sin(HALF_ANGLE), -2 * FREQUENCY * math.sin(HALF_ANGLE / 2) ** 2
     return motion("coning", a_rad_s=a, b_rad_s=FREQUENCY, g_rad_s=g)
@@ -73,8 +72,8 @@ def published_step(method: str, standard: Design) -> catalogue.Choice:
     return catalogue.choose("euler", method, standard.samples, previous=standard.previous)
 
 
-def drift_deg_h(drift: Array, duration: Fraction) -> float:
-    """Return the largest drift of a run about the axis of the cone, over its duration.
+def drift_deg_h(drift: Array, duration: Fraction) -> Array:
+    """Return the largest drift of a run, over its duration.
 
     Parameters
     ----------
@@ -85,11 +84,12 @@ def drift_deg_h(drift: Array, duration: Fraction) -> float:
 
     Returns
     -------
-    float
-        Its magnitude in deg/h.
+    array, (3,)
+        In deg/h about x, y and z; its length is the largest.
     """
-    axis = np.array([0, math.cos(HALF_ANGLE), math.sin(HALF_ANGLE)])
-    return math.degrees(float(np.abs(drift @ axis).max())) / float(duration) * 3600
+    largest = drift[np.linalg.norm(drift, axis=1).argmax()]
+    rates: Array = np.degrees(largest) / float(duration) * 3600
+    return rates
 
 
 def generated_drifts(standard: Design) -> dict[str, float]:
@@ -108,7 +108,8 @@ def generated_drifts(standard: Design) -> dict[str, float]:
     drifts = {}
     for form in FORMS:
         step = attitude_backend(published_step(f"coning-{form}", standard))
-        drifts[f"coning-{form}"] = drift_deg_h(simulate(step, cone(), length, duration).drift, duration)
+        rates = drift_deg_h(simulate(step, cone(), length, duration).drift, duration)
+        drifts[f"coning-{form}"] = float(np.linalg.norm(rates))
     return drifts
 
 

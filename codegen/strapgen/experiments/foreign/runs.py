@@ -7,8 +7,10 @@ than those that take it as an argument.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from strapgen.backends import evaluator
 from strapgen.backends.increments import windows
+from strapgen.simulation.runs import drift_between
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 from strapgen.toolchain.foreign import compile_foreign, run_foreign
@@ -27,11 +30,20 @@ Array = NDArray[np.float64]
 
 SCALARS = ("last", "first")
 SENSES = ("body-to-reference", "reference-to-body")
-INPUTS = ("increments", "rates")
+#: Rates are means over the sampling interval, or those at its end.
+ENDS = "rates-at-ends"
+RATE_INPUTS = (RATES, ENDS)
+INPUTS = ("increments", *RATE_INPUTS)
+#: Largest rate in rad/s that is fed while the interval is short: a gyro measures it (2000 deg/s are 34.9 rad/s).
+_MOST_RATE = 30
+#: Time between samples in s, unless another one is stated.
+INTERVAL = Fraction(1, 100)
 #: Samples that a function may remember; calls without rotation push so many out of its memory.
 REMEMBERED = 8
 #: Elements of an attitude that are larger are none; their products stay finite.
 _LARGEST = 1e30
+#: Smallest ratio of the least to the largest stretch of a state that has a direction.
+_FLAT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -63,18 +75,68 @@ class Convention:
     def matrices(self, states: Array) -> Array:
         """Return direction cosine matrices, body to reference, of states (N, elements).
 
-        Rotation vectors, which have three elements, turn the attitude one after the other.
+        A state of another length than 1 is read as the rotation nearest to it. Rotation vectors, which have three
+        elements, turn the attitude one after the other.
         """
         if states.shape[-1] == 9:
-            matrices = states.reshape(-1, 3, 3)
+            matrices = _nearest(states.reshape(-1, 3, 3))
         elif states.shape[-1] == 3:
             turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(states), 3, 3)), states)
             matrices = np.array(list(accumulate(turns, np.matmul)))
         else:
-            matrices = evaluator("dcm-from-euler")(
-                states if self.scalar == "last" else np.roll(states, -1, axis=-1)
-            )
+            matrices = evaluator("dcm-from-euler")(self.ours(states / _or_one(lengths(states))[:, None]))
         return matrices if self.sense == SENSES[0] else np.swapaxes(matrices, -1, -2)
+
+    def ours(self, states: Array) -> Array:
+        """Return states of four elements with the scalar part last."""
+        return states if self.scalar == "last" else np.roll(states, -1, axis=-1)
+
+
+def lengths(states: Array) -> Array:
+    """Return the lengths of states (N, elements), 1 for a rotation: of Euler parameters, or of the mean row.
+
+    Parameters
+    ----------
+    states : array, (N, 4), (N, 9) or (N, 3)
+        Rotation vectors, which have three elements, are of no length.
+
+    Returns
+    -------
+    array, (N,)
+    """
+    if states.shape[-1] == 3:
+        return np.ones(len(states))
+    rows = 3 if states.shape[-1] == 9 else 1
+    size: Array = np.linalg.norm(states, axis=-1) / np.sqrt(rows)
+    return size
+
+
+def departure(states: Array) -> float:
+    """Return the largest departure of C C' from the unit matrix, of the matrices C of states (N, elements).
+
+    Parameters
+    ----------
+    states : array, (N, 4), (N, 9) or (N, 3)
+
+    Returns
+    -------
+    float
+    """
+    if states.shape[-1] != 9:
+        return float(np.abs(lengths(states) ** 4 - 1).max())
+    matrices = states.reshape(-1, 3, 3)
+    return float(np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)).max())
+
+
+def _or_one(size: Array) -> Array:
+    return np.where(size > 0, size, 1.0)
+
+
+def _nearest(matrices: Array) -> Array:
+    """Return the orthogonal matrices nearest to matrices (N, 3, 3); one without a direction stays as it is."""
+    left, stretch, right = np.linalg.svd(matrices)
+    turns: Array = left @ right
+    return np.where((stretch[:, 2] > _FLAT * stretch[:, 0])[:, None, None], turns, matrices)
 
 
 @dataclass(frozen=True)
@@ -84,15 +146,12 @@ class Segment:
     Parameters
     ----------
     increments : array, (N, K, 3)
-        Of N calls, in rad.
-    width : float
-        Time between samples in s.
+        Of N calls, in rad. A function that takes rates gets them divided by the time between samples.
     settled : bool
         Whether calls without rotation come first, which empty a memory of samples.
     """
 
     increments: Array
-    width: float = 1.0
     settled: bool = True
 
 
@@ -114,6 +173,52 @@ class SegmentRun:
     matrices: Array
     relative: Array
 
+    @property
+    def start(self) -> Array:
+        """The attitude before the first call."""
+        start: Array = self.matrices[0] @ self.relative[1].T
+        return start
+
+    def unturned(self, frame: Array) -> SegmentRun:
+        """Return the run as it would be in reference axes that stand still.
+
+        Parameters
+        ----------
+        frame : array, (3,)
+            Rotation vector in rad by which a call turns the attitude without rotation of the body, reference axes.
+
+        Returns
+        -------
+        SegmentRun
+        """
+        counts = np.arange(len(self.relative))[:, None]
+        back = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(counts), 3, 3)), -counts * frame)
+        return replace(self, relative=self.start.T @ back @ self.start @ self.relative)
+
+
+def rotation_vectors(matrices: Array) -> Array:
+    """Return the rotation vectors of rotations.
+
+    Parameters
+    ----------
+    matrices : array, (..., 3, 3)
+
+    Returns
+    -------
+    array, (..., 3)
+        In rad.
+
+    Examples
+    --------
+    >>> rotation_vectors(evaluator("dcm-update")(np.eye(3), np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
+    array([0., 0., 2.])
+    """
+    sines = drift_between(np.broadcast_to(np.eye(3), matrices.shape), matrices)
+    size = np.linalg.norm(sines, axis=-1, keepdims=True)
+    cosine = (np.trace(matrices, axis1=-2, axis2=-1)[..., None] - 1) / 2
+    vectors: Array = sines * np.where(size > 0, np.arctan2(size, cosine) / _or_one(size), 1.0)
+    return vectors
+
 
 @dataclass(frozen=True)
 class ForeignStep:
@@ -124,18 +229,24 @@ class ForeignStep:
     source : ForeignSource
     convention : Convention
     takes : str
-        "increments" in rad, or "rates" in rad/s, which are the means over the time between samples.
+        "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or
+        "rates-at-ends", which are those at the end of each.
+    interval : Fraction
+        Time between samples in s.
     """
 
     source: ForeignSource
     convention: Convention = Convention()
     takes: str = "increments"
+    interval: Fraction = INTERVAL
     module: Path = field(init=False)
 
     def __post_init__(self) -> None:
         checks.choice("input", self.takes, INPUTS)
-        if self.source.arguments.named(RATES) and self.takes != "rates":
-            raise InputError(f"--input {self.takes} contradicts the argument rates; --input rates fits it")
+        if self.source.arguments.named(RATES) and self.takes == "increments":
+            raise InputError(
+                f"--input {self.takes} contradicts the argument rates; --input {RATES} or {ENDS} fits it"
+            )
         object.__setattr__(self, "module", compile_foreign(self.source))
 
     @property
@@ -147,6 +258,15 @@ class ForeignStep:
     def unit(self) -> float:
         """The step from 1 to the next number of the function's precision."""
         return float(np.finfo(np.float32 if self.source.precision == "float" else np.float64).eps)
+
+    @property
+    def most(self) -> float:
+        """The largest angle of a sample in rad that a gyro measures."""
+        return float(_MOST_RATE * self.interval)
+
+    def calls_for(self, angle: float, fewest: int) -> int:
+        """Return the number of calls that a rotation by an angle in rad takes, at rates that a gyro measures."""
+        return max(fewest, math.ceil(angle / (self.samples * self.most)))
 
     @property
     def settling(self) -> int:
@@ -194,12 +314,12 @@ class ForeignStep:
         quiet = np.zeros((self.settling if segment.settled else 0, count, 3))
         samples = np.concatenate([quiet, segment.increments]).reshape(-1, 3)
         numbers = windows(np.concatenate([np.zeros((previous, 3)), samples]), count, previous)
-        if self.takes == "rates":
-            numbers = numbers / segment.width
+        if self.takes != "increments":
+            numbers = numbers / float(self.interval)
         rows = np.empty((len(numbers), 3 + numbers[0].size))
         rows[:, 0] = np.arange(len(numbers)) == 0
-        rows[:, 1] = segment.width
-        rows[:, 2] = segment.width * count
+        rows[:, 1] = float(self.interval)
+        rows[:, 2] = float(self.interval * count)
         rows[:, 3:] = numbers.reshape(len(numbers), -1)
         return rows
 
