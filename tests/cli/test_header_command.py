@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 from strapgen.cli import header_command, main
 from strapgen.experiments import verification
+from strapgen.library.generated_files import command_of
 from strapgen.support.exceptions import InputError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -138,7 +141,7 @@ def test_error_above_the_certified_bound_fails(folder, capsys, monkeypatch):
 
 
 def read_of(folder: Path) -> header_command.HeaderCommand:
-    from strapgen.library.generated_files import command_of, text_of
+    from strapgen.library.generated_files import text_of
 
     return header_command.read(command_of(text_of(folder / f"{NAME}.h")) or "")
 
@@ -183,6 +186,54 @@ def test_whole_of_several_functions_is_verified(command, tmp_path, capsys):
     whole.unlink()
     status, out, _ = says(line, capsys)
     assert status == 1 and json.loads(out)["differences"] == [f"{whole}: is not there"]
+
+
+WHOLES = {
+    "two-speed dcm --target c-fixed --sample-hz 400 --lsb 0.0175dps": "--sample-hz 400 --lsb 0.0175dps",
+    "two-speed dcm --target c-fixed --max-rate-deg-s 300 --sample-hz 400": "--max-rate-deg-s 300 --sample-hz 400",
+    "two-speed euler --target c-fixed --lsb-rad 3e-6 --input-bits 12 --project": "--lsb-rad 3e-6 --input-bits 12",
+    "system two-speed-dcm --target c-fixed --lsb 0.0175dps": "--sample-hz 3200 --lsb 0.0175dps",
+    "system two-speed-dcm --target c-fixed --sample-hz 1600 --input-bits 16": "--sample-hz 1600",
+    "system two-speed-dcm --target c --sample-hz 1600": "--sample-hz 1600",
+}
+
+
+@pytest.mark.parametrize("command", WHOLES)
+def test_whole_states_the_gyro_and_is_generated_again(command, tmp_path, capsys):
+    assert says([*command.split(), "--out", str(tmp_path)], capsys)[0] == 0
+    status, out, _ = says(["verify", str(tmp_path), "--format", "json"], capsys)
+    data = json.loads(out)
+    assert status == 0 and data["holds"] and len(data["stages"]) == 3
+    text = re.sub(r"\n \* +", " ", Path(data["header"]).read_text())
+    assert WHOLES[command] in text and text.count("--sample-hz") == WHOLES[command].count("--sample-hz")
+    assert ("counts of the gyro in 16 bits; 1 count = " in text) == ("lsb" in command)
+    assert says([*command.split(), "--check", "--out", str(tmp_path)], capsys)[0] == 0
+    header = Path(data["header"])
+    header.write_text(header.read_text().replace("typedef", "typedef ", 1))
+    status, out, error = says([*command.split(), "--check", "--out", str(tmp_path)], capsys)
+    assert status == 1 and "-typedef " in out and "out of step" in error
+
+
+def test_two_speeds_say_what_generate_says_of_each_loop(tmp_path, capsys):
+    """Cost, gyro, range and certified bound: the same lines, from the same code, and the bounds in the header."""
+    gyro = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"
+    status, out, _ = says(f"two-speed dcm {gyro} --out {tmp_path}".split(), capsys)
+    lines = out.splitlines()
+    assert status == 0 and lines[0].startswith("dcm-two-speed-2 for c-fixed: ") and " multiply" in lines[0]
+    (fast,) = (k for k, line in enumerate(lines) if line.startswith("two-speed-fast-2 for c-fixed: "))
+    assert "increment: counts of the gyro in 16 bits; 1 count = " in lines[fast + 1]
+    assert sum(line.startswith("  next_coning: Q") and "error at most" in line for line in lines) == 1
+    # The same options for the loop by itself, in the formats that the loops share.
+    status, out, _ = says(f"two-speed dcm {gyro} --out {tmp_path} --format json".split(), capsys)
+    functions = json.loads(out)["functions"]
+    assert len(functions) == 3 and functions[0]["kernel"] == "two-speed-fast-2"
+    command = command_of((tmp_path / "two_speed_fast_2_w32.h").read_text()) or ""
+    _, out, _ = says([*shlex.split(command)[1:], "--out", str(tmp_path / "alone")], capsys)
+    contract = [line for line in out.splitlines() if "error at most" in line or "counts of" in line]
+    assert contract and {*contract} <= {*lines}
+    text = (tmp_path / "dcm_two_speed_2_w32.h").read_text()
+    worst = re.search(r"next_coning: Q\S+, error at most (\S+),", "\n".join(lines))
+    assert worst is not None and f"next_coning {worst[1]}" in text.replace("\n *     ", " ")
 
 
 def test_header_command_reads_every_value_option():

@@ -158,8 +158,8 @@ def test_what_does_not_go_with_counts_is_refused():
     settings = Settings.of(lsb="3e-6rad")
     with pytest.raises(InputError, match="takes no increments; an lsb does not go with it"):
         quantized(Choice("euler-normalize"), settings)
-    with pytest.raises(InputError, match="takes neither counts of a gyro nor a state that saturates"):
-        two_speed_sources.sources("dcm", 2, "c-fixed", settings)
+    with pytest.raises(InputError, match="takes no state that saturates"):
+        two_speed_sources.sources("dcm", 2, "c-fixed", Settings.of(lsb="3e-6rad", state="q31"))
     with pytest.raises(InputError, match="the format of increments follows from their bits"):
         quantized(EULER, Settings.of(lsb="3e-6rad", formats={"increments": "Q0.31"}))
 

@@ -119,7 +119,7 @@ class Loops(ABC):
                 return np.ascontiguousarray(values, self.dtype)
         argument, kernel = self._arguments[name]
         if summed and argument.format.word < _EXACT_BITS:
-            values = pulses(values[:, None], argument.format.unit)[:, 0]
+            values = pulses(values[:, None], argument.unit)[:, 0]
         return integers(argument, values, kernel)
 
     def in_si(self, name: str, values: Array) -> Array:
@@ -197,7 +197,7 @@ class LoopsFromPython(Loops):
 
     def _zero(self, cycles: Cycles) -> dict[str, Array]:
         """Return zeros for every input that a call receives from the one before."""
-        kind = cycles.samples["increment"].dtype
+        kind = cycles.start["state"].dtype
         return {signal.name: np.zeros((1, signal.size), kind) for signal in self.wires.memory}
 
     def _fast_cycles(self, cycles: Cycles) -> dict[str, Array]:

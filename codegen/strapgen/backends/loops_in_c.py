@@ -10,6 +10,7 @@ import numpy as np
 
 from strapgen.backends.c import real_type
 from strapgen.backends.evaluators import Array, Evaluator
+from strapgen.backends.fixed_numbers import array_type
 from strapgen.backends.loops import Cycles, Loops, LoopsFromPython, LoopSources
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
@@ -25,14 +26,9 @@ class LoopsInC(Loops):
         super().__init__(sources, evaluator)
         if sources.whole is None:
             raise InputTypeError("the loops have no C of the whole; LoopsInC.generated returns it")
-        fixed = sources.loops[0].fixed
-        if fixed is None:
-            self._type, real = real_type(sources.whole.target)
-            self.dtype = np.dtype(real)
-            self._kind = self.dtype
-        else:
-            self._kind = np.dtype(f"int{fixed.settings.word}")
-            self._type = f"{self._kind.name}_t"
+        if sources.loops[0].fixed is None:
+            self.dtype = np.dtype(real_type(sources.whole.target)[1])
+        self._target = sources.whole.target
         self._function = sources.whole.function.name
         self._module = compiler.load(sources.whole)
 
@@ -47,7 +43,7 @@ class LoopsInC(Loops):
         ffi, lib = self._module.ffi, self._module.lib
         memory = ffi.new(f"{self._function}_memory *")
         values = {
-            name: np.ascontiguousarray(array, self._kind)
+            name: np.ascontiguousarray(array, self._kind(name))
             for name, array in {**cycles.samples, **cycles.start}.items()
         }
         getattr(lib, f"{self._function}_begin")(memory, self._pointer(values["state"]))
@@ -55,8 +51,8 @@ class LoopsInC(Loops):
             getattr(memory, name)[0:3] = values[name][0].tolist()
         slow_cycles = len(values["turn"])
         navigation_cycles = slow_cycles // cycles.slow
-        attitudes = np.empty((slow_cycles, values["state"].shape[1]), self._kind)
-        changes = np.empty((navigation_cycles, 3), self._kind)
+        attitudes = np.empty((slow_cycles, values["state"].shape[1]), self._kind("state"))
+        changes = np.empty((navigation_cycles, 3), self._kind("velocity_change"))
         if navigation_cycles:
             inputs = [values[signal.name] for group in self.wires.samples for signal in group]
             status = getattr(lib, f"{self._function}_run")(
@@ -72,6 +68,13 @@ class LoopsInC(Loops):
                 raise AssertionError("the loops by themselves refuse what the whole refuses")
         return attitudes, changes
 
+    def _kind(self, name: str) -> np.dtype[Any]:
+        """Return the type of an argument's elements."""
+        held = self._arguments.get(name)
+        kind: np.dtype[Any] = self.dtype if held is None else np.dtype(f"int{held[0].format.word}")
+        return kind
+
     def _pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
-        return self._module.ffi.from_buffer(f"{self._type}[]", array)
+        kind = array_type(array.dtype) if array.dtype.kind == "i" else f"{real_type(self._target)[0]}[]"
+        return self._module.ffi.from_buffer(kind, array)

@@ -236,17 +236,20 @@ class FixedOptions:
 
     def check_increments(self, choice: Choice) -> None:
         """Refuse a largest rate or angle for a kernel that takes neither."""
+        from strapgen.fixedpoint.sensor_scale import counted
+        from strapgen.ir.fixed_settings import TURNING
         from strapgen.library import generated_sources
 
-        counted = {*self.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
-        if not counted and not {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}:
+        of_gyro = {*self.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
+        of_angle = {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}
+        if not of_gyro and not of_angle:
             return
-        names = {signal.name for signal in generated_sources.program(choice).inputs}
-        if counted and "increments" not in names:
+        program = generated_sources.program(choice)
+        if of_gyro and not counted(program):
             raise InputError(
-                f"kernel {choice.kernel} takes no increments; {min(counted)} does not go with it"
+                f"kernel {choice.kernel} takes no increments; {min(of_gyro)} does not go with it"
             )
-        if not names & {"increments", "turns"}:
+        if of_angle and not {signal.name for signal in program.inputs} & {*TURNING}:
             raise InputError(
                 f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
             )

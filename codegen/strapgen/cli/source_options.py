@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.options import option
-from strapgen.cli.output import Project, WithRuns
+from strapgen.cli.output import Project, WithRuns, print_json
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -120,6 +120,18 @@ class SourceOptions:
         from strapgen.library import generated_files
 
         return generated_files.difference(self.out or Path(), files)
+
+    def show_difference(self, files: Mapping[str, str], format: str) -> None:
+        """Print how the files in the folder differ from generated ones, and exit with 1 if they do."""
+        folder, difference = self.out or Path(), self.compare(files)
+        if format == "json":
+            print_json({"in_step": not difference, "difference": difference})
+        elif difference:
+            typer.echo(difference, nl=False)
+        if difference:
+            refuse_out_of_step(folder, "the same command without --check writes the files again")
+        if format == "text":
+            typer.echo(f"{folder}: {len(files)} files, in step")
 
 
 def refuse_out_of_step(folder: Path, again: str) -> None:

@@ -23,7 +23,6 @@ from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support.exceptions import InputError
 from strapgen.systems import two_speed_sources
-from strapgen.targets.contract import options
 from strapgen.targets.project_c.emit import MotionRun, two_speed_main
 from strapgen.targets.two_speed_c.emit import wiring
 from strapgen.targets.vectors_c.cycles import CycleTable, cycle_files
@@ -56,10 +55,7 @@ def project_files(
     whole = two_speed_sources.sources(algorithm, sculling, target, settings)
     loops = two_speed_sources.loops(algorithm, sculling, target, settings)
     system = two_speed_sources.description(algorithm, sculling).system
-    command = f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}"
-    if settings is not None:
-        command += f" {options(settings)}"
-    command += " --project"
+    command = f"{two_speed_sources.command(algorithm, sculling, target, settings)} --project"
     tests = cycle_files(_cycle_table(whole, LoopSources(loops, system), command))
     for loop in loops:
         stated = None if loop.fixed is None else loop.fixed.settings
@@ -72,7 +68,7 @@ def project_files(
     largest = project.LARGEST
     if loops[0].fixed is not None:
         (argument,) = (a for a in loops[0].fixed.inputs if a.signal.name == "increment")
-        largest = argument.high * argument.format.unit / project.PART
+        largest = argument.high * argument.unit / project.PART
     run = MotionRun(
         project.decimal(largest / _FAST_CYCLE),
         project.decimal(step, 15),

@@ -70,7 +70,7 @@ def _is_whole(header: Path) -> bool:
     if not header.is_file():
         return False
     command = command_of(text_of(header)) or ""
-    return command.startswith(_COMMANDS) and not command.endswith(" --with-runs")
+    return command.startswith(_COMMANDS) and not command.endswith((" --with-runs", " --project"))
 
 
 def verify_whole(

@@ -32,9 +32,9 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     from strapgen.fixedpoint.quantization import (
         lowered,  # numpy and the proofs are loaded when they are needed
     )
-    from strapgen.fixedpoint.sensor_scale import COUNTED, in_counts
+    from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
-    if settings.input_bits is not None and not any(signal.name in COUNTED for signal in program.inputs):
+    if settings.input_bits is not None and not counted(program):
         what = "an lsb" if settings.sensor is not None else "a number of input bits"
         raise InputError(f"{program.kernel} takes no increments; {what} does not go with it")
     counts = program if settings.sensor is None else in_counts(program, settings.sensor)

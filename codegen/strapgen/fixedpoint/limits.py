@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.sensor_scale import COUNTED
+from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.fixed_settings import TURNING, Settings
+from strapgen.ir.fixed_settings import TURNING, Settings, rounded_limit
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.program import Program
 from strapgen.ir.sensor import Sensor
@@ -92,7 +93,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
             stated.append(Limit(signal, Fraction(1), word - 1, True, word))
             continue
         largest = largest_magnitude(program, signal, settings)
-        if signal.name in COUNTED and settings.input_bits is not None:
+        if signal in counted(program) and settings.input_bits is not None:
             stated.append(_counted(signal, largest, settings, settings.input_bits))
             continue
         text = stated_format(settings, signal)
@@ -125,6 +126,27 @@ def _counted(signal: Signal, largest: Fraction, settings: Settings, bits: int) -
     # A limit of the gyro is that of its bits; one in rad is rounded up to a count.
     counts = min(math.ceil(largest / sensor.count), 1 << (bits - 1))
     return Limit(signal, counts / Fraction(2) ** sensor.fraction, sensor.fraction, True, memory, sensor)
+
+
+def ranges_of_copies(program: Program, settings: Settings, copied: Mapping[str, str]) -> dict[str, Fraction]:
+    """Return the ranges of states that are counted inputs of the call before, by name: all that those may be.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+        With the ranges of the inputs.
+    copied : mapping of str to str
+        The input by the name of the state.
+    """
+    if settings.input_bits is None:
+        return {}
+    accepted = {}
+    for signal in counted(program):
+        largest = largest_magnitude(program, signal, settings)
+        argument = _counted(signal, largest, settings, settings.input_bits).argument(0)
+        accepted[signal.name] = rounded_limit(max(-argument.low, argument.high) * argument.unit)
+    return {state: accepted[name] for state, name in copied.items() if name in accepted}
 
 
 def stated_format(settings: Settings, signal: Signal) -> str | None:

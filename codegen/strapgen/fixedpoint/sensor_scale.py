@@ -26,6 +26,7 @@ from strapgen.ir.program import (
     walk,
 )
 from strapgen.ir.sensor import Sensor
+from strapgen.ir.signals import Signal
 
 #: Changes of a weight that are tried, the smallest first: none stays where no other costs less.
 _CHANGES = sorted(range(-6, 7), key=abs)
@@ -33,9 +34,18 @@ _CHANGES = sorted(range(-6, 7), key=abs)
 _STAND_IN = Fraction(10007, 16384)
 #: Programs with more operations keep the weights of their lowest degrees.
 _MOST_OPERATIONS = 600
-#: Inputs that a gyro counts.
-COUNTED = ("increments",)
+#: Names of the inputs that a gyro counts: those of a step, and that of a loop where it is an angle increment.
+_OF_STEP, _OF_LOOP = "increments", "increment"
 _LINEAR = ("add", "subtract", "negate", "multiply")
+
+
+def counted(program: Program) -> tuple[Signal, ...]:
+    """Return the inputs of a program that a gyro may count: its samples of angle increments."""
+    return tuple(
+        signal
+        for signal in program.inputs
+        if signal.name == _OF_STEP or (signal.name == _OF_LOOP and signal.is_angle_increment)
+    )
 
 
 def in_counts(program: Program, sensor: Sensor) -> Program:
@@ -60,17 +70,17 @@ def in_counts(program: Program, sensor: Sensor) -> Program:
     >>> in_counts(one, Sensor(Fraction(3, 4), "", "")).body[0].value.arguments[0]
     Constant(value=Fraction(3, 8))
     """
-    counted = {n: 1 for signal in program.inputs if signal.name in COUNTED for n in signal.elements}
-    if not counted or sensor.scale == 1:
+    elements = {name: 1 for signal in counted(program) for name in signal.elements}
+    if not elements or sensor.scale == 1:
         return program
-    angles = _angles(program, [*counted])
+    angles = _angles(program, [*elements])
     folded = _with_assigned_results(program, angles)
     converted = _with_angles_first(program, angles)
-    candidates = [(converted, counted)]
+    candidates = [(converted, elements)]
     # Functions have series of their own, which a scale of their argument would make longer.
     operations = (n for a in program.body for n in walk(a.value) if isinstance(n, Operation))
     if all(node.kind in _LINEAR for node in operations):
-        candidates.insert(0, (folded, dict(_weights(folded, tuple(counted)))))
+        candidates.insert(0, (folded, dict(_weights(folded, tuple(elements)))))
     program, weights = min(candidates, key=lambda pair: _total_cost(*pair))
     scaling = _Scaling(sensor.scale, weights)
     body = tuple(replace(a, value=scaling.assigned(a)) for a in program.body)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.ir.angle_accumulation import AngleAccumulation
-from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
+from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
@@ -210,10 +210,7 @@ class Interface:
     def companion_settings(self) -> Settings:
         """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
         formats = {} if self.settings.state else {"state": str(self.inputs[0].format)}
-        settings = replace(self.settings, ranges={}, formats=formats)
-        if settings.input_bits is None:
-            return settings
-        return replace(settings, sensor=None, input_bits=None, largest_angle=DEFAULT_ANGLE, stated="")
+        return replace(self.settings, ranges={}, formats=formats).without_counts()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the interface as plain JSON data."""

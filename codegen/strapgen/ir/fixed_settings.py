@@ -229,8 +229,7 @@ class Settings:
             angle = whole if angle is None else min(angle, whole)
         if angle is None:
             angle = DEFAULT_ANGLE
-        largest = Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT)
-        return cls(word, largest, **rest, stated=" ".join(options), sensor=sensor)
+        return cls(word, rounded_limit(angle), **rest, stated=" ".join(options), sensor=sensor)
 
     def fitted(self, largest: float) -> Settings:
         """Return the settings with a largest angle of this magnitude, and up to an eighth more.
@@ -248,6 +247,12 @@ class Settings:
         exponent = math.frexp(largest)[1] - 4
         angle = Fraction(2) ** exponent * math.ceil(math.ldexp(largest, -exponent))
         return replace(self, largest_angle=angle, stated="")
+
+    def without_counts(self) -> Settings:
+        """Return the settings of what takes no increments from the gyro."""
+        if self.input_bits is None:
+            return self
+        return replace(self, sensor=None, input_bits=None, largest_angle=DEFAULT_ANGLE, stated="")
 
     def for_increments(self, largest: float) -> Settings:
         """Return the settings for a run whose largest increment is known; a largest angle that is stated stays."""
@@ -283,6 +288,11 @@ class Settings:
                 "sensor": data["sensor"] and Sensor.from_dict(data["sensor"]),
             }
         )
+
+
+def rounded_limit(angle: Fraction) -> Fraction:
+    """Return a largest angle rounded up as those that are stated."""
+    return Fraction(math.ceil(angle * _LIMIT_UNIT), _LIMIT_UNIT)
 
 
 def _interval(step: Any, sample_hz: Any, increments: int) -> tuple[Fraction | None, str]:

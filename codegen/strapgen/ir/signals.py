@@ -117,6 +117,11 @@ class Signal:
         return len(self.elements)
 
     @property
+    def is_angle_increment(self) -> bool:
+        """Whether it is what a gyro measures: an angle increment of the cycle in body axes."""
+        return (self.unit, self.frame, self.over) == ("rad", "b", CYCLE)
+
+    @property
     def identity(self) -> tuple[Fraction, ...] | None:
         """The elements for no rotation; None for what is no attitude with the labels of one.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from strapgen.ir.attitude_step import Companions
@@ -74,6 +75,19 @@ class Sources:
 
     def _in_words(self) -> str:
         return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"
+
+    @property
+    def cost(self) -> str:
+        """The operations of one call in words."""
+        counts = [f"{number} {kind}" for kind, number in self.operations.items() if number]
+        return f"{', '.join(counts) or 'no operations'}, {self.temporaries} temporaries"
+
+    @property
+    def largest_errors(self) -> dict[str, Fraction]:
+        """The largest error bound of a call by the name of the output; empty where none is known."""
+        if self.fixed is not None:
+            return {argument.signal.name: max(argument.errors) for argument in self.fixed.outputs}
+        return {} if self.rounding is None else dict(self.rounding.worst)
 
     @property
     def step_files(self) -> dict[str, str]:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from strapgen import targets
+from strapgen.fixedpoint.limits import ranges_of_copies
+from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings, rounded_limit
 from strapgen.ir.formats import Format
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.sources import Sources
@@ -115,6 +117,12 @@ class _Fit:
         """Generate all stages, each with the formats of those before it."""
         system = self.description.system
         self.inputs = {signal.name: signal for signal in system.inputs}
+        self.gyros = {name for name, signal in self.inputs.items() if signal.is_angle_increment}
+        if self.settings.input_bits is not None and not self.gyros:
+            what = "an lsb" if self.settings.sensor is not None else "a number of input bits"
+            raise InputError(
+                f"no input of {system.name} is an angle increment in body axes, in rad; {what} does not go with it"
+            )
         self.pushed = {
             step.cell: step for rate in system.rates for step in rate.steps if isinstance(step, Push)
         }
@@ -165,7 +173,7 @@ class _Fit:
         return _generated(self.description, stage, self.target, replace(settings, carry="none"))
 
     def _settings(self, stage: SystemStage) -> Settings:
-        """Return word, error feedback and the ranges of a stage's inputs."""
+        """Return word, error feedback, the ranges of a stage's inputs, and the gyro if it takes counts."""
         ranges: dict[str, Fraction] = {}
         angle, sources = DEFAULT_ANGLE, {wire.input: wire.source for wire in stage.wires}
         copied = self._copies(stage)
@@ -178,15 +186,43 @@ class _Fit:
                 angle = largest
             else:
                 ranges[wire.input] = largest
-        return replace(
-            self.settings,
+        settings = self.settings if self._counted(stage) else self.settings.without_counts()
+        settings = replace(
+            settings,
             word=stage.word or self.settings.word,
             carry=self._carry(stage),
             ranges=ranges,
             formats={},
-            largest_angle=angle,
+            largest_angle=angle if settings.sensor is None else rounded_limit(angle),
             stated="",
         )
+        wider = ranges_of_copies(self.description.programs[stage.name], settings, copied)
+        return replace(settings, ranges=ranges | wider)
+
+    def _counted(self, stage: SystemStage) -> set[str]:
+        """Return the inputs of a stage that are counts of the gyro.
+
+        Raises
+        ------
+        InputError
+            If a gyro's counts meet an input that takes angles.
+        """
+        if self.settings.input_bits is None:
+            return set()
+        takers = {signal.name for signal in counted(self.description.programs[stage.name])}
+        wired = {wire.input: wire.source for wire in stage.wires if self._origin(wire.source) in self.gyros}
+        for name in sorted({*wired} ^ takers if wired else ()):
+            raise InputError(
+                f"{name} takes an angle in rad, and {', '.join(sorted(self.gyros))} would be counts; no lsb goes "
+                "with it"
+            )
+        return {*wired}
+
+    def _origin(self, source: str) -> str:
+        """Return where the samples of a wire come from: the other end of a cell that collects them, or the wire's."""
+        while source in self.pushed:
+            source = self.pushed[source].source
+        return source
 
     def _copies(self, stage: SystemStage) -> dict[str, str]:
         """Return the states that are copies of inputs of the call before, with these inputs; not those with ranges."""
@@ -209,8 +245,7 @@ class _Fit:
         stated = self.description.ranges[stage.name].get(name)
         if stated is not None:
             return stated
-        while source in self.pushed:
-            source = self.pushed[source].source
+        source = self._origin(source)
         if source in self.inputs:
             known = self.inputs[source].bound
         else:
@@ -233,7 +268,10 @@ class _Fit:
         """Return the formats of what is wired to a stage, and of the cells that its outputs replace, in its word."""
         word = stage.word or self.settings.word
         wired: dict[str, str] = {}
+        counts = self._counted(stage)  # their format follows from their bits
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
+            if wire.input in counts:
+                continue
             if wire.external and self.inputs[wire.source].unit == "1" and signal.over == CYCLE:
                 wired[wire.input] = str(Format(word, 0))  # counts are whole numbers
                 continue

@@ -13,7 +13,10 @@ from functools import cache
 
 from strapgen import targets
 from strapgen.catalogue import Choice
+from strapgen.fixedpoint.limits import ranges_of_copies
+from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
+from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.library import generated_sources
 from strapgen.support import checks
@@ -151,20 +154,25 @@ def loops(
     if not TARGETS[target].fixed:
         fast, slow, navigation = (generated_sources.sources(Choice(name), target) for name in names)
         return fast, slow, navigation
-    settings = _without_largest_angle(settings or Settings())
     programs = {name: generated_sources.program(Choice(name)) for name in names}
+    settings = _in_ranges(settings or Settings(), programs[names[0]])
     inputs = {name: {signal.name for signal in program.inputs} for name, program in programs.items()}
     _require_inputs(settings, set().union(*inputs.values()))
     earlier = {state: name for program in programs.values() for state, name in copies(program).items()}
     ranges = {name: settings.ranges[other] for name, other in earlier.items() if other in settings.ranges}
-    settings = replace(settings, ranges=ranges | dict(settings.ranges))
+    wider = ranges_of_copies(programs[names[0]], settings, copies(programs[names[0]]))
+    settings = replace(settings, ranges=ranges | wider | dict(settings.ranges))
 
     def loop(name: str, formats: Mapping[str, str]) -> Sources:
-        return _fixed_loop(name, target, _of_inputs(replace(settings, formats=formats), inputs[name]))
+        chosen = settings if counted(programs[name]) else settings.without_counts()
+        return _fixed_loop(name, target, _of_inputs(replace(chosen, formats=formats), inputs[name]))
 
     formats = dict(settings.formats)
     natural = _formats(loop(names[0], formats))
+    counts = {s.name for s in counted(programs[names[0]]) if settings.input_bits is not None}
     for total, increment in summed(programs[names[0]]).items():
+        if increment in counts:
+            continue
         alike = [increment, *(state for state, name in earlier.items() if name == increment)]
         formats |= {name: natural[total] for name in alike if name not in formats}
     result = []
@@ -202,8 +210,10 @@ def _fixed_loop(kernel: str, target: str, settings: Settings) -> Sources:
 
 
 def _formats(sources: Sources) -> dict[str, str]:
+    """Return the formats of a loop's inputs; not of counts, whose format follows from their bits."""
     assert sources.fixed is not None
-    return {argument.signal.name: str(argument.format) for argument in sources.fixed.inputs}
+    word = sources.fixed.settings.word
+    return {a.signal.name: str(a.format) for a in sources.fixed.inputs if a.format.word == word}
 
 
 def sources(
@@ -232,26 +242,40 @@ def sources(
     """
     checks.choice("target", target, [name for name, entry in BUILT_IN.items() if entry.compiled])
     if BUILT_IN[target].fixed:
-        settings = _without_largest_angle(settings or Settings())
+        settings = settings or Settings()
     parts = loops(algorithm, sculling, target, settings)
-    command = f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}"
-    if settings is not None:
-        command += f" {options(settings)}"
     title = f"Two speeds: {ALGORITHMS[algorithm]}, sculling {SCULLING[sculling]}"
     system = description(algorithm, sculling).system
-    return whole(f"{algorithm}-two-speed-{sculling}", title, command, system, parts)
+    return whole(
+        f"{algorithm}-two-speed-{sculling}",
+        title,
+        command(algorithm, sculling, target, settings),
+        system,
+        parts,
+    )
 
 
-def _without_largest_angle(settings: Settings) -> Settings:
-    """Return settings without the largest angle of a step's increments, which no loop has.
+def command(algorithm: str, sculling: int, target: str, settings: Settings | None) -> str:
+    """Return the command line that generates the C of all loops; parameters are those of `loops`."""
+    stated = "" if settings is None else f" {options(settings, keep_stated=True)}"
+    return f"strapgen two-speed {algorithm} --sculling {sculling} --target {target}{stated}"
+
+
+def _in_ranges(settings: Settings, fast: Program) -> Settings:
+    """Return settings with the largest angle, if one is stated, as the range of the fast loop's increments.
 
     Raises
     ------
     InputError
-        If they state counts of a gyro or a saturating state: the loops share increments of one format.
+        If that range is stated too, or a state that saturates: the loops share one that has room above 1.
     """
-    if settings.input_bits is not None or settings.state:
-        raise InputError(
-            "an algorithm in two speeds takes neither counts of a gyro nor a state that saturates"
-        )
-    return replace(settings, largest_angle=DEFAULT_ANGLE, stated="")
+    if settings.state:
+        raise InputError("an algorithm in two speeds takes no state that saturates")
+    ranges = dict(settings.ranges)
+    for signal in counted(fast) if "--max-" in settings.stated else ():
+        if signal.name in ranges:
+            raise InputError(
+                f"the largest rate and the range of {signal.name} are both stated; one is needed"
+            )
+        ranges[signal.name] = settings.largest_angle
+    return replace(settings, ranges=ranges, largest_angle=DEFAULT_ANGLE, stated="")

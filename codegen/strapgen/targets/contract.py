@@ -59,12 +59,19 @@ def command(fixed: FixedProgram, target: str) -> str:
     return f"{generating(fixed.program)} --target {target} {stated}"
 
 
-def options(settings: Settings, inputs: Iterable[Signal] = ()) -> str:
-    """Return settings as options of the command line, with the largest angle if one of the inputs has it."""
-    words = [f"--word {settings.word}"]
-    if any(signal.name in TURNING for signal in inputs):
-        words.append(settings.stated or f"--max-angle-rad {settings.largest_angle}")
-    if settings.sensor is not None and settings.sensor.stated not in settings.stated:
+def options(settings: Settings, inputs: Iterable[Signal] = (), *, keep_stated: bool = False) -> str:
+    """Return settings as options of the command line, with the largest angle if one of the inputs has it.
+
+    With `keep_stated` the options that it follows from are among them, whatever the inputs are.
+    """
+    words, largest = [f"--word {settings.word}"], ""
+    if keep_stated and settings.stated:
+        largest = settings.stated
+        words.append(largest)
+    elif any(signal.name in TURNING for signal in inputs):
+        largest = settings.stated or f"--max-angle-rad {settings.largest_angle}"
+        words.append(largest)
+    if settings.sensor is not None and settings.sensor.stated not in largest:
         words.append(settings.sensor.stated)
     if settings.input_bits != settings.default_input_bits:
         words.append(f"--input-bits {settings.input_bits}")

@@ -13,12 +13,10 @@ from strapgen.cli.options import KernelOptions, OptionalAlgorithm, listed, optio
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
-from strapgen.ir.decimals import above, places_above
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.ir.float_interface import RoundingBounds
     from strapgen.ir.sources import Sources
     from strapgen.library.generation import Request
 
@@ -71,7 +69,7 @@ def generate(
     groups = [_files(task, sources, output) for task, sources in results]
     files = _together(groups)
     if output.check:
-        _check_files(files, output, format)
+        output.show_difference(files, format)
         return
     paths = dict(zip(files, output.write(files), strict=True))
     written = [[paths[name] for name in group] for group in groups]
@@ -149,20 +147,6 @@ def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
     return files
 
 
-def _check_files(files: dict[str, str], output: SourceOptions, format: str) -> None:
-    """Print how the files in the folder differ from generated ones; exit with 1 if they do."""
-    folder = output.out or Path()
-    difference = output.compare(files)
-    if format == "json":
-        print_json({"in_step": not difference, "difference": difference})
-    elif difference:
-        typer.echo(difference, nl=False)
-    if difference:
-        refuse_out_of_step(folder, "the same command without --check writes the files again")
-    if format == "text":
-        typer.echo(f"{folder}: {len(files)} files, in step")
-
-
 def _check_alone(
     algorithm: str | None,
     method: KernelOptions,
@@ -192,22 +176,11 @@ def _check_alone(
 
 
 def _text(task: Request, sources: Sources, written: list[Path]) -> str:
-    """Return the operations and the files, in fixed point with the format and the error of every output."""
-    counts = [f"{number} {kind}" for kind, number in sources.operations.items() if number]
-    head = f"{', '.join(counts) or 'no operations'}, {sources.temporaries} temporaries"
-    lines = [f"{sources.kernel} for {task.target}: {head}", *(f"  {path}" for path in written)]
-    lines += _call_rate(task)
-    for output in sources.fixed.outputs if sources.fixed else ():
-        bound, unit = max(output.errors), output.format.unit
-        useless = 2 * bound >= max(abs(output.low), abs(output.high)) * unit
-        lines.append(
-            f"  {output.signal.name}: {output.format}, error at most {above(bound, 4)}, "
-            f"{places_above(bound / unit)} of the last place"
-            + (": of the size of the value, which certifies nothing" if useless else "")
-        )
-    if sources.rounding is not None:
-        lines += _rounding_lines(sources.rounding)
-    return "\n".join(lines)
+    """Return the operations and the files, in fixed point with the gyro and the error of every output."""
+    from strapgen.cli import generated_text
+
+    lines = [*generated_text.head(sources, task.target, written), *_call_rate(task)]
+    return "\n".join([*lines, *(f"  {line}" for line in generated_text.contract(sources))])
 
 
 def _call_rate(task: Request) -> list[str]:
@@ -218,18 +191,6 @@ def _call_rate(task: Request) -> list[str]:
         return []
     hertz = checks.number("sample_hz", words[words.index("--sample-hz") + 1]) / count
     return [f"  a step takes {count} samples of the gyro: call it at {float(hertz):g} Hz"]
-
-
-def _rounding_lines(rounding: RoundingBounds) -> list[str]:
-    """Return the error bound of every output in floating point."""
-    if rounding.reason:
-        return [f"  no error bound is known: {rounding.reason}"]
-    return [
-        f"  {name}: error at most {above(bound, 4)}, {places_above(bound / rounding.unit)} of the last place of 1"
-        if bound
-        else f"  {name}: exact"
-        for name, bound in rounding.worst.items()
-    ]
 
 
 def _generate_all(targets: list[str] | None, output: SourceOptions, format: str) -> None:

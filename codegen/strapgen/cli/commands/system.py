@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +13,7 @@ from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Format, WithRuns, check_format, print_json
-from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
+from strapgen.cli.source_options import SourceOptions
 from strapgen.support import checks
 from strapgen.support.exceptions import InputError
 
@@ -65,7 +66,13 @@ def system(
         ),
     ] = None,
     fixed: Annotated[
-        FixedOptions, Shown(only=("word", "rounding", "carry", "drift_allowance", "multiply", "digits"))
+        FixedOptions,
+        Shown(
+            only=(
+                *("word", "lsb", "lsb_rad", "input_bits"),
+                *("rounding", "carry", "drift_allowance", "multiply", "digits"),
+            )
+        ),
     ],
     out: Annotated[
         Path | None,
@@ -104,7 +111,7 @@ def system(
     files = sources.files if with_runs else sources.step_files
     place = SourceOptions(out=out, check=output.check, force=output.force)
     if output.check:
-        _compare(place, files, format)
+        place.show_difference(files, format)
         return
     picture = {} if draw is None else {draw.name: drawing(fit)}
     written = place.write(files) if out is not None else []
@@ -163,7 +170,10 @@ def fitted_stages(
     from strapgen.targets import BUILT_IN, system_targets
 
     checks.choice("target", target, system_targets())
-    settings = fixed.settings(1)
+    rate = None if sample_hz is None else checks.number("--sample-hz", sample_hz, positive=True)
+    description = read_system(file, rate)
+    timed = None if fixed.lsb is None else str(description.system.sample_hz)
+    settings = replace(fixed, sample_hz=timed).settings(1)
     if BUILT_IN[target].fixed:
         settings = settings or Settings()
     elif settings is not None:
@@ -175,8 +185,7 @@ def fitted_stages(
         if not BUILT_IN[target].compiled:
             raise InputError(f"--cpu goes with targets in C, not with {target}")
         processors(None, [cpu])  # known before the stages are generated
-    rate = None if sample_hz is None else checks.number("--sample-hz", sample_hz, positive=True)
-    fit = fitted(read_system(file, rate), target, settings)
+    fit = fitted(description, target, settings)
     needs = budget(fit) if cpu is None else system_cost.measured_budget(fit, cpu)
     return fit, needs, _command(file, target, rate, cpu, settings)
 
@@ -188,20 +197,8 @@ def _command(
     from strapgen.targets.contract import options
 
     words = [f"strapgen system {shlex.quote(file.as_posix())} --target {target}"]
-    words += [] if rate is None else [f"--sample-hz {rate}"]
+    stated = "" if settings is None else options(settings)
+    words += [] if rate is None or "--sample-hz" in stated else [f"--sample-hz {rate}"]
     words += [] if cpu is None else [f"--cpu {cpu}"]
-    words += [] if settings is None else [options(settings)]
+    words += [stated] if stated else []
     return " ".join(words)
-
-
-def _compare(place: SourceOptions, files: dict[str, str], format: str) -> None:
-    """Print how the files in the folder differ from the generated ones, and exit with 1 if they do."""
-    difference = place.compare(files)
-    if format == "json":
-        print_json({"in_step": not difference, "difference": difference})
-    elif difference:
-        typer.echo(difference, nl=False)
-    if difference:
-        refuse_out_of_step(place.out or Path(), "the same command without --check writes the files again")
-    if format == "text":
-        typer.echo(f"{place.out}: {len(files)} files, in step")

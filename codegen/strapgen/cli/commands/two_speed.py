@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -30,16 +31,24 @@ def two_speed(
     ] = "c",
     fixed: Annotated[
         FixedOptions,
-        Shown(only=("word", "rounding", "carry", "drift_allowance", "ranges", "formats")),
+        Shown(
+            only=(
+                *("word", "max_rate_deg_s", "sample_hz", "lsb", "lsb_rad", "input_bits"),
+                *("rounding", "carry", "drift_allowance", "ranges", "formats"),
+            )
+        ),
     ],
-    output: Annotated[SourceOptions, Shown(only=("out", "with_runs", "project", "force"))],
+    output: Annotated[SourceOptions, Shown(only=("out", "with_runs", "project", "check", "force"))],
     format: Format = "text",
 ) -> None:
     """Generate the C code of an algorithm in two speeds.
 
-    You get a function for each loop, and one that runs them all.
+    You get a function for each loop, and one that runs them all. --sample-hz is the rate of the fast loop, which takes
+    one sample of the gyro.
 
     Example: strapgen two-speed dcm --target c --out firmware
+
+    Example: strapgen two-speed dcm --target c-fixed --sample-hz 400 --lsb 0.0175dps --out firmware
     """
     check_format(format)
     from strapgen.systems import two_speed_sources
@@ -52,23 +61,47 @@ def two_speed(
         from strapgen.experiments import project, two_speed_project
 
         added = two_speed_project.project_files(algorithm, form, target, settings)
-        project.refuse_changed(output.out or Path(), added, output.force)
+        if not output.check:
+            project.refuse_changed(output.out or Path(), added, output.force)
         files = files | added
-    written = output.write(files)
-    if format == "json":
-        print_json(
-            {
-                "kernel": sources.kernel,
-                "target": target,
-                "loops": list(two_speed_sources.kernels(algorithm, form)),
-                "files": [str(path) for path in written],
-                "operations": sources.operations,
-            }
-        )
+    if output.check:
+        output.show_difference(files, format)
         return
-    typer.echo(f"{sources.kernel} for {target}")
-    for path in written:
-        typer.echo(f"  {path}")
+    written = output.write(files)
+    loops = two_speed_sources.loops(algorithm, form, target, settings)
+    if format == "json":
+        print_json(_data(sources, loops, written))
+        return
+    from strapgen.cli import generated_text
+
+    lines = generated_text.head(sources, target, written)
+    for loop in loops:
+        lines += [
+            *generated_text.head(loop, target),
+            *(f"  {line}" for line in generated_text.contract(loop)),
+        ]
+    typer.echo("\n".join(lines))
+
+
+def _data(sources: Sources, loops: Sequence[Sources], written: Sequence[Path]) -> dict[str, Any]:
+    """Return what was generated as plain JSON data, with what `generate` says of each loop."""
+    from strapgen.catalogue import Choice
+    from strapgen.library.generation import generated_data
+
+    places = {path.name: str(path) for path in written}
+    return {
+        "kernel": sources.kernel,
+        "target": sources.target,
+        "loops": [loop.kernel for loop in loops],
+        "files": [*places.values()],
+        "operations": sources.operations,
+        "functions": [
+            generated_data(
+                Choice(loop.kernel), loop, sources.target, [places[name] for name in loop.step_files]
+            )
+            for loop in loops
+        ],
+    }
 
 
 def generated(algorithm: str, sculling: str, target: str, fixed: FixedOptions) -> Sources:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.ir.decimals import above, float_above
+from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.signals import Signal
 from strapgen.reports.report import Report
 from strapgen.reports.table import ERROR, Column, TextTable
@@ -138,9 +139,14 @@ def _about(fit: Fitted, name: str, signal: Signal) -> dict[str, Any]:
         "unit": signal.unit,
         "frame": signal.frame,
         "shape": list(signal.shape),
-        "format": None if argument is None else str(argument.format),
+        "format": None if argument is None else _format(argument),
         "range": None if largest is None else float_above(Fraction(largest)),
     }
+
+
+def _format(argument: Argument) -> str:
+    """Return the format of a value, or the bits of the counts that it is."""
+    return str(argument.format) if argument.sensor is None else f"{argument.format.word}-bit counts"
 
 
 def _budget(needs: Budget) -> dict[str, Any]:

@@ -132,11 +132,11 @@ def two_speed_main(
     whole: Sources, loops: Sequence[Sources], wires: Wiring, command: str, run: MotionRun
 ) -> str:
     """Return a main program that runs an algorithm in two speeds on coning and prints the attitude and its error."""
-    fast, slow, _ = loops
+    fast, slow, navigation = loops
     state = slow.function.inputs[0]
     identity = [Fraction(place % 4 == 0 if state.size == 9 else place == 3) for place in range(state.size)]
     increment, *others = sum(wires.samples, ())
-    formats = {a.signal.name: a.format.fraction for loop in (fast, slow) for a in _inputs(loop)}
+    formats = {a.signal.name: a for loop in (fast, slow) for a in _inputs(loop)}
     values = {
         "name": whole.function.name,
         "fast": run.fast,
@@ -145,8 +145,10 @@ def two_speed_main(
         "zeros": others,
         "change": wires.results[2][0],
         "calls": loop_calls(whole.function.name, wires),
-        "fraction": formats.get(increment.name, 0),
-        "state_fraction": formats.get(state.name, 0),
+        "formats": formats,
+        "types": types_of(fast) | types_of(slow) | types_of(navigation),
+        "unit": repr(float(formats[increment.name].unit)) if formats else "",
+        "state_fraction": formats[state.name].format.fraction if formats else 0,
     }
     return render("project_c/main_two_speed.c.j2", **_values(slow, command, run, identity) | values)
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from strapgen.ir.decimals import above
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
@@ -14,6 +15,7 @@ from strapgen.support.version import VERSION
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.c_fixed.words import WORDS
 from strapgen.targets.rendering import render_c, runs_of
+from strapgen.targets.vectors_c.emit import types_of
 
 #: Names of the loops, from the fastest.
 LOOPS = ("fast", "slow", "navigation")
@@ -111,6 +113,7 @@ def whole(name: str, title: str, command: str, system: DescribedSystem, loops: S
     state = wires.memory_named(slow.function.inputs[0].name)
     identifier = name.replace("-", "_") + numbers.suffix
     outputs = (state, *wires.results[2])
+    types = {name: kind for loop in loops for name, kind in types_of(loop).items()}
     values = {
         "title": title,
         "command": command,
@@ -118,8 +121,9 @@ def whole(name: str, title: str, command: str, system: DescribedSystem, loops: S
         "guard": f"{identifier}_h".upper(),
         "headers": [next(file for file in loop.files if file.endswith(".h")) for loop in loops],
         "loops": LOOPS,
+        "costs": [_cost(which, loop) for which, loop in zip(LOOPS, loops, strict=True)],
         "normalization": _NORMALIZATION[state.size],
-        "type": numbers.type,
+        "types": types,
         "residual_type": numbers.feedback_type,
         "word": numbers.word,
         "memory": wires.memory,
@@ -127,8 +131,8 @@ def whole(name: str, title: str, command: str, system: DescribedSystem, loops: S
         "samples": wires.samples,
         "results": wires.results[2],
         **_contracts(loops),
-        **_cycles(loops, wires, numbers.type, identifier),
-        **_run(wires, numbers.type, outputs),
+        **_cycles(loops, wires, types, identifier),
+        **_run(wires, types, outputs),
     }
     files = render_c("two_speed_c", identifier, **values)
     for loop in loops:
@@ -139,11 +143,17 @@ def whole(name: str, title: str, command: str, system: DescribedSystem, loops: S
     return Sources(name, fast.target, files, function, counts, temporaries, None, runs=runs_of(identifier))
 
 
+def _cost(which: str, loop: Sources) -> str:
+    """Return the operations of a loop and what a call of it may be off, in words."""
+    errors = ", ".join(f"{name} {above(error, 4)}" for name, error in loop.largest_errors.items())
+    bound = f"error of a call at most: {errors}" if errors else "no error bound is known"
+    return f"_{which}: {loop.cost}; {bound}"
+
+
 class _Numbers(NamedTuple):
-    """The numbers of the loops in C: ending of names, types of a number and of error feedback, bits of a word."""
+    """The numbers of the loops in C: ending of names, type of error feedback, bits of a word."""
 
     suffix: str
-    type: str
     feedback_type: str = ""
     word: int = 0
 
@@ -152,9 +162,9 @@ def _numbers(loop: Sources) -> _Numbers:
     """Return the numbers of a loop; a word of 0 bits stands for floating point."""
     if loop.fixed is None:
         real = real_of(loop.target)
-        return _Numbers(real.infix, real.name)
+        return _Numbers(real.infix)
     word = WORDS[loop.fixed.settings.word]
-    return _Numbers(f"_w{word.bits}", word.type, word.residual, word.bits)
+    return _Numbers(f"_w{word.bits}", word.residual, word.bits)
 
 
 def _contracts(loops: Sequence[Sources]) -> dict[str, object]:
@@ -167,12 +177,15 @@ def _contracts(loops: Sequence[Sources]) -> dict[str, object]:
     return {"arguments": arguments, "residuals": feedback}
 
 
-def _cycles(loops: Sequence[Sources], wires: Wiring, type_: str, identifier: str) -> dict[str, object]:
+def _cycles(
+    loops: Sequence[Sources], wires: Wiring, types: Mapping[str, str], identifier: str
+) -> dict[str, object]:
     """Return the text of the function of one cycle, for each loop by name."""
     names, parameters = {}, {}
     for which, samples, results in zip(LOOPS, wires.samples, wires.results, strict=True):
         names[which] = ["memory", *(signal.name for signal in (*samples, *results))]
-        pointers = [f"const {type_} *{s.name}" for s in samples] + [f"{type_} *{s.name}" for s in results]
+        pointers = [f"const {types[s.name]} *{s.name}" for s in samples]
+        pointers += [f"{types[s.name]} *{s.name}" for s in results]
         parameters[which] = ", ".join([f"{identifier}_memory *memory", *pointers])
     return {
         "parameters": parameters,
@@ -186,10 +199,11 @@ def _cycles(loops: Sequence[Sources], wires: Wiring, type_: str, identifier: str
     }
 
 
-def _run(wires: Wiring, type_: str, outputs: Sequence[Signal]) -> dict[str, object]:
+def _run(wires: Wiring, types: Mapping[str, str], outputs: Sequence[Signal]) -> dict[str, object]:
     """Return the text of the function that runs whole navigation cycles: its arrays, and the pointers to check."""
     samples = sum(wires.samples, ())
-    arrays = [f", const {type_} *{s.name}" for s in samples] + [f", {type_} *{s.name}" for s in outputs]
+    arrays = [f", const {types[s.name]} *{s.name}" for s in samples]
+    arrays += [f", {types[s.name]} *{s.name}" for s in outputs]
     return {"arrays": "".join(arrays), "pointers": ["memory", *(s.name for s in (*samples, *outputs))]}
 
 

@@ -10,7 +10,7 @@ from strapgen.ir.sources import Sources
 from strapgen.targets.lines import fill_arguments
 from strapgen.targets.rendering import render
 from strapgen.targets.two_speed_c.emit import LOOPS, Wiring
-from strapgen.targets.vectors_c.emit import NumberText, file_names, numbers_of
+from strapgen.targets.vectors_c.emit import NumberText, file_names, numbers_of, types_of
 
 Rows = Sequence[Sequence[Any]]
 
@@ -78,6 +78,7 @@ def cycle_files(table: CycleTable) -> dict[str, str]:
         "macro": name.upper(),
         "command": table.command,
         "numbers": numbers,
+        "types": {name: kind for loop in table.loops for name, kind in types_of(loop).items()},
         "table": table,
         "state": state,
         "change": change,

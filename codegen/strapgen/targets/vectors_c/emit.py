@@ -12,7 +12,7 @@ from typing import Any
 
 from strapgen.ir.sources import Sources
 from strapgen.targets.c.emit import CPrinter, real_of
-from strapgen.targets.c_fixed.words import WORDS
+from strapgen.targets.c_fixed.words import WORDS, memory_type
 from strapgen.targets.lines import fill_arguments
 from strapgen.targets.rendering import render
 
@@ -101,7 +101,7 @@ def types_of(sources: Sources) -> dict[str, str]:
     types = {signal.name: numbers_of(sources).type for signal in signals}
     if sources.fixed is not None:
         arguments = (*sources.fixed.inputs, *sources.fixed.outputs)
-        types |= {argument.signal.name: WORDS[argument.format.word].type for argument in arguments}
+        types |= {argument.signal.name: memory_type(argument) for argument in arguments}
     return types
 
 
