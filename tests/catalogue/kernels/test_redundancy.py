@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
 from itertools import combinations
 
@@ -11,9 +12,12 @@ import sympy as sp
 from gathering import each
 
 import strapgen
+from strapgen.backends.fixed import ModelEvaluator
+from strapgen.catalogue.kernels.redundancy.equations import SensorSet
 from strapgen.catalogue.kernels.redundancy.geometry import HEXAD, SensorGeometry, geometry
 from strapgen.catalogue.kernels.redundancy.geometry_file import kernels, read
 from strapgen.catalogue.redundancy_names import HEXAD_TRIADS, REDUNDANCY
+from strapgen.reports.instruments.geometry import geometry_report
 from strapgen.support.exceptions import InputError
 
 #: The parity vectors of the six sensors, by the sensors of each.
@@ -177,7 +181,15 @@ def test_bad_geometries_are_refused_in_one_line_with_the_reason(tmp_path):
         ("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0]]", "all axes lie in one plane"),
         ("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1]]", "axis 3 is in no parity equation"),
         (f"axes = [{good}, [0, 0, 0]]", "axis 3 is zero"),
-        (f'axes = [{good}, [1, 2, "x"]]', "a component of axis 3 is 'x'; a finite number is needed"),
+        (f'axes = [{good}, [1, 2, "x"]]', "a component of axis 3 is 'x': numbers, + - * /"),
+        (f"axes = [{good}, [1e308, 0, 0]]", "a component of axis 3 is '1e308': an exponent is at most 100"),
+        (f"axes = [{good}, [1{'0' * 400}, 0, 0]]", "axis 3 has a component beyond 1000"),
+        (f"axes = [{good}, [0, 0, nan]]", "a component of axis 3 is 'nan'"),
+        (f'axes = [{good}, ["sqrt(6)-sqrt(2)*sqrt(3)", 0, 0.0]]', "axis 3 is zero"),
+        (
+            f'axes = [{good}, ["sqrt(2)", "sqrt(3)", 0], ["sqrt(5)", "sqrt(7)", 0]]',
+            "over three different square roots",
+        ),
         (f"axes = [{good}, [1, 2]]", "axis 3 is [1, 2]; three numbers are needed"),
         ("axes = 3", "axes is no list"),
         ("", "has no axes"),
@@ -191,6 +203,72 @@ def test_bad_geometries_are_refused_in_one_line_with_the_reason(tmp_path):
         with pytest.raises(InputError) as error:
             read(file)
         assert reason in str(error.value) and "\n" not in str(error.value), text
+
+
+#: Sensors on a cone, as its drawing has them, and the same with rows that are no unit vectors.
+CONE = """
+axes = [
+    [1, 0, 0], ["-1/2", "sqrt(3)/2", 0], ["-0.5", "-sqrt(3)/2", 0], [0, 0, 1],
+    [0.5, 0, "sqrt(3)/2"], ["1/4", "sqrt(3)/4", "sqrt(3)/2"],
+]
+"""
+
+
+def test_axes_with_roots_and_decimals_are_exact(tmp_path):
+    """Equations and matrices are those of exact arithmetic with SymPy's own numbers."""
+    file = tmp_path / "cone.toml"
+    file.write_text(CONE)
+    cone = read(file).geometry
+    assert cone.axes[4] == (Fraction(1, 2), 0, sp.sqrt(3) / 2) and cone.lengths == (1,) * 6
+    assert cone.equations[:2] == ((1, 1, 1, 0, 0, 0), (-1, 0, 0, -sp.sqrt(3), 2, 0))
+    rows = sp.Matrix([[sp.sympify(x) for x in row] for row in cone.axes])
+    for equation in cone.equations:
+        assert (sp.Matrix([equation]) * rows).applyfunc(sp.expand) == sp.zeros(1, 3)
+    for triad in cone.triads:
+        inverse = sp.Matrix([[sp.sympify(x) for x in row] for row in triad.inverse])
+        assert (inverse * rows[list(triad.sensors), :]).applyfunc(sp.expand) == sp.eye(3)
+        gains = [sp.expand((inverse[k, :] * inverse[k, :].T)[0]) for k in range(3)]
+        assert [sp.sympify(x) for x in triad.squared_gains] == gains
+    gains = [float(triad.squared_gain) for triad in cone.triads]
+    assert gains == sorted(gains) and len(gains) == 16
+    least = sp.Matrix([[sp.sympify(x) for x in row] for row in cone.least_squares])
+    assert (least * rows).applyfunc(sp.expand) == sp.eye(3)
+    assert len(cone.parity_basis) == 3 and np.linalg.matrix_rank(np.array(cone.parity_basis, float)) == 3
+    assert cone.fail_operate == by_ranks(cone) == 1
+
+
+def test_code_of_axes_with_roots_is_inside_its_bound(tmp_path, rng):
+    file = tmp_path / "cone.toml"
+    file.write_text(CONE)
+    parity = strapgen.lower(next(kernels(read(file))))
+    fixed = strapgen.quantize(parity, strapgen.Settings(word=32))
+    model = ModelEvaluator(strapgen.generate(fixed, "fixed-model"))
+    (measured,), (result,) = fixed.interface.inputs, fixed.interface.outputs
+    words = rng.integers(measured.low, measured.high, (20, 6), endpoint=True)
+    (computed,), _ = model.run([words], model.fresh(20))
+    equations, worst = sp.Matrix(read(file).geometry.equations), 0.0
+    for row, outcome in zip(words, computed, strict=True):
+        exact = equations * sp.Matrix([int(word) for word in row]) * sp.sympify(measured.unit)
+        off = [abs(int(w) * sp.sympify(result.unit) - x) for w, x in zip(outcome, exact, strict=True)]
+        assert all(sp.N(x - sp.sympify(e), 30) <= 0 for x, e in zip(off, result.errors, strict=True))
+        worst = max(worst, *(float(x) for x in off))
+    assert worst > float(max(result.errors)) / 4
+
+
+def test_axis_is_divided_by_its_length_where_that_is_in_the_field():
+    one = geometry([[1, 0, 0], [0, 2, 0], [0, 0, "0.5"], [1, 2, 2], ["sqrt(2)", "sqrt(2)", 0], [1, 1, 1]])
+    third = Fraction(1, 3)
+    assert one.axes[1:4] == ((0, 1, 0), (0, 0, 1), (third, 2 * third, 2 * third))
+    assert one.axes[4] == (sp.sqrt(2) / 2, sp.sqrt(2) / 2, 0)
+    # The root of 3 is not among these numbers.
+    assert one.axes[5] == (1, 1, 1) and one.lengths == (1, 1, 1, 1, 1, sp.sqrt(3))
+    sensors = SensorSet("six", one)
+    assert float(sensors.parity.bound) >= max(np.abs(np.array(one.equations, float)).sum(axis=1)) / 8
+    said = geometry_report(sensors, []).written("text")
+    assert said.count("stands as it is") == 1
+    assert "axis 5 stands as it is: its length sqrt(3) is not in the field of the axes" in said
+    data = json.loads(geometry_report(sensors, []).written("json"))
+    assert data["lengths"][5] == "sqrt(3)" and data["axes"][4][0] == "sqrt(2)/2"
 
 
 def test_the_kernels_of_a_file_are_those_of_its_sensors(tmp_path):

@@ -130,7 +130,7 @@ def _value(node: ast.expr, source: str) -> Number:
         case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
             return _operation(node.op, _value(node.left, source), _value(node.right, source))
         case ast.Call(func=ast.Name(id="sqrt"), args=[argument], keywords=[]):
-            return _root(_settled(_value(argument, source)))
+            return root(_settled(_value(argument, source)))
     raise _NotAllowedError("numbers, + - * /, parentheses, whole powers with ** and sqrt are allowed")
 
 
@@ -188,14 +188,14 @@ def _inverse(value: Number) -> Number:
     return _settled(domain.to_sympy(domain.one / element))
 
 
-def _root(square: Number) -> Number:
-    """Return the square root of a number in the form that `_settled` returns."""
+def root(square: Number) -> Number:
+    """Return the square root of a number that `number` returns."""
     if (square if isinstance(square, Fraction) else square.evalf(50)) < 0:
         raise _NotAllowedError("it holds the root of a negative number")
     if isinstance(square, Fraction):
-        root = Fraction(math.isqrt(square.numerator), math.isqrt(square.denominator))
-        if root * root == square:
-            return root
+        whole = Fraction(math.isqrt(square.numerator), math.isqrt(square.denominator))
+        if whole * whole == square:
+            return whole
     import sympy as sp
 
     # Without denesting, sqrt(3 + 2 sqrt(2)) and 1 + sqrt(2) would be two different nodes.

@@ -49,9 +49,9 @@ def redundancy(
 ) -> None:
     """Derive what redundant sensors tell of their failures.
 
-    Components of an axis are exact: whole numbers, decimals, or texts such as "2/3". You see the parity equations in
-    integers, the noise of every triad, and how many failures are isolated. With --out you get the code of all: parity,
-    selection, triads, and the tables as CSV.
+    Components of an axis are exact: whole numbers, decimals, or texts such as "2/3" and "sqrt(3)/2". You see the
+    parity equations, the noise of every triad, and how many failures are isolated. With --out you get the code of all:
+    parity, selection, triads, and the tables as CSV.
 
     Example: strapgen redundancy examples/hexad.toml --target c-fixed --out out/hexad
     """

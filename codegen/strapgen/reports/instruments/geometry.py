@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from strapgen.catalogue.kernels.redundancy.equations import SensorSet, equation_label, gain_text
+from strapgen.catalogue.methods.coefficients import Number
 from strapgen.design.failure_tables import FailureTable
 from strapgen.reports.report import Report
 from strapgen.reports.table import Column, TextTable
@@ -49,10 +50,14 @@ def _lines(sensors: SensorSet, tables: Sequence[FailureTable]) -> Iterator[str]:
     yield f"{sensors.name}: {geometry.count} sensors, {sensors.sensor}"
     for number, axis in enumerate(geometry.axes):
         yield f"  {number}  {', '.join(map(str, axis))}"
+    for number, length in enumerate(geometry.lengths):
+        if length != 1:
+            yield f"axis {number} stands as it is: its length {_short(length)} is not in the field of the axes"
     yield ""
     yield f"{len(geometry.equations)} parity equations"
     for equation in geometry.equations:
-        yield f"  {equation_label(equation):4}  {' '.join(f'{value:3}' for value in equation)}"
+        numbers = [f"{value:3}" if isinstance(value, int) else f" {value}" for value in equation]
+        yield f"  {equation_label(equation):4}  {' '.join(numbers)}"
     yield ""
     yield TextTable(_TRIADS, _triad_rows(sensors)).as_text()
     yield ""
@@ -61,6 +66,12 @@ def _lines(sensors: SensorSet, tables: Sequence[FailureTable]) -> Iterator[str]:
     yield _failures(sensors)
     statuses = sum(len(table.verdicts) for table in tables)
     yield f"tables: {len(tables)} states of the sensors, {statuses} statuses of the equations"
+
+
+def _short(length: Number) -> str:
+    """Return a length exactly if that is short, else with nine digits."""
+    text = str(length)
+    return text if len(text) <= 24 else f"{float(length):.9g}"
 
 
 def _triad_rows(sensors: SensorSet) -> list[list[Any]]:
@@ -96,7 +107,8 @@ def _data(sensors: SensorSet, tables: Sequence[FailureTable]) -> dict[str, Any]:
         "sensor": sensors.sensor,
         "range": str(sensors.range),
         "axes": [list(map(str, axis)) for axis in geometry.axes],
-        "equations": [list(equation) for equation in geometry.equations],
+        "lengths": list(map(str, geometry.lengths)),
+        "equations": [[x if isinstance(x, int) else str(x) for x in row] for row in geometry.equations],
         "triads": [
             {
                 "sensors": list(triad.sensors),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import sympy as sp
 
 from strapgen.catalogue.kernels.redundancy.geometry import HEXAD, SensorGeometry, Triad
+from strapgen.catalogue.methods.coefficients import Number, root
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import CYCLE, Signal, after
 from strapgen.support import checks
@@ -76,7 +78,7 @@ class SensorSet:
     @property
     def parity(self) -> Signal:
         """The signal of the results of all parity equations."""
-        largest = max(sum(map(abs, equation)) for equation in self.geometry.equations)
+        largest = max(_whole_above(sum(map(abs, equation))) for equation in self.geometry.equations)
         return Signal.labelled(
             "parity",
             "p",
@@ -210,7 +212,7 @@ def triad_name(one: Triad, sensors: SensorSet) -> str:
 
 def gain_text(one: Triad) -> str:
     """Return the noise gains of a triad, exactly."""
-    return ", ".join(str(sp.sqrt(sp.Rational(gain))) for gain in one.squared_gains)
+    return ", ".join(str(root(gain)) for gain in one.squared_gains)
 
 
 def all_sensors(sensors: SensorSet = HEXAD_SET) -> Kernel:
@@ -232,5 +234,10 @@ def all_sensors(sensors: SensorSet = HEXAD_SET) -> Kernel:
     )
 
 
-def _matrix(rows: tuple[tuple[Fraction, ...], ...]) -> sp.Matrix:
-    return sp.Matrix([[sp.Rational(value.numerator, value.denominator) for value in row] for row in rows])
+def _matrix(rows: tuple[tuple[Number, ...], ...]) -> sp.Matrix:
+    return sp.Matrix([[sp.sympify(value) for value in row] for row in rows])
+
+
+def _whole_above(number: Any) -> int:
+    """Return the smallest integer that is not below a number."""
+    return int(sp.ceiling(number))

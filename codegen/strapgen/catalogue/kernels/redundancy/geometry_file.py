@@ -29,8 +29,8 @@ def read(path: str | Path) -> SensorSet:
     Parameters
     ----------
     path : path
-        A TOML file with ``axes``, rows of three exact numbers each, and if need be ``name``, ``sensor``, "gyro" or
-        "accelerometer", and ``range``, the largest increment of a cycle in rad or m/s.
+        A TOML file with ``axes``, rows of three numbers each as `geometry` reads them, and if need be ``name``,
+        ``sensor``, "gyro" or "accelerometer", and ``range``, the largest increment of a cycle in rad or m/s.
 
     Raises
     ------
