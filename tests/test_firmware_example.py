@@ -199,7 +199,55 @@ def test_nothing_is_installed_by_a_name_that_no_index_has():
     ],
 )
 def test_compared_run_has_the_step_of_the_options(options, step):
+    assert f"--step {step} --duration" in make("attitude-compare", f"ATTITUDE_OPTIONS='{options}'")
+
+
+def make(target: str, variables: str) -> str:
+    """Return the commands of a target of the Makefile, with single spaces."""
     needed("make")
-    command = f"make -n -f {EXAMPLE / 'strapgen.mk'} attitude-compare ATTITUDE_OPTIONS='{options}'"
+    command = f"make -n -f {EXAMPLE / 'strapgen.mk'} {target} {variables}"
     said = subprocess.run(shlex.split(command), capture_output=True, text=True, check=True).stdout
-    assert f"--step {step} --duration" in said
+    return " ".join(said.replace("\\\n", " ").split())
+
+
+GYRO = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "options", "compared"),
+    [
+        ("two-speed", "dcm", GYRO, "two-speed-dcm --source firmware"),
+        ("two-speed", "dcm", f"{GYRO} --sculling 1", "two-speed-dcm-1 --source firmware"),
+        ("system", "a.toml", GYRO, "a.toml --source firmware"),
+    ],
+)
+def test_gate_takes_two_speeds_and_systems(command, name, options, compared):
+    variables = f"ATTITUDE_COMMAND={command} ATTITUDE={name} ATTITUDE_OPTIONS='{options}'"
+    said = make("attitude-compare", variables)
+    assert f"strapgen compare {compared} --reference exact --motion" in said
+    assert "--step 1/400 --duration" in said and "--fail-above" not in said
+    project = "" if command == "system" else "--project "
+    assert (
+        make("attitude-generate", variables) == f"strapgen {command} {name} {options} {project}--out firmware"
+    )
+    assert make("attitude-check", variables) == f"strapgen {command} {name} {options} --check --out firmware"
+    alone = f"ATTITUDE_COMMAND={command} ATTITUDE={name} ATTITUDE_OPTIONS='--target c-fixed'"
+    assert "--step" not in make("attitude-compare", alone), "the rate of the system's file"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("command", "name"), [("two-speed", "dcm"), ("system", "two-speed-dcm")])
+def test_gate_of_counts_passes_and_stops_an_edited_loop(command, name, tmp_path):
+    needed("make", "cmake")
+    environment = without_the_checkout(tmp_path)
+    shutil.copy(EXAMPLE / "strapgen.mk", tmp_path)
+    line = f"make -f strapgen.mk ATTITUDE_COMMAND={command} ATTITUDE={name} ATTITUDE_OPTIONS='{GYRO}'"
+    targets = ["generate", "check", "verify", "compare", *(["vectors"] if command == "two-speed" else [])]
+    for target in targets:
+        done = run(f"{line} attitude-{target}", tmp_path, environment)
+        assert done.returncode == 0, done.stdout
+    (source,) = (path for path in (tmp_path / "firmware").glob("*slow*_w32.c") if path.name[:5] != "test_")
+    source.write_text(source.read_text().replace("return 1;", "return 3;"))
+    for target in ("check", "verify", "compare"):
+        done = run(f"{line} attitude-{target}", tmp_path, environment)
+        assert done.returncode != 0 and "return 3;" in done.stdout

@@ -110,7 +110,7 @@ def test_what_does_not_go_with_a_system_is_refused_in_one_line(file, log, tmp_pa
         (f"simulate {file} --increments-csv {log} --specific-force 0,0,1", "--specific-force goes with"),
         (f"simulate euler {CONING} --step 0.1 --duration 1 --specific-force 0,0,1", "--specific-force goes"),
         (f"compare {run} --fail-above 1", "--fail-above does not go"),
-        (f"compare {run} --source x.c", "--source does not go"),
+        (f"compare {run} --source x.c", "x.c"),
         (f"compare {run} --plot {tmp_path}/x.png", "--plot does not go"),
         (f"compare {run} --increments 3", "--increments does not go"),
         (f"strapdown {file} --increments-csv {log} --fast-cycles 4", "--fast-cycles does not go"),

@@ -97,6 +97,13 @@ class TwoSpeed:
         chosen = fitted(backend, settings)
         self._load(backend, loops_class(target).generated(algorithm, sculling, target, chosen))
 
+    @classmethod
+    def of_sources(cls, name: str, sources: LoopSources) -> TwoSpeed:
+        """Return loops and the C of the whole, if there is any, as an algorithm under a name."""
+        runner = cls.__new__(cls)
+        runner._load(name, sources)
+        return runner
+
     def _load(self, name: str, sources: LoopSources) -> None:
         """Load the code of the loops."""
         target = sources.loops[0].target

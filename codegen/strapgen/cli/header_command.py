@@ -21,6 +21,7 @@ from strapgen.support.suggestions import alternatives
 if TYPE_CHECKING:
     from strapgen.ir.sources import Sources
     from strapgen.library.generation import Request
+    from strapgen.systems.fitting import Fitted
 
 Group = TypeVar("Group")
 
@@ -84,7 +85,9 @@ class HeaderCommand:
         """Return the files of a command that generates several functions; see `request`."""
         values, fixed = self.values, self._group(FixedOptions)
         if self.name == "two-speed":
-            return two_speed.generated(values["algorithm"], values["sculling"], values["target"], fixed)
+            from strapgen.systems import two_speed_sources
+
+            return two_speed_sources.sources(*self.two_speed())
         if self.name == "window generate":
             return window_generate.generated(
                 values["window"],
@@ -94,15 +97,27 @@ class HeaderCommand:
                 fixed,
                 values["name"],
             )
+        return self.system(algorithms)[1]
+
+    def system(self, algorithms: Iterable[str] = ()) -> tuple[Fitted, Sources]:
+        """Return the generated stages of a described system, and its files; see `request`."""
         from strapgen.systems import built_in, system_file
         from strapgen.systems.bounds import bounds
 
+        values = self.values
         for stage in system_file.read(built_in.file_of(values["file"])).stages:
             _require_named(stage.kernel, algorithms)
         fit, needs, command = system.fitted_stages(
-            values["file"], values["target"], values["sample_hz"], values["cpu"], fixed
+            values["file"], values["target"], values["sample_hz"], values["cpu"], self._group(FixedOptions)
         )
-        return system.unit(fit, needs, bounds(fit), command)
+        return fit, system.unit(fit, needs, bounds(fit), command)
+
+    def two_speed(self) -> two_speed.TwoSpeedRequest:
+        """Return what a command of two speeds generates: algorithm, form of sculling, target and settings."""
+        values = self.values
+        return two_speed.request(
+            values["algorithm"], values["sculling"], values["target"], self._group(FixedOptions)
+        )
 
     def _group(self, kind: type[Group]) -> Group:
         """Return a group of options with the values that are stated."""

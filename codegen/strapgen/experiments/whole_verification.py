@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from strapgen.experiments.verification import Verification, differing_lines, present_runs, verify
@@ -98,26 +98,62 @@ def verify_whole(
     CompilerError
         If a stage in step does not compile.
     """
-    folder, lines = header.parent, []
-    generated = sources.step_files
-    if header.name not in generated:
-        first = next(name for name in generated if name.endswith(".h"))
-        lines.append(f"{header}: other options: the command in it generates {first}")
-    here = {name: text_of(folder / name) for name in generated if (folder / name).is_file()}
-    here |= {name: text for name, text in present_runs(folder, sources).items() if text}
+    folder, generated = header.parent, sources.step_files
+    here = _present(header, sources)
     expected = [*generated, *(present_runs(folder, sources))]
-    for name in expected:
-        text = sources.files[name]
-        if name in here:
-            lines += differing_lines(folder / name, here[name], text, _reason(here[name], text))
-        else:
-            lines.append(f"{folder / name}: is not there")
     checked = tuple(
         verify(folder / name, request, run_differing=run_differing)
         for name, request in stages.items()
         if all((folder / name).with_suffix(ending).is_file() for ending in (".h", ".c"))
     )
-    return WholeVerification(header, len(expected), tuple(lines), checked)
+    return WholeVerification(
+        header, len(expected), tuple(_differences(header, sources, here, expected)), checked
+    )
+
+
+def sources_of_files(header: Path, sources: Sources, *, run_differing: bool = False) -> Sources:
+    """Return the sources of a whole with the text of its files, which must be what their command generates.
+
+    Parameters
+    ----------
+    header, sources
+        As for `verify_whole`.
+    run_differing : bool, optional
+        Whether files that differ may run.
+
+    Raises
+    ------
+    InputError
+        If they differ and may not run then.
+    """
+    here = _present(header, sources)
+    expected = [*sources.step_files, *(present_runs(header.parent, sources))]
+    difference = next(_differences(header, sources, here, expected), None)
+    if difference is not None and not run_differing:
+        raise InputError(f"{difference}; --run-differing compiles and runs the file as it stands")
+    return replace(sources, files={**sources.files, **here})
+
+
+def _present(header: Path, sources: Sources) -> dict[str, str]:
+    """Return the text of the files of a whole that are there."""
+    folder = header.parent
+    here = {name: text_of(folder / name) for name in sources.step_files if (folder / name).is_file()}
+    return here | {name: text for name, text in present_runs(folder, sources).items() if text}
+
+
+def _differences(
+    header: Path, sources: Sources, here: Mapping[str, str], expected: Iterable[str]
+) -> Iterator[str]:
+    """Yield what differs from generated files, a line of text each."""
+    if header.name not in sources.step_files:
+        first = next(name for name in sources.step_files if name.endswith(".h"))
+        yield f"{header}: other options: the command in it generates {first}"
+    for name in expected:
+        path, text = header.parent / name, sources.files[name]
+        if name in here:
+            yield from differing_lines(path, here[name], text, _reason(here[name], text))
+        else:
+            yield f"{path}: is not there"
 
 
 def _reason(here: str, generated: str) -> str:

@@ -11,6 +11,7 @@ from strapgen.backends.c import real_type
 from strapgen.backends.evaluators import Array
 from strapgen.backends.systems.memory import SystemMemory
 from strapgen.backends.systems.runner import SystemRunner
+from strapgen.ir.sources import Sources
 from strapgen.support.exceptions import InputError
 from strapgen.systems import generation
 from strapgen.systems.fitting import Fitted
@@ -18,11 +19,11 @@ from strapgen.toolchain import compiler
 
 
 class CompiledSystem(SystemRunner):
-    """Runs the generated C unit of a system."""
+    """Runs the C unit of a system: the generated one, or files that are stated."""
 
-    def __init__(self, fit: Fitted, backend: str) -> None:
+    def __init__(self, fit: Fitted, backend: str, sources: Sources | None = None) -> None:
         super().__init__(fit, backend)
-        self.sources = generation.unit(fit, f"strapgen system {self.system.name}")
+        self.sources = sources or generation.unit(fit, f"strapgen system {self.system.name}")
         self.module = compiler.load(self.sources)
         self.name = self.sources.function.name
 

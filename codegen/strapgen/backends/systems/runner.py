@@ -145,7 +145,7 @@ class SystemRunner(ABC):
             values = values.reshape(-1, signal.size)
             argument = self.fit.arguments.get(signal.name)
             if argument is not None and signal.over == CYCLE and argument.format.word < _EXACT_BITS:
-                values = _carried(values, argument.unit)
+                values = carried(values, argument.unit)
             result[signal.name] = self.stored(signal.name, values)
             counts.add(len(values))
         if len(counts) > 1:
@@ -282,7 +282,7 @@ class InterpretedSystem(SystemRunner):
         }, memory
 
 
-def _carried(values: Array, unit: Fraction) -> Array:
+def carried(values: Array, unit: Fraction) -> Array:
     """Return increments of any number of elements, (cycles, elements), as differences of rounded sums."""
     count, size = values.shape
     padded = np.pad(values, ((0, 0), (0, -size % 3)))

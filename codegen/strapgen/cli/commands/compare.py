@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,14 +23,14 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output
 from strapgen.cli.sample_source import SampleSource
-from strapgen.cli.systems.comparing import compared_system
+from strapgen.cli.systems.comparing import compared_system, counted
+from strapgen.cli.systems.running import refuse_options
 from strapgen.support.exceptions import InputError
 from strapgen.systems.built_in import is_system
 
 if TYPE_CHECKING:
     from strapgen.backends import Backend
     from strapgen.catalogue import Choice
-    from strapgen.ir.fixed_settings import Settings
     from strapgen.library.generation import Request
     from strapgen.reports.comparison import ComparedKernel
 
@@ -88,13 +87,14 @@ def compare(
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
     output.check(algorithm, *methods.files, *source.files)
-    if is_system(algorithm):
-        stated = {"--source": files, "--fail-above": fail_above, "--plot": output.plot}
-        others, names = [name for name in stated if stated[name]], _backends(backend, reference, None)
-        return compared_system(algorithm, methods, names, reference, others, source, fixed, output)
-    choices = _taking_increments(methods.choices(algorithm))
     names = _backends(backend, reference, files)
+    if is_system(algorithm):
+        stated = {"--fail-above": fail_above, "--plot": output.plot}
+        refuse_options(methods, fixed, [name for name in stated if stated[name]])
+        return compared_system(algorithm, names, reference, (files, run_differing), source, fixed, output)
+    choices = _taking_increments(methods.choices(algorithm))
     requests = {path: header_command_of(path).request([algorithm]) for path in files or ()}
+    counts = {path: request.settings for path, request in requests.items()}
     most = limit("--fail-above", fail_above)
     source.check()
     _check_fixed(fixed, {*names, reference}, source.pulse_arcsec)
@@ -115,7 +115,7 @@ def compare(
                 increments=inputs.increments,
                 reference=reference,
                 truth=inputs.truth,
-                settings=_counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), requests),
+                settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
             )
             kernels.append(
                 ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
@@ -125,8 +125,7 @@ def compare(
         comparison_report(kernels, reference, drift),
         lambda path: plots.comparison_image(kernels, reference, path),
     )
-    if most is not None:
-        _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
+    _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
 
 
 def _taking_increments(choices: list[Choice]) -> list[Choice]:
@@ -151,31 +150,10 @@ def _of_files(requests: Mapping[Path, Request], choice: Choice, run_differing: b
     return result
 
 
-def _counted(settings: Settings | None, requests: Mapping[Path, Request]) -> Settings | None:
-    """Return settings with the gyro whose counts the files take: all back ends then run on its counts.
-
-    Raises
-    ------
-    InputError
-        If the files, or the options of the command, state different gyros.
-    """
-    from strapgen.ir.fixed_settings import Settings
-
-    gyros = {} if settings is None or settings.sensor is None else {settings.sensor: "the command"}
-    for path, request in requests.items():
-        if request.settings is not None and request.settings.sensor is not None:
-            gyros.setdefault(request.settings.sensor, str(path))
-    if len(gyros) > 1:
-        stated = " and ".join(f"{sensor.stated} of {place}" for sensor, place in gyros.items())
-        raise InputError(f"{stated} are different gyros; one run has the counts of one")
-    counting = next((r.settings for r in requests.values() if r.settings and r.settings.sensor), None)
-    if counting is None or (settings is not None and settings.sensor is not None):
-        return settings
-    return replace(settings or Settings(), sensor=counting.sensor, input_bits=counting.input_bits)
-
-
-def _fail_above(kernels: list[ComparedKernel], most: float, said: str) -> None:
-    """Exit with 1 if a back end is further from the reference than allowed."""
+def _fail_above(kernels: list[ComparedKernel], most: float | None, said: str) -> None:
+    """Exit with 1 if a back end is further from the reference than allowed, where a limit is stated."""
+    if most is None:
+        return
     beyond = [(each.kernel, row) for each in kernels for row in each.rows if not row.max_abs_rad <= most]
     if beyond:
         several = len(kernels) > 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -53,14 +53,13 @@ def two_speed(
     check_format(format)
     from strapgen.systems import two_speed_sources
 
-    form = whole("sculling", sculling) or 0
-    settings = _settings(target, fixed)
-    sources = two_speed_sources.sources(algorithm, form, target, settings)
+    task = request(algorithm, sculling, target, fixed)
+    sources = two_speed_sources.sources(*task)
     files = sources.files if output.with_runs else sources.step_files
     if output.project:
         from strapgen.experiments import project, two_speed_project
 
-        added = two_speed_project.project_files(algorithm, form, target, settings)
+        added = two_speed_project.project_files(*task)
         if not output.check:
             project.refuse_changed(output.out or Path(), added, output.force)
         files = files | added
@@ -68,7 +67,7 @@ def two_speed(
         output.show_difference(files, format)
         return
     written = output.write(files)
-    loops = two_speed_sources.loops(algorithm, form, target, settings)
+    loops = two_speed_sources.loops(*task)
     if format == "json":
         print_json(_data(sources, loops, written))
         return
@@ -104,18 +103,24 @@ def _data(sources: Sources, loops: Sequence[Sources], written: Sequence[Path]) -
     }
 
 
-def generated(algorithm: str, sculling: str, target: str, fixed: FixedOptions) -> Sources:
-    """Return the sources that the options ask for.
+class TwoSpeedRequest(NamedTuple):
+    """What one call of ``strapgen two-speed`` generates, as `two_speed_sources.sources` takes it."""
+
+    algorithm: str
+    sculling: int
+    target: str
+    settings: Settings | None
+
+
+def request(algorithm: str, sculling: str, target: str, fixed: FixedOptions) -> TwoSpeedRequest:
+    """Return what the options ask for.
 
     Raises
     ------
     InputError
         If options do not go together.
     """
-    from strapgen.systems import two_speed_sources
-
-    form = whole("sculling", sculling) or 0
-    return two_speed_sources.sources(algorithm, form, target, _settings(target, fixed))
+    return TwoSpeedRequest(algorithm, whole("sculling", sculling) or 0, target, _settings(target, fixed))
 
 
 def _settings(target: str, fixed: FixedOptions) -> Settings | None:

@@ -2,37 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from strapgen.cli.sensor_options import force_of
-from strapgen.cli.systems.running import described_along, described_at, recorded, refuse_options
+from strapgen.cli.systems.files import runner_of_file
+from strapgen.cli.systems.running import described_along, described_at, recorded
 from strapgen.support import checks
+from strapgen.support.exceptions import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from strapgen.cli.fixed_options import FixedOptions
-    from strapgen.cli.options import SeveralMethods
     from strapgen.cli.output import Output
     from strapgen.cli.sample_source import SampleSource
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.systems.wiring import Description
 
 
 def compared_system(
     name: str,
-    methods: SeveralMethods,
     names: list[str],
     reference: str,
-    others: list[str],
+    files: tuple[Sequence[Path] | None, bool],
     source: SampleSource,
     fixed: FixedOptions,
     output: Output,
 ) -> None:
     """Compare a described system on back ends, and exit with 1 if a pass is outside its bound."""
-    refuse_options(methods, fixed, others)
     output.check(name, *source.files)
     source.check(of_system=True)
     from strapgen.cli.progress import waiting
@@ -41,12 +43,38 @@ def compared_system(
 
     description, inputs, title = _inputs(name, source)
     with waiting(f"running {name}"):
-        rows = compare_system(description, names, reference, inputs, fixed.settings(1))
+        runners = {path: runner_of_file(path, description, [name], files[1]) for path in files[0] or ()}
+        settings = counted(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
+        of_files = {str(path): runner for path, (runner, _) in runners.items()}
+        rows = compare_system(description, names, reference, inputs, settings, of_files)
     output.report(system_comparison_report(rows, f"{name}: {title}", reference))
     broken = [f"{row.output} on {row.backend}" for row in rows if row.share is not None and row.share > 1]
     if broken:
         typer.echo(f"strapgen: outside the certified bound: {', '.join(broken)}", err=True)
         raise typer.Exit(1)
+
+
+def counted(settings: Settings | None, files: Mapping[Path, Settings | None]) -> Settings | None:
+    """Return settings with the gyro whose counts the files take: all back ends then run on its counts.
+
+    Raises
+    ------
+    InputError
+        If the files, or the options of the command, state different gyros.
+    """
+    from strapgen.ir.fixed_settings import Settings
+
+    gyros = {} if settings is None or settings.sensor is None else {settings.sensor: "the command"}
+    for path, stated in files.items():
+        if stated is not None and stated.sensor is not None:
+            gyros.setdefault(stated.sensor, str(path))
+    if len(gyros) > 1:
+        both = " and ".join(f"{sensor.stated} of {place}" for sensor, place in gyros.items())
+        raise InputError(f"{both} are different gyros; one run has the counts of one")
+    counting = next((stated for stated in files.values() if stated and stated.sensor), None)
+    if counting is None or (settings is not None and settings.sensor is not None):
+        return settings
+    return replace(settings or Settings(), sensor=counting.sensor, input_bits=counting.input_bits)
 
 
 def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDArray[Any]], str]:

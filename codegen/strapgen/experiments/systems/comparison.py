@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from strapgen.backends import BACKENDS
-from strapgen.backends.systems import system_runner
+from strapgen.backends.systems import SystemRun, system_runner
 from strapgen.backends.systems.compiled import CompiledSystem
+from strapgen.backends.systems.runner import carried
 from strapgen.experiments.systems.agreement import PassAgreement, agreement, distance
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.sensor import Sensor
 from strapgen.systems.wiring import Description
 
 
@@ -47,12 +51,20 @@ class OutputComparison:
         return asdict(self)
 
 
+class RunsSamples(Protocol):
+    """What runs a system: a back end, or files."""
+
+    def run(self, inputs: Mapping[str, Any]) -> SystemRun:
+        """Run cycles of the fastest rate, see `SystemRunner.run`."""
+
+
 def compare_system(
     description: Description,
     names: Iterable[str],
     reference: str,
     inputs: Mapping[str, Any],
     settings: Settings | None = None,
+    files: Mapping[str, RunsSamples] | None = None,
 ) -> list[OutputComparison]:
     """Run a system on back ends over the same samples and compare its outputs with those of a reference.
 
@@ -66,7 +78,10 @@ def compare_system(
     inputs : mapping of str to array, (cycles, shape)
         Samples in SI units.
     settings : Settings, optional
-        Word, rounding and error feedback in fixed point where a stage states none.
+        Word, rounding and error feedback in fixed point where a stage states none. With a gyro that counts, all back
+        ends run on its counts.
+    files : mapping of str to RunsSamples, optional
+        What runs files, by their names.
 
     Returns
     -------
@@ -79,27 +94,40 @@ def compare_system(
     InputError
         If a name is not known, or a stage refuses a sample.
     """
+    if settings is not None and settings.sensor is not None:
+        inputs = {**inputs, **_counts(description, inputs, settings.sensor)}
     other = system_runner(description, reference, settings if BACKENDS[reference].fixed else None)
     expected = other.run(inputs).values
     rows = []
-    for name in names:
-        runner = system_runner(description, name, settings if BACKENDS[name].fixed else None)
+    runners: dict[str, RunsSamples] = {
+        name: system_runner(description, name, settings if BACKENDS[name].fixed else None) for name in names
+    }
+    for name, runner in (runners | dict(files or {})).items():
         values = runner.run(inputs).values
         passes: PassAgreement | None = None
         if isinstance(runner, CompiledSystem):
             passes = agreement(runner, other, inputs)
-        for output in runner.system.outputs:
-            signal = runner.system.cell(output).signal
+        for output in description.system.outputs:
+            signal = description.system.cell(output).signal
             difference = float(distance(signal, values[output], expected[output]).max(initial=0))
             rows.append(_row(name, output, signal.unit, difference, passes))
     return rows
+
+
+def _counts(description: Description, inputs: Mapping[str, Any], sensor: Sensor) -> dict[str, Any]:
+    """Return the angle increments in whole counts of a gyro, each with the rounding error of those before."""
+    return {
+        signal.name: carried(np.asarray(inputs[signal.name], float), sensor.count)
+        for signal in description.system.inputs
+        if signal.is_angle_increment
+    }
 
 
 def _row(
     backend: str, output: str, unit: str, difference: float, passes: PassAgreement | None
 ) -> OutputComparison:
     if passes is None:
-        return OutputComparison(backend, output, unit, difference, None, None, None, "it runs no C")
+        return OutputComparison(backend, output, unit, difference, None, None, None, "no pass of it is known")
     return OutputComparison(
         backend,
         output,
