@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from strapgen.backends.systems import system_runner
+from strapgen.backends.two_speed import TwoSpeed
 from strapgen.cli import main
+from strapgen.experiments.systems.loop_files import LoopFiles
 from strapgen.ir.fixed_settings import Settings
+from strapgen.support.exceptions import InputError
 from strapgen.systems.two_speed_sources import loops
+from strapgen.systems.wiring import described
 
 GYRO = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --duration 1"
@@ -43,8 +50,9 @@ def test_system_runs_on_the_counts_of_its_header(system, capsys):
     alike = [{**row, "backend": ""} for row in rows]
     assert alike[:2] == alike[2:]
     assert 0 < rows[0]["one_pass"] <= rows[0]["bound"]
-    # 50 slow cycles, each with the rounding of 8 passes at most; one lost count is 7.6e-7 rad, more than all of it.
-    assert 0 < rows[0]["run"] <= 50 * 8 * rows[0]["bound"] < 7.6e-7
+    # Each of 50 slow cycles adds the bound of a pass to three elements of a row, which only turn, and 7 passes of the
+    # fast loop, less than a tenth of it. Without whole counts for all, half a count would be between the two.
+    assert 0 < rows[0]["run"] <= 50 * 3 * rows[0]["bound"] < 7.6e-7 / 2
 
 
 def test_two_speeds_run_at_the_rates_of_the_built_in_system(two_speed, capsys):
@@ -60,6 +68,26 @@ def test_two_speeds_run_at_the_rates_of_the_built_in_system(two_speed, capsys):
     # 50 slow cycles of 20 ms, each with the sums of 8 fast ones in three components, and the rounding of two loops.
     assert 0 < rows["slow_state"]["run"] <= float(50 * (3 * 8 * sums + 3 * turned))
     assert rows["slow_state"]["one_pass"] is None
+
+
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+def test_loops_run_as_the_built_in_system_does(algorithm, rng):
+    """In floating point both compute the same numbers, but for rounding, in a navigation frame that turns."""
+    description = described(f"two-speed-{algorithm}", Fraction(400))
+    inputs = {
+        signal.name: rng.uniform(-0.5, 0.5, (80, 3)) * float(signal.bound)
+        for signal in description.system.inputs
+    }
+    expected = system_runner(description, "numpy").run(inputs).values
+    values = LoopFiles(TwoSpeed(algorithm, 2, "numpy"), description.system).run(inputs).values
+    assert {*values} == {*expected} and len(values) == 2
+    for name, rows in expected.items():
+        # Turns of up to 5e-5 rad in ten slow cycles; rounding of doubles of at most 10 m/s, some hundred times.
+        np.testing.assert_allclose(values[name], rows, rtol=0, atol=1e-13)
+    with pytest.raises(InputError, match="has 79 cycles; two speeds take whole navigation cycles, of 40"):
+        LoopFiles(TwoSpeed(algorithm, 2, "numpy"), description.system).run(
+            {name: rows[1:] for name, rows in inputs.items()}
+        )
 
 
 def test_files_that_are_no_part_of_the_comparison_are_refused(system, two_speed, tmp_path, capsys):
