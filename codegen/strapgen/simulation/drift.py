@@ -19,8 +19,8 @@ from strapgen.simulation.runs import Run, simulate
 _HOUR = 3600
 #: Records of a run that its steady drift is measured from, as a fraction of all: at each end.
 _END = 10
-#: Units in the last place of double precision a step above which rounding is a small part of the angle: on cones it adds
-#: up to a third of one.
+#: Units in the last place of double precision a step above which rounding is a small part of the angle: on cones it
+#: adds up to a third of one.
 _UNITS_A_STEP = 4
 
 
