@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
+import sympy as sp
 from gathering import each
 
 from strapgen.catalogue import METHODS
+from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.experiments import frontier
 from strapgen.experiments.frontier import CANDIDATES, MOTIONS, Candidate, candidates, in_order, pareto
 from strapgen.reports import plots
 from strapgen.reports.selection.frontier import frontier_report
+from strapgen.simulation import drift
 from strapgen.support.exceptions import InputError
 
 FEW = ("coning-compressed:1+1", "rk4:2", "coning-compressed:4")
@@ -85,6 +89,33 @@ def test_drifts_are_those_of_the_closed_forms(study):
     b, angle = 2 * pi * 5 / 100, radians(0.1)
     left = (2 * b - sin(2 * b)) / 2 - 2 / 3 * 2 * sin(b) * (1 - cos(b))
     assert rk4.drifts["cone 0.1/5"] == pytest.approx(degrees(left * angle**2 / 0.02) * 3600, rel=0.01)
+
+
+def on_cone(method: str, half_angle: str, frequency: str, duration: str) -> float:
+    """Return the drift of one algorithm on a cone, as the command shows it."""
+    (one,) = candidates([method])
+    cone = {"cone": ("cone", {"half_angle_deg": half_angle, "frequency_hz": frequency})}
+    return frontier._drift(one.choice, "cone", frontier.Trial(one, "100", duration, cone))
+
+
+@each("half_angle", ["0.01", "0.001"])
+def test_a_drift_that_rounding_hides_is_that_of_its_series(half_angle):
+    # The closed form is of second order in the half-angle: the fourth adds 2.3e-4 of it at 0.01 deg, and its square.
+    symbols = {"alpha": math.radians(float(half_angle)), "omega": 10 * math.pi, "T": 0.01}
+    closed = sp.sympify(design(3, 3, "combined").residual().expression).evalf(30, subs=symbols)
+    expected = abs(math.degrees(float(closed))) * 3600
+    assert expected < 1e-11
+    allowed = 3e-4 * (float(half_angle) / 0.01) ** 2 + 1e-9
+    assert on_cone("coning-combined:3+3", half_angle, "5", "1.2") == pytest.approx(expected, rel=allowed)
+
+
+def test_both_arithmetics_agree_where_both_show_a_drift(monkeypatch):
+    plain = on_cone("coning-combined:3+3", "1", "5", "1.2")
+    monkeypatch.setattr(drift, "_UNITS_A_STEP", math.inf)
+    # Rounding of double precision is a unit in the last place at most in each of the 40 steps.
+    rounding = math.degrees(40 * 2.0**-52) / 1.2 * 3600
+    many_digits = on_cone("coning-combined:3+3", "1", "5", "1.2")
+    assert many_digits == pytest.approx(plain, abs=rounding) and many_digits != plain
 
 
 def test_results_come_in_the_order_of_the_candidates(study):

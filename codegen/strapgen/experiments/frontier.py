@@ -16,13 +16,11 @@ from typing import Any
 import numpy as np
 
 from strapgen import catalogue
-from strapgen.backends import backend
 from strapgen.catalogue import Choice
 from strapgen.library import generated_sources
-from strapgen.simulation.drift import drift
+from strapgen.simulation.drift import measured_drift
 from strapgen.simulation.motions import Motion
 from strapgen.simulation.rate_motions.motion_files import is_file
-from strapgen.simulation.runs import simulate
 from strapgen.simulation.users_motions import any_motion
 from strapgen.support import cache as disk_cache
 from strapgen.support import checks
@@ -361,10 +359,9 @@ def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
     with np.errstate(all="ignore"):
         try:
             profile = _motion(name, tuple(settings.items()), trial.duration)
-            run = simulate(backend(choice), profile, step, duration // step * step)
+            value = measured_drift(choice, profile, step, duration // step)
         except InputError:  # the attitude is not finite
             return None
-        value = drift(run)
     return value if np.isfinite(value) else None
 
 

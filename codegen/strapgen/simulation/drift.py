@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
+
+import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.simulation.runs import Run
+from strapgen.backends import backend, exact
+from strapgen.catalogue import Choice
+from strapgen.simulation.exact_attitudes import exact_attitudes, has_digits
+from strapgen.simulation.motions import Motion
+from strapgen.simulation.runs import Run, simulate
 
 #: Seconds in an hour.
 _HOUR = 3600
 #: Records of a run that its steady drift is measured from, as a fraction of all: at each end.
 _END = 10
+#: Units in the last place of double precision a step above which rounding is a small part of the angle: on cones it
+#: adds up to a third of one.
+_UNITS_A_STEP = 4
 
 
 def angles(run: Run) -> NDArray[np.float64]:
@@ -53,7 +64,46 @@ def drift(run: Run) -> float:
     >>> round(drift(simulate(backend("euler", "coning-compressed", 2), cone, "0.02", 10)), 3)
     0.317
     """
-    return float(np.degrees(angles(run).max()) / run.time[-1] * _HOUR)
+    return drift_of(angles(run).max(), run.time[-1])
+
+
+def drift_of(angle: float, duration: float | Fraction) -> float:
+    """Return an angle in rad over a duration in s, in deg/h."""
+    return math.degrees(angle) / float(duration) * _HOUR
+
+
+def measured_drift(choice: Choice, motion: Motion, step: Fraction, count: int) -> float:
+    """Return the drift of a step on a motion, in many digits where double precision may show its own rounding.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that takes increments.
+    motion : Motion
+    step : Fraction
+        In s.
+    count : int
+        Number of steps.
+
+    Returns
+    -------
+    float
+        In deg/h, see `drift`.
+
+    Raises
+    ------
+    InputError
+        If the attitude leaves the range of its numbers.
+    """
+    stepper, duration = backend(choice), count * step
+    value = drift(simulate(stepper, motion, step, duration))
+    if not (value < drift_of(_UNITS_A_STEP * stepper.unit * count, duration) and has_digits(motion)):
+        return value
+    error = exact.interpreter("error-matrix")
+    with mpmath.workdps(exact.DIGITS):
+        # Of an angle that double precision does not show, the drift is the angle itself.
+        largest = max(mpmath.norm(error(*pair)) for pair in exact_attitudes(choice, motion)(step, count))
+    return drift_of(float(largest), duration)
 
 
 def steady_drift(run: Run) -> float:

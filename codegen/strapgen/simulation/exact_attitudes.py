@@ -78,6 +78,11 @@ def exact_attitudes(
     return run
 
 
+def has_digits(motion: Motion) -> bool:
+    """Return whether the increments and the attitude of a motion are known in more digits than double precision has."""
+    return isinstance(motion, RateMotion) or motion.name in MOTIONS
+
+
 def uncertainty(motion: Motion, length: Fraction, count: int) -> float:
     """Return the error in rad that a run of `exact_attitudes` may have from increments, attitude and rounding.
 

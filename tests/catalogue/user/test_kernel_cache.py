@@ -136,6 +136,10 @@ def test_a_damaged_entry_is_derived_again(derives, file, name, damage):
     assert [derives(file), derives(file)] == [(True, "one"), (False, "one")]
 
 
+#: Starts a process that ends at once, and waits for it.
+CHILD = "{}\nif not pid:\n    os._exit(0)\nos.waitpid(pid, 0)\nWORD = 'one'\n"
+
+
 @pytest.mark.parametrize(
     "helper",
     [
@@ -143,8 +147,12 @@ def test_a_damaged_entry_is_derived_again(derives, file, name, damage):
         "import glob\nWORD = len(glob.glob(__file__ + '*'))\n",
         "import os\nWORD = os.system('true')\n",
         "WORD = 'one'\nopen(__file__ + '.log', 'a').close()\n",
+        "import os\n" + CHILD.format("pid = os.fork()"),
+        "import os\n" + CHILD.format("pid, terminal = os.forkpty()"),
+        "import os\nos.waitpid(os.posix_spawn('/bin/true', ['true'], {}), 0)\nWORD = 'one'\n",
+        "import os\ntry:\n    os.execv(__file__ + '.none', ['none'])\nexcept OSError:\n    WORD = 'one'\n",
     ],
-    ids=["listing", "pattern", "program", "writing"],
+    ids=["listing", "pattern", "program", "writing", "fork", "terminal", "spawn", "exec"],
 )
 def test_what_depends_on_more_than_files_is_derived_every_time(derives, file, helper):
     beside(file, helper=helper)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from gathering import each
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.experiments.foreign import causes as causes
 from strapgen.experiments.foreign.probes import Products, pairs
+from strapgen.experiments.foreign.replacement import IN_PLACE, explanation
+from strapgen.experiments.foreign.runs import Convention, rotation_vectors
 
 DESIGNS = [
     (samples, previous, form)
@@ -73,6 +76,7 @@ def test_a_correction_from_three_kept_samples_is_known_when_its_older_sample_is_
         for (older, newer), c in design(1, 3, form).pairs.items():
             if newer == 3:
                 table[older - 4, 0] = float(c)
+        assert set(table) == {*pairs(1)}  # a probe looks at all of them
         assert causes.cause(Products(1, table, table)) == causes.LATE
 
 
@@ -112,12 +116,25 @@ def test_faults_that_make_up_a_known_size_are_no_known_fault():
 @each("samples", [1, 2, 4])
 def test_samples_that_are_turned_one_by_one_are_known(samples):
     assert causes.cause(one_by_one(samples, 1)) is None
+    assert causes.wanted(one_by_one(samples, -1)) == pytest.approx(one_by_one(samples, 1).at_once)
     standard = causes.standard_design(one_by_one(samples, 1))
     assert (standard.samples, standard.previous) == (1, 1)
     named = {factor: causes.cause(one_by_one(samples, factor)) for factor in (0, -1, 2, 0.5)}
     wanted = [causes.ABSENT, causes.WRONG_SIGN, causes.FACTOR_TWO, causes.FACTOR_TWO]
     assert list(named.values()) == wanted
     assert causes.cause(one_by_one(samples, 1, distance=2)) == causes.LATE
+
+
+@each("samples", [2, 3, 4])
+def test_samples_in_reverse_order_are_known(samples):
+    # The recursion by hand: sample k of a call is its sample N - 1 - k, and the one before the first the last call's 0.
+    known = dict.fromkeys(pairs(samples), 0.0)
+    absent = known | {(i, j): -0.5 for i, j in known if i >= 0}
+    assert causes.cause(Products(samples, absent, absent)) == f"{causes.REVERSED}; {causes.ABSENT}"
+    table = (
+        absent | {(k, k + 1): -0.5 - 1 / 12 for k in range(samples - 1)} | {(-samples, samples - 1): 1 / 12}
+    )
+    assert causes.cause(Products(samples, table, table)) == causes.REVERSED
 
 
 def test_another_size_is_told_in_numbers():
@@ -138,3 +155,24 @@ def test_the_error_of_a_probe_changes_no_name(error):
         exact = tables(1, 1, "compressed", factor)
         off = {pair: c + error for pair, c in exact.at_once.items()}
         assert causes.cause(Products(1, off, off)) == cause
+
+
+@each(("downwards", "elements"), [(False, "elements 0, 1, 2"), (True, "elements 1, 2, 3")])
+def test_an_update_in_place_is_explained_in_either_order(downwards, elements):
+    # The product of quaternions, scalar first, element by element into the state that is read.
+    convention = Convention("first")
+    states = np.array([[0.5, 0.5, -0.5, 0.5], [0.1, -0.7, 0.5, 0.5], [0.8, 0.36, 0.48, 0.0]])
+    states = np.repeat(states / np.linalg.norm(states, axis=1, keepdims=True), 3, axis=0)
+    vectors = np.tile(0.02 * np.array([[1.0, 0, 0], [0, 1, 0.5], [0.3, 0, 1]]), (3, 1))
+    after = states.copy()
+    half = vectors / 2
+    signs = [(0, ((1, 0, -1), (2, 1, -1), (3, 2, -1))), (1, ((0, 0, 1), (2, 2, 1), (3, 1, -1))),
+             (2, ((0, 1, 1), (1, 2, -1), (3, 0, 1))), (3, ((0, 2, 1), (1, 1, 1), (2, 0, -1)))]  # fmt: skip
+    for k, terms in signs[:: -1 if downwards else 1]:
+        sine, cosine = np.sinc(np.linalg.norm(half, axis=1) / np.pi), np.cos(np.linalg.norm(half, axis=1))
+        after[:, k] = cosine * after[:, k] + sum(
+            s * after[:, j] * half[:, axis] * sine for j, axis, s in terms
+        )
+    turned = np.swapaxes(convention.matrices(states), 1, 2) @ convention.matrices(after)
+    said = explanation(convention, states, vectors, rotation_vectors(turned) - vectors)
+    assert said is not None and said.startswith(f"{elements} {IN_PLACE.split(' that of')[0]}")

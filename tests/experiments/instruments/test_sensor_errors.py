@@ -62,6 +62,23 @@ def test_white_noise_and_its_prediction_agree_within_5_percent(motion):
     assert pooled == pytest.approx(predicted[-1, 0], rel=0.05)
 
 
+def test_a_deviation_is_about_the_mean_of_the_runs():
+    # Three runs by hand: squares about their own mean over N - 1, not about 0 and not over N.
+    motion, errors = CONING, InstrumentErrors(gyro=NOISY)
+    backend = strapgen.backend("euler", method="rk4", increments=2)
+    (row,) = SensorStudy(backend, path_of(motion, 8), errors).rows(3)
+    samples = motion.samples(STEP / 2, 0, 16)
+    measured = [samples, *(MeasurementUnit(errors, 1 / 16, run)(samples)[0] for run in range(3))]
+    states = backend.propagate(np.stack(measured).reshape(4, 8, 2, 3), 8)[:, -1]
+    exact, *ends = backend.matrices(states)
+    angles = np.array([-drift_between(end, exact) for end in ends])
+    by_hand = np.sqrt(((angles - angles.sum(axis=0) / 3) ** 2).sum(axis=0) / 2)
+    np.testing.assert_allclose(row.deviation[-1], by_hand, rtol=1e-9)
+    np.testing.assert_allclose(row.mean[-1], angles.sum(axis=0) / 3, rtol=1e-9)
+    low, high = deviation_interval(2)
+    np.testing.assert_allclose([row.low[-1], row.high[-1]], [low * by_hand, high * by_hand], rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("steps", "runs"), [(360, 400), pytest.param(1440, 600, marks=pytest.mark.long)], ids=["short", "whole"]
 )

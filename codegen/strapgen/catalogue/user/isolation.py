@@ -31,6 +31,7 @@ _OUTSIDE = {
     "os.scandir": "lists a folder",
     "os.exec": "starts a program",
     "os.fork": "starts a process",
+    "os.forkpty": "starts a process",
     "os.posix_spawn": "starts a program",
     "os.system": "starts a program",
     "subprocess.Popen": "starts a program",

@@ -14,6 +14,7 @@ WRONG_SIGN = "correction of the wrong sign"
 LATE = "correction one sample late"
 FACTOR_TWO = "correction off by a factor of 2"
 SUM_LATE = "the sum of the samples before lacks the last one (one sample late)"
+REVERSED = "the samples of a call are taken in reverse order"
 STATE_KEPT = "state kept between runs"
 
 #: Smallest coefficient that counts as one.
@@ -208,7 +209,13 @@ def cause(products: Products) -> str | None:
     late_sum = {(older, newer): c for (older, newer), c in turned.items() if newer - older > 1}
     if samples > 1 and _alike(_less(now, late_sum), ideal, noise):
         return SUM_LATE
-    return None if right else _by_size(products)
+    if right or samples == 1:
+        return None if right else _by_size(products)
+    if _alike(now, _reversed(turned, samples, now), noise):
+        return f"{REVERSED}; {ABSENT}"
+    if any(_alike(now, _reversed(_plus(*each), samples, now), noise) for each in _ideals(samples)):
+        return REVERSED
+    return _by_size(products)
 
 
 def _by_size(products: Products) -> str:
@@ -275,12 +282,30 @@ def _delayed(ideal: Table, samples: int) -> Iterator[Table]:
     yield {(older - samples, newer): c for (older, newer), c in ideal.items()}
 
 
+def _reversed(table: Table, samples: int, visible: Table) -> Table:
+    """Return what is seen of coefficients where the samples of each call are taken from the last to the first.
+
+    Of a correction that is even in this order, as that of added samples often is, it is the wrong sign.
+    """
+    seen: Table = {}
+    for pair, c in table.items():
+        older, newer = (number - number % samples + samples - 1 - number % samples for number in pair)
+        place, value = ((older, newer), c) if older < newer else ((newer, older), -c)
+        if place in visible:
+            seen[place] = value
+    return seen
+
+
 def _any(table: Table) -> bool:
     return any(abs(c) > LEAST for c in table.values())
 
 
 def _less(table: Table, base: Table) -> Table:
     return {pair: c - base.get(pair, 0.0) for pair, c in table.items()}
+
+
+def _plus(table: Table, other: Table) -> Table:
+    return {pair: table.get(pair, 0.0) + other.get(pair, 0.0) for pair in {*table, *other}}
 
 
 def _alike(table: Table, other: Table, noise: float) -> bool:
