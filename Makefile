@@ -131,6 +131,7 @@ check-generated:
 	$(BIN)/strapgen generate --all --check
 check-style:
 	$(BIN)/ruff check .
+	$(BIN)/lint-imports --no-cache > /dev/null || $(BIN)/lint-imports --no-cache
 check-layout:
 	$(BIN)/ruff format --check .
 check-types:

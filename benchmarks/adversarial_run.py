@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import strapgen
-from strapgen.backends.fixed import FixedBackend
+from strapgen.run.fixed import FixedBackend
 
 #: What restores a state.
 NORMALIZATIONS = {

@@ -16,8 +16,8 @@ import time
 import numpy as np
 
 import strapgen
-from strapgen.backends import BACKENDS, DEFAULT_BACKENDS
 from strapgen.catalogue import ALGORITHMS
+from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
 from throughput import least
 
 #: Interpreters of single operations in Python are references and too slow for runs of this length.

@@ -29,7 +29,7 @@ GENERATORS = ("strapgen", "SymForce", "wrenfold", "CasADi")
 
 def formulas(step: tuple, symbols: dict, number, functions: dict) -> list:
     """Return the next state of a step in the symbols of another system."""
-    from strapgen.symbolic.kernel import evaluate_stages
+    from strapgen.kernel.kernel import evaluate_stages
 
     kernel = _kernel(step)
     if step[-1] == "staged":  # as in a textbook: slopes of the state
@@ -66,7 +66,7 @@ def _names(step) -> list[str]:
 def write_strapgen(step, folder: Path) -> int:
     """Write the Jacobians of strapgen, and return how many numbers they are."""
     from strapgen.catalogue import choose
-    from strapgen.library import generated_sources
+    from strapgen.run import generated_sources
 
     algorithm, method, increments, previous, _ = step
     choice = choose(f"{algorithm}-jacobian", method, increments, previous=previous or None)

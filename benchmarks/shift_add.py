@@ -16,10 +16,10 @@ from pathlib import Path
 
 import strapgen
 from strapgen.catalogue import Choice
-from strapgen.experiments.cost import cost
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.toolchain.processors import PROCESSORS
+from strapgen.lab.cost.cost import cost
+from strapgen.lab.cost.processors import PROCESSORS
 
 #: Kernels with their constants and settings.
 KERNELS: dict[str, tuple[Choice, dict]] = {
@@ -119,7 +119,7 @@ def main() -> None:
         for word in (16, 32):
             for way, more in WAYS.items():
                 settings = Settings.of(word=word, **stated, **more)
-                sources = strapgen.library.generated_sources.sources(choice, "c-fixed", settings)
+                sources = strapgen.run.generated_sources.sources(choice, "c-fixed", settings)
                 executed = cost(sources, "cortex-m0").executed
                 result = sources.fixed.outputs[-1]
                 places = float(max(result.errors) / result.format.unit)

@@ -22,8 +22,7 @@ import numpy as np
 
 import strapgen
 from strapgen.catalogue import choose
-from strapgen.library import generated_sources
-from strapgen.toolchain import compiler
+from strapgen.run import compiler, generated_sources
 
 #: Runs side by side, and the steps of each.
 RUNS, STEPS = 10_000, 20

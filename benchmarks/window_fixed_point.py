@@ -12,10 +12,10 @@ from fractions import Fraction
 import numpy as np
 
 import strapgen
-from strapgen.backends.increments import pulses
-from strapgen.backends.protocol import Backend
-from strapgen.simulation.drift import angles
-from strapgen.simulation.runs import attitude, drift_between
+from strapgen.lab.simulate.drift import angles
+from strapgen.lab.simulate.runs import attitude, drift_between
+from strapgen.run.increments import pulses
+from strapgen.run.protocol import Backend
 
 INTERVAL = Fraction(1, 100)
 WINDOW = "window-7-7"

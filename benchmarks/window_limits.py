@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import strapgen
-from strapgen.backends.increments import pulses
-from strapgen.backends.protocol import Backend
 from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.design import responses
-from strapgen.design.family import FamilyBrief, design
-from strapgen.simulation.drift import angles, drift, steady_drift
-from strapgen.simulation.motions import PROFILES, Motion
-from strapgen.simulation.runs import Run, attitude, drift_between
+from strapgen.design.filters import responses
+from strapgen.design.windows.family import FamilyBrief, design
+from strapgen.lab.motions.motions import PROFILES, Motion
+from strapgen.lab.simulate.drift import angles, drift, steady_drift
+from strapgen.lab.simulate.runs import Run, attitude, drift_between
+from strapgen.run.increments import pulses
+from strapgen.run.protocol import Backend
 
 INTERVAL = Fraction(1, 100)
 BAND = Fraction(13, 10)

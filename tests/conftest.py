@@ -22,16 +22,14 @@ from covering import beyond_two_rounds, mark_combinations
 from gathering import SEED
 
 import strapgen
-from strapgen.backends import BACKENDS, Backend
 from strapgen.catalogue import ALGORITHMS
-from strapgen.evidence.subjects import Subject
+from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.reports.plots import figures
-from strapgen.support import processes
-from strapgen.support.exceptions import CompilerError
+from strapgen.results import figures
+from strapgen.run import compiler, octave_process, processes, shared_libraries
+from strapgen.run.backends import BACKENDS, Backend
+from strapgen.run.shared_libraries import COMPILERS
 from strapgen.targets import BUILT_IN
-from strapgen.toolchain import compiler, octave, shared_libraries
-from strapgen.toolchain.shared_libraries import COMPILERS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -51,10 +49,13 @@ CAYLEY_KLEIN = ("numpy", "c")
 
 #: Where all tests run in Octave too, which takes a program a thousand times as long as C: what holds of the behaviour
 #: there, and of the bits of all kernels in tests/targets/test_matlab.py, says the rest.
-IN_OCTAVE = Path(__file__).parent / "backends"
+IN_OCTAVE = Path(__file__).parent / "run"
 #: Where no test runs in C++ and Rust, folders and files: tests/targets holds every kernel there to the bits and the
 #: integers of the C, on which these tests run, and the back ends themselves behave as tests/backends says.
-NOT_IN_OTHER_LANGUAGES = ("catalogue", "experiments", "simulation", "test_claims.py", "test_constant_rate.py")
+NOT_IN_OTHER_LANGUAGES = (
+    *("catalogue", "lab", "navigation", "design", "firmware"),
+    *("test_claims.py", "test_constant_rate.py"),
+)
 
 #: Objects made since the last search for garbage at which a session searches again, by generation. A search takes a
 #: second for a million objects, most of which stay; the processes of a session share what its tests make.
@@ -113,7 +114,7 @@ def _other_language(values: Mapping[str, object]) -> Callable[[], object] | None
         if target in BUILT_IN and BUILT_IN[target].language in COMPILERS:
             return COMPILERS[BUILT_IN[target].language].path
         if target == "matlab":
-            return octave.command
+            return octave_process.command
     return None
 
 
@@ -128,7 +129,7 @@ def _missing(program: Callable[[], object]) -> str:
 
 
 def _is_of_cayley_klein(value: object) -> bool:
-    if isinstance(value, Subject):  # whose name is derived
+    if type(value).__name__ == "Subject":  # whose name is derived
         value = value.choice
     return str(getattr(value, "name", value)).startswith("cayley-klein")
 
@@ -159,7 +160,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             )
         elsewhere = (
             IN_OCTAVE not in item.path.parents
-            if program is octave.command
+            if program is octave_process.command
             else program is not None
             and not {*NOT_IN_OTHER_LANGUAGES}.isdisjoint(item.path.relative_to(config.rootpath).parts)
         )

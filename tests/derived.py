@@ -11,15 +11,15 @@ import sympy as sp
 from scipy.spatial.transform import Rotation
 
 from strapgen import catalogue
-from strapgen.backends import BACKENDS, fitted
-from strapgen.backends.kernel_sources import sources_of_program
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
-from strapgen.symbolic.kernel import Kernel, evaluate_stages
+from strapgen.kernel.kernel import Kernel, evaluate_stages
+from strapgen.run import generated_sources
+from strapgen.run.backends import BACKENDS, fitted
+from strapgen.run.kernel_sources import sources_of_program
 
 #: Kernels of the standard catalogue that fixed point can be made of without ranges from a user: all but the models of
 #: motions, whose rates have none, as tests/library proves.

@@ -83,9 +83,9 @@ class _Loader(importlib.machinery.SourceFileLoader):
 
     def exec_module(self, module: ModuleType) -> None:
         super().exec_module(module)
-        if module.__name__ == "strapgen.support.cache":
+        if module.__name__ == "strapgen.storage.cache":
             _note_entries(module)
-        elif module.__name__ == "strapgen.library.generated_sources":
+        elif module.__name__ == "strapgen.run.generated_sources":
             _note_programs(module)
 
 

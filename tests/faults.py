@@ -44,7 +44,7 @@ SMALL_KB, LARGE_KB = (16, 3000), 64_000
 WRITE_TREE = """
 import sys
 from pathlib import Path
-from strapgen.library import standard_tree
+from strapgen.run import standard_tree
 tree = Path(sys.argv[1])
 files = {path.relative_to(tree).as_posix(): path.read_text() for path in sorted(tree.rglob("*")) if path.is_file()}
 files = {name: text for name, text in files.items() if name.rpartition("/")[0] or name == "README.md"}

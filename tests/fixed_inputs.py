@@ -8,10 +8,10 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 
-from strapgen.backends.exact import FUNCTIONS
-from strapgen.backends.fixed import FixedEvaluator
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import OPERATIONS, RESOLUTION, Constant, Program, Reference
+from strapgen.run.exact import FUNCTIONS
+from strapgen.run.fixed import FixedEvaluator
 
 
 def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Generator) -> list[np.ndarray]:

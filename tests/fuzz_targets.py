@@ -16,14 +16,14 @@ from typing import Any
 import typer.main
 
 from strapgen import cli
+from strapgen.analysis.vibration.spectrum import read_spectrum
 from strapgen.catalogue.methods import tableaux, windows
+from strapgen.firmware.check_code.foreign_arguments import read_arguments
+from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.formats import Format
 from strapgen.ir.sensor import Sensor
-from strapgen.simulation import recording
-from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.lab.recordings import recording
 from strapgen.targets.contract_lines import Contract
-from strapgen.toolchain.foreign_arguments import read_arguments
-from strapgen.vibration.spectrum import read_spectrum
 
 #: Longest time in s of a case: what takes longer was accepted, and computes.
 PATIENCE = 2.0

@@ -6,14 +6,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from strapgen.backends import of_sources
-from strapgen.backends.fixed import FixedEvaluator
 from strapgen.catalogue import Choice
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import InputError
-from strapgen.toolchain import compiler
+from strapgen.run import compiler, generated_sources
+from strapgen.run.backends import of_sources
+from strapgen.run.fixed import FixedEvaluator
 
 #: Kernels with every kind of operation that code in floating point has, with scalar inputs and with several outputs.
 DOUBLE = [

@@ -9,12 +9,13 @@ from functools import cache
 import mpmath
 import numpy as np
 
-from strapgen.backends.exact import DIGITS, Interpreter, number
-from strapgen.backends.late.unit_fixed import LateUnitOnIntegers, state_argument
-from strapgen.catalogue.methods.late_filters import polynomial
+from strapgen.design.commit_late import commit_late_sources
+from strapgen.design.commit_late.commit_late_sources import LateSources
+from strapgen.design.commit_late.late_filters import polynomial
+from strapgen.design.commit_late.late_unit_fixed import LateUnitOnIntegers, state_argument
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import commit_late_sources, generated_sources
-from strapgen.library.commit_late_sources import LateSources
+from strapgen.run import generated_sources
+from strapgen.run.exact import DIGITS, Interpreter, number
 
 #: Samples as integers, three axes each.
 Samples = Sequence[Sequence[int]]

@@ -16,13 +16,13 @@ from pathlib import Path
 
 #: The folders of the package whose code has a numerical meaning.
 FOLDERS = (
-    *("ir", "symbolic", "fixedpoint", "catalogue", "lowering", "targets", "backends"),
-    *("simulation", "analysis", "vibration", "experiments"),
+    *("ir", "kernel", "fixedpoint", "catalogue", "lowering", "targets", "run"),
+    *("lab", "analysis", "design", "navigation", "firmware"),
 )
 #: Modules in them that compute nothing: names, texts, and how other people's code is run.
 WITHOUT_NUMBERS = (
     *("catalogue/names.py", "catalogue/user/", "targets/names.py", "targets/renaming.py", "targets/lines.py"),
-    *("targets/contract.py", "targets/rendering.py", "analysis/notation.py", "lowering/names.py"),
+    *("targets/contract.py", "targets/rendering.py", "analysis/series/notation.py", "lowering/names.py"),
 )
 _SWAPPED = {
     ast.Add: ("+", "-"),

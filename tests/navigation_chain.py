@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import strapgen
-from strapgen.simulation.earth import Earth
+from strapgen.navigation.frame.earth import Earth
 
 
 @cache

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.kernel import Kernel
 
 #: Coefficients of a rate, the constant one first: sum_k rate[k] t^k, each an array of three exact numbers.
 Rate = Sequence[np.ndarray]

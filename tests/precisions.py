@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.backends import BACKENDS
+from strapgen.run.backends import BACKENDS
 from strapgen.targets.registry import BUILT_IN
 
 

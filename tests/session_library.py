@@ -25,14 +25,13 @@ from strapgen.catalogue import Choice, choose
 from strapgen.catalogue.method_names import ALGORITHMS, METHODS, VECTORS
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS
+from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
-from strapgen.support import cache
-from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.run import compiler, generated_sources
+from strapgen.run.shared_libraries import COMPILERS
+from strapgen.storage import cache
 from strapgen.targets import TARGETS
-from strapgen.toolchain import compiler
-from strapgen.toolchain.shared_libraries import COMPILERS
 
 #: The kernels that tests build, quick ones and long ones: kernel, target, and what fixed point is made for.
 FORECASTS = {

@@ -15,14 +15,17 @@ from typing import Any
 
 import pytest
 
-from strapgen.analysis import accumulation, constant_rate, error_analysis, growth, overview, ratios, series
-from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
-from strapgen.design import coning, family
-from strapgen.experiments import predicted_tables, thesis_statements, thesis_tables
+from strapgen.analysis.error_analysis import error_analysis, overview
+from strapgen.analysis.growth import growth
+from strapgen.analysis.ratios import ratios
+from strapgen.analysis.series import accumulation, constant_rate, series
+from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
+from strapgen.design.coning import coning
+from strapgen.design.coning import coning_report as coning_reports
+from strapgen.design.windows import family, window_report
 from strapgen.ir.fixed_settings import Settings
-from strapgen.reports import coning as coning_reports
-from strapgen.reports import window
-from strapgen.reports.plots import figures
+from strapgen.results import figures
+from strapgen.thesis import predicted_tables, thesis_statements, thesis_tables
 
 #: Modules that analyse, and the pure functions of a choice, a motion and a number of terms that they call.
 ANALYSES = (error_analysis, overview, ratios)
@@ -51,7 +54,11 @@ def _once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return call
 
 
-_coefficients, _filters, _window_data = _once(coning.design), _once(family.design), cache(window.window_data)
+_coefficients, _filters, _window_data = (
+    _once(coning.design),
+    _once(family.design),
+    cache(window_report.window_data),
+)
 _figures = _once(coning_reports.ShapedDrift.figures)
 _draw, _entries = figures.image, thesis_tables.entries
 _predicted, _claims = predicted_tables.predicted, ratios.claims
@@ -116,6 +123,6 @@ def shared_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coning, "design", _coefficients)
     monkeypatch.setattr(family, "design", _filters)
     monkeypatch.setattr(coning_reports.ShapedDrift, "figures", lambda drift: dict(_figures(drift)))
-    monkeypatch.setattr(window, "window_data", lambda filters: deepcopy(_window_data(filters)))
+    monkeypatch.setattr(window_report, "window_data", lambda filters: deepcopy(_window_data(filters)))
     monkeypatch.setattr(UnknownTableau, "solve", lambda self, equations="general": _solve(self, equations))
     monkeypatch.setattr(figures, "image", _image)

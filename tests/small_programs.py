@@ -11,10 +11,10 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.backends.exact import FUNCTIONS
+from strapgen.fixedpoint.floating.number_formats import NUMBERS
 from strapgen.ir.program import OPERATIONS, Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.rounding.number_formats import NUMBERS
+from strapgen.run.exact import FUNCTIONS
 
 TYPES = {"double": np.float64, "float": np.float32}
 

@@ -16,11 +16,11 @@ import pytest
 from tolerances import certified, roundoff
 
 import strapgen
-from strapgen.backends import BACKENDS
-from strapgen.simulation.runs import simulate
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.simulate.runs import simulate
+from strapgen.run.backends import BACKENDS
+from strapgen.run.shared_libraries import COMPILERS
 from strapgen.targets import BUILT_IN
-from strapgen.toolchain.shared_libraries import COMPILERS
 
 #: Every combination has its own number in the source.
 pytestmark = pytest.mark.every_combination

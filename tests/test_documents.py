@@ -26,8 +26,7 @@ from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.cli import app, main
-from strapgen.library import standard_tree
-from strapgen.toolchain import octave
+from strapgen.run import octave_process, standard_tree
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "paths").glob("*.md")])
@@ -364,7 +363,7 @@ def test_a_command_of_a_page(command, workplace, capsys, monkeypatch):
     for program in [compiler[1], *needed] if compiler else needed:
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not on this machine")
-    if "octave" in command and (reason := octave.missing()):
+    if "octave" in command and (reason := octave_process.missing()):
         pytest.skip(reason)
     if command.startswith("strapgen generate --all"):  # of all, in tests/targets
         few = [derived.program(Choice("euler", "rk4", 2))]
@@ -621,8 +620,8 @@ def test_the_kernel_and_the_command_to_add_run(capsys):
     assert f'"{inverse.name}": Recipe("{inverse.title}", "inverse", "euler_inverse"),' in CONTRIBUTING
     values = inverse.expand(dict(zip(inverse.inputs[0].elements, (1, 5, 7, 5), strict=True)))
     assert [*values["inverse"]] == [-1, -5, -7, 5]
-    exec(compile(command, "cost.py", "exec"), added := {})
-    added["cost"]("euler")
+    exec(compile(command, "steps.py", "exec"), added := {})
+    added["steps"]("euler")
     assert capsys.readouterr().out == "euler-rk4-2: 38 multiply, 30 add\n"
 
 

@@ -12,7 +12,7 @@ from fuzz_targets import TARGETS, FindingError
 
 from strapgen.evidence import fuzzing
 from strapgen.evidence.subjects import standard
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 
 @pytest.mark.parametrize("name", TARGETS)

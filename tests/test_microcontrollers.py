@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 from derived import FIXED_POINT
 
-from strapgen.experiments import cost
-from strapgen.experiments.cost import EVERYWHERE, REFERENCE, Cost
-from strapgen.library import generated_sources
-from strapgen.reports.cost import catalogue_report
-from strapgen.toolchain.processors import PROCESSORS
+from strapgen.lab.cost import cost
+from strapgen.lab.cost.cost import EVERYWHERE, REFERENCE, Cost
+from strapgen.lab.cost.cost_report import catalogue_report
+from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.run import generated_sources
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "microcontrollers.md").read_text()

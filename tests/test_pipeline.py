@@ -15,24 +15,24 @@ import strapgen
 from strapgen import pipeline, targets
 from strapgen.catalogue import Choice, choose
 from strapgen.cli import main
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.run import generated_sources
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
 #: The modules of the stages themselves.
 STAGES = (
     *("strapgen.catalogue.derivation", "strapgen.catalogue.kernels", "strapgen.catalogue.methods"),
-    *("strapgen.symbolic", "strapgen.lowering", "strapgen.fixedpoint", "strapgen.targets"),
+    *("strapgen.kernel", "strapgen.lowering", "strapgen.fixedpoint", "strapgen.targets"),
 )
 #: The modules that a choice passes through beside the stages, from the command line to the text of generated C.
 TRIP = {
-    "strapgen.cli.commands.generate",
+    "strapgen.cli.generate_command",
     "strapgen.cli.options",
     "strapgen.catalogue.choosing",
     "strapgen.catalogue.choice",
     "strapgen.cli.fixed_options",
-    "strapgen.library.generated_sources",
-    "strapgen.library.generation",
+    "strapgen.run.generated_sources",
+    "strapgen.run.generation",
     "strapgen.pipeline",
 }
 

@@ -16,7 +16,7 @@ import pytest
 from gathering import each
 
 import strapgen
-from strapgen.symbolic import evaluation, rotations
+from strapgen.kernel import evaluation, rotations
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(strapgen.__file__).parent
@@ -31,7 +31,7 @@ def in_a_new_process(code: str) -> str:
 @pytest.fixture(scope="module")
 def after_imports() -> list[str]:
     """Return in a line each the names that `dir` shows after some modules were imported, and the names with kinds."""
-    modules = ("cli", "backends.two_speed", "experiments.conformance", "vibration.spectrum")
+    modules = ("cli", "navigation.two_speed.two_speed_runner", "firmware.check_code.conformance")
     return in_a_new_process(
         f"import {', '.join(f'strapgen.{module}' for module in modules)}, strapgen as s; s.derive('euler')\n"
         "print(*dir(s))\n"
@@ -149,9 +149,9 @@ SCRIPT = """
     kernel = strapgen.derive("euler", strapgen.TABLEAUX["rk4"], 2)
     backend = strapgen.build(strapgen.generate(strapgen.lower(kernel), "c"))
     run = strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), "0.1", 1)
-    reveal_type(kernel)  # strapgen.symbolic.kernel.Kernel
-    reveal_type(backend)  # strapgen.backends.protocol.Backend
-    reveal_type(run)  # strapgen.simulation.runs.Run
+    reveal_type(kernel)  # strapgen.kernel.kernel.Kernel
+    reveal_type(backend)  # strapgen.run.protocol.Backend
+    reveal_type(run)  # strapgen.lab.simulate.runs.Run
     reveal_type(strapgen.compare)  # def (
     reveal_type(gyro.pulses)  # def (
     reveal_type(tableaux.read("heun.toml"))  # strapgen.catalogue.methods.tableau.Tableau

@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.analysis import growth, velocity_series
-from strapgen.analysis.solving import SolvedStep
+from strapgen.analysis.growth import growth
+from strapgen.analysis.series import velocity_series
+from strapgen.analysis.unknowns.solving import SolvedStep
+from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods.shaped_coning import SHAPES
-from strapgen.catalogue.methods.unknown_tableau import UnknownTableau
-from strapgen.support.brief import LINES, WIDTH, full_text, short_repr
+from strapgen.ir.notebook_display import LINES, WIDTH, full_text, short_repr
 
 ROOT = Path(__file__).resolve().parents[1]
 TURN = np.full((8, 2, 3), 0.01)
@@ -142,7 +143,9 @@ MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
     "sensors.Heating": strapgen.sensors.Heating,
     "sensors.OutputNoise": strapgen.sensors.OutputNoise,
     "sensors.MeasurementUnit": lambda: strapgen.sensors.MeasurementUnit(strapgen.sensors.read("ahrs"), 0.01),
-    "spectrum": lambda: strapgen.vibration.Spectrum(np.ones_like, {"angle_x": np.ones_like}, (1.0, 2.0)),
+    "vibration.Spectrum": lambda: strapgen.vibration.Spectrum(
+        np.ones_like, {"angle_x": np.ones_like}, (1.0, 2.0)
+    ),
     "shape": lambda: SHAPES["coning-shaped-8"],
     "design": lambda: coning_coefficients.design(3, 0, "combined"),
     "unknowns.VelocitySeries": lambda: velocity_series.series(
@@ -152,6 +155,9 @@ MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
     "stability": lambda: growth.stability(strapgen.choose("dcm", "rk1")),
     "vibration.Assessment": lambda: strapgen.vibration.of(strapgen.choose("euler", "rk1", 1)),
     "vibration.Rates": lambda: strapgen.vibration.Rates(1.0, 1.0, 0.0),
+    "vibration.RandomRates": lambda: strapgen.vibration.RandomRates(
+        *2 * [strapgen.vibration.Rates(1.0, 1.0, 0.0)]
+    ),
 }
 #: Formulas in a notebook: kernels, series, tableaux, order conditions, coefficients, windows.
 FORMULAS = (

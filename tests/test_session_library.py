@@ -10,7 +10,7 @@ from session_library import choice_by_name, line, settings_of
 
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
+from strapgen.run import generated_sources
 from strapgen.targets import TARGETS
 
 

@@ -29,10 +29,10 @@ sys.path[:0] = [str(SITE), str(SITE / "try")]
 
 import build  # noqa: E402
 import mathjax  # noqa: E402
-import navigation  # noqa: E402
 import reference_commands  # noqa: E402
 import reference_python  # noqa: E402
 import repository_pages  # noqa: E402
+import site_navigation as navigation  # noqa: E402
 import staging  # noqa: E402
 
 # Navigation

@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 from browser_checks import HEIGHT, WIDTHS, opened, served
 
-from strapgen import choose_step, derive, generate, lower, rounding_bounds, vibration
+from strapgen import choose_step, derive, generate, lower, rounding_bounds
+from strapgen.analysis import vibration
 from strapgen.catalogue.method_names import METHODS
 from strapgen.catalogue.methods import tableaux
-from strapgen.rounding import proved
+from strapgen.fixedpoint.floating import proved
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "docs" / "site"), str(ROOT / "docs" / "site" / "try")]

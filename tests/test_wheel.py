@@ -14,7 +14,7 @@ import pytest
 import session_library
 
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.support import resources
+from strapgen.storage import resources
 
 pytestmark = pytest.mark.long
 
@@ -50,7 +50,7 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
         }
         assert shipped
         assert shipped <= names
-    assert {"strapgen/cli/commands/generate.py", "strapgen/py.typed"} <= names
+    assert {"strapgen/cli/generate_command.py", "strapgen/py.typed"} <= names
     assert {f"strapgen/catalogue/methods/butcher_tableaux/{method}.toml" for method in TABLEAUX} <= names
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
 
@@ -111,7 +111,7 @@ def test_version(installed):
 #: Writes the catalogue, holds the files of the installation to it, and generates one step; all is derived once.
 WRITE_AND_CHECK = """
 from strapgen.cli import main
-from strapgen.library import standard_tree
+from strapgen.run import standard_tree
 programs = [*standard_tree.programs()]
 standard_tree.programs = lambda: iter(programs)
 one = ["generate", "euler", "--target", "c", "--out", "firmware"]

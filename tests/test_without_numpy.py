@@ -13,16 +13,16 @@ import sys
 import pytest
 
 from strapgen import derive, generate, lower, rounding_bounds
-from strapgen.rounding import proved
+from strapgen.fixedpoint.floating import proved
 
 MISSING = ("numpy", "scipy", "matplotlib", "cffi", "setuptools", "typer", "click", "rich", "flint", "gmpy2")
 HEAD = f"import json, sys\nfor name in {MISSING!r}:\n    sys.modules[name] = None\n"
 PROGRAM = """
 import strapgen
-from strapgen.analysis.error_analysis import analyse
-from strapgen.reports.error_analysis.series import series_report
-from strapgen.reports.formulas import as_latex
-from strapgen.rounding import proved
+from strapgen.analysis.error_analysis.error_analysis import analyse
+from strapgen.analysis.error_analysis.series_report import series_report
+from strapgen.results.display.formulas import as_latex
+from strapgen.fixedpoint.floating import proved
 
 choice = strapgen.choose(*{choice!r})
 kernel = strapgen.derive(choice)

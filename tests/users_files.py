@@ -8,7 +8,7 @@ from pathlib import Path
 STEP = """{beginning}
 from fractions import Fraction
 from strapgen.ir.attitude_step import Companions
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel.kernel import KernelBuilder
 from strapgen.ir.signals import Signal
 
 def algorithm():

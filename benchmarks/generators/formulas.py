@@ -10,7 +10,7 @@ from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.methods.runge_kutta import method, staged_step
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.kernel import Kernel
 
 
 def kernel(case: Case) -> Kernel:

@@ -7,27 +7,14 @@ end, `simulate` it against a closed-form motion. `backend` does the first four a
 import importlib as _importlib
 import typing as _typing
 
-from strapgen.support.version import VERSION as __version__  # noqa: N811
+from strapgen.ir.version import VERSION as __version__  # noqa: N811
 
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
-    from strapgen import vibration as vibration
-    from strapgen.analysis import unknowns as unknowns
-    from strapgen.backends import Backend as Backend
-    from strapgen.backends import Evaluator as Evaluator
-    from strapgen.backends import backend as backend
-    from strapgen.backends import build as build
-    from strapgen.backends import evaluator as evaluator
-    from strapgen.backends import exact as exact
-    from strapgen.backends import increments as _increments
-    from strapgen.backends.commit_late import CommitLate as CommitLate
-    from strapgen.backends.late.recording import recording_attitudes as recording_attitudes
-    from strapgen.backends.late.unit import GapError as GapError
-    from strapgen.backends.late.unit import SampleKind as SampleKind
-    from strapgen.backends.registry import BACKENDS as BACKENDS
-    from strapgen.backends.systems import SystemRunner as SystemRunner
-    from strapgen.backends.systems import system_runner as system_runner
-    from strapgen.backends.two_speed import TwoSpeed as TwoSpeed
+    from strapgen.analysis import vibration as vibration
+    from strapgen.analysis.algorithm import AttitudeAlgorithm as AttitudeAlgorithm
+    from strapgen.analysis.algorithm import algorithm as algorithm
+    from strapgen.analysis.unknowns import unknowns as unknowns
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
     from strapgen.catalogue import choose_step as choose_step
@@ -46,19 +33,21 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
-    from strapgen.design import family as _family
-    from strapgen.experiments import word_length as _word_length
-    from strapgen.experiments.algorithm import AttitudeAlgorithm as AttitudeAlgorithm
-    from strapgen.experiments.algorithm import algorithm as algorithm
-    from strapgen.experiments.comparison import Comparison as Comparison
-    from strapgen.experiments.comparison import Comparisons as Comparisons
-    from strapgen.experiments.comparison import compare as compare
-    from strapgen.experiments.conformance import Finding as Finding
-    from strapgen.experiments.conformance import check as check
-    from strapgen.experiments.convergence import Convergence as Convergence
-    from strapgen.experiments.convergence import converge as converge
+    from strapgen.design.commit_late.commit_late import CommitLate as CommitLate
+    from strapgen.design.commit_late.late_recording import recording_attitudes as recording_attitudes
+    from strapgen.design.commit_late.late_unit import GapError as GapError
+    from strapgen.design.commit_late.late_unit import SampleKind as SampleKind
+    from strapgen.design.windows import family as _family
+    from strapgen.firmware.check_code.conformance import Finding as Finding
+    from strapgen.firmware.check_code.conformance import check as check
+    from strapgen.fixedpoint.floating.bounds import rounding_bounds as rounding_bounds
     from strapgen.ir.attitude_step import Companions as Companions
     from strapgen.ir.attitude_step import Order as Order
+    from strapgen.ir.exceptions import CompilerError as CompilerError
+    from strapgen.ir.exceptions import InputError as InputError
+    from strapgen.ir.exceptions import InputTypeError as InputTypeError
+    from strapgen.ir.exceptions import MissingExtraError as MissingExtraError
+    from strapgen.ir.exceptions import StrapgenError as StrapgenError
     from strapgen.ir.fixed_settings import Settings as Settings
     from strapgen.ir.float_interface import RoundingBounds as RoundingBounds
     from strapgen.ir.formats import Format as Format
@@ -67,43 +56,54 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
     from strapgen.ir.sources import Sources as Sources
+    from strapgen.kernel import algebra as algebra
+    from strapgen.kernel.kernel import Kernel as Kernel
+    from strapgen.kernel.kernel import KernelBuilder as KernelBuilder
+    from strapgen.kernel.kernel import Stage as Stage
+    from strapgen.kernel.kernel import resolution as resolution
+    from strapgen.lab import sensor_errors as _sensor_errors
+    from strapgen.lab.compare.comparison import Comparison as Comparison
+    from strapgen.lab.compare.comparison import Comparisons as Comparisons
+    from strapgen.lab.compare.comparison import compare as compare
+    from strapgen.lab.converge.convergence import Convergence as Convergence
+    from strapgen.lab.converge.convergence import converge as converge
+    from strapgen.lab.motions.motions import Motion as Motion
+    from strapgen.lab.motions.motions import motion as motion
+    from strapgen.lab.motions.users_motions import read_motion as read_motion
+    from strapgen.lab.recordings.recording import History as History
+    from strapgen.lab.recordings.recording import InertialRecording as InertialRecording
+    from strapgen.lab.recordings.recording import Recording as Recording
+    from strapgen.lab.recordings.recording import propagate as propagate
+    from strapgen.lab.recordings.recording import read_increments as read_increments
+    from strapgen.lab.recordings.recording import read_inertial as read_inertial
+    from strapgen.lab.recordings.recording import read_rates as read_rates
+    from strapgen.lab.simulate.runs import Run as Run
+    from strapgen.lab.simulate.runs import simulate as simulate
+    from strapgen.lab.simulate.scipy_rotations import from_rotation as from_rotation
+    from strapgen.lab.simulate.scipy_rotations import to_rotation as to_rotation
+    from strapgen.lab.word_length import word_length as _word_length
+    from strapgen.navigation.courses.courses import Course as Course
+    from strapgen.navigation.courses.courses import course as course
+    from strapgen.navigation.systems.system_backends import SystemRunner as SystemRunner
+    from strapgen.navigation.systems.system_backends import system_runner as system_runner
+    from strapgen.navigation.systems.wiring import read_system as read_system
+    from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed as TwoSpeed
     from strapgen.pipeline import derive as derive
     from strapgen.pipeline import generate as generate
     from strapgen.pipeline import lower as lower
     from strapgen.pipeline import quantize as quantize
-    from strapgen.reports import formulas as formulas
-    from strapgen.rounding.bounds import rounding_bounds as rounding_bounds
-    from strapgen.simulation import sensor_errors as _sensor_errors
-    from strapgen.simulation.courses import Course as Course
-    from strapgen.simulation.courses import course as course
-    from strapgen.simulation.motions import Motion as Motion
-    from strapgen.simulation.motions import motion as motion
-    from strapgen.simulation.recording import History as History
-    from strapgen.simulation.recording import InertialRecording as InertialRecording
-    from strapgen.simulation.recording import Recording as Recording
-    from strapgen.simulation.recording import propagate as propagate
-    from strapgen.simulation.recording import read_increments as read_increments
-    from strapgen.simulation.recording import read_inertial as read_inertial
-    from strapgen.simulation.recording import read_rates as read_rates
-    from strapgen.simulation.runs import Run as Run
-    from strapgen.simulation.runs import simulate as simulate
-    from strapgen.simulation.scipy_rotations import from_rotation as from_rotation
-    from strapgen.simulation.scipy_rotations import to_rotation as to_rotation
-    from strapgen.simulation.users_motions import read_motion as read_motion
-    from strapgen.support.exceptions import CompilerError as CompilerError
-    from strapgen.support.exceptions import InputError as InputError
-    from strapgen.support.exceptions import InputTypeError as InputTypeError
-    from strapgen.support.exceptions import MissingExtraError as MissingExtraError
-    from strapgen.support.exceptions import StrapgenError as StrapgenError
-    from strapgen.symbolic import algebra as algebra
-    from strapgen.symbolic.kernel import Kernel as Kernel
-    from strapgen.symbolic.kernel import KernelBuilder as KernelBuilder
-    from strapgen.symbolic.kernel import Stage as Stage
-    from strapgen.symbolic.kernel import resolution as resolution
-    from strapgen.systems.wiring import read_system as read_system
+    from strapgen.results.display import formulas as formulas
+    from strapgen.run import exact as exact
+    from strapgen.run import increments as _increments
+    from strapgen.run.backends import Backend as Backend
+    from strapgen.run.backends import Evaluator as Evaluator
+    from strapgen.run.backends import backend as backend
+    from strapgen.run.backends import build as build
+    from strapgen.run.backends import evaluator as evaluator
+    from strapgen.run.compiler import compile_together as compile_together
+    from strapgen.run.registry import BACKENDS as BACKENDS
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
-    from strapgen.toolchain.compiler import compile_together as compile_together
 
     gyro = _increments
     sensors = _sensor_errors
@@ -112,25 +112,25 @@ if _typing.TYPE_CHECKING:
 
 #: Public names by the modules that define them.
 _NAMES = {
-    "backends": (
+    "run.backends": (
         "Backend",
         "Evaluator",
         "backend",
         "build",
         "evaluator",
     ),
-    "backends.commit_late": ("CommitLate",),
-    "backends.late.recording": ("recording_attitudes",),
-    "backends.late.unit": (
+    "design.commit_late.commit_late": ("CommitLate",),
+    "design.commit_late.late_recording": ("recording_attitudes",),
+    "design.commit_late.late_unit": (
         "GapError",
         "SampleKind",
     ),
-    "backends.registry": ("BACKENDS",),
-    "backends.systems": (
+    "run.registry": ("BACKENDS",),
+    "navigation.systems.system_backends": (
         "SystemRunner",
         "system_runner",
     ),
-    "backends.two_speed": ("TwoSpeed",),
+    "navigation.two_speed.two_speed_runner": ("TwoSpeed",),
     "catalogue": (
         "Choice",
         "choose",
@@ -152,20 +152,20 @@ _NAMES = {
     "catalogue.methods.tableaux": ("TABLEAUX",),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
-    "experiments.algorithm": (
+    "analysis.algorithm": (
         "AttitudeAlgorithm",
         "algorithm",
     ),
-    "experiments.comparison": (
+    "lab.compare.comparison": (
         "Comparison",
         "Comparisons",
         "compare",
     ),
-    "experiments.conformance": (
+    "firmware.check_code.conformance": (
         "Finding",
         "check",
     ),
-    "experiments.convergence": (
+    "lab.converge.convergence": (
         "Convergence",
         "converge",
     ),
@@ -187,16 +187,16 @@ _NAMES = {
         "lower",
         "quantize",
     ),
-    "rounding.bounds": ("rounding_bounds",),
-    "simulation.courses": (
+    "fixedpoint.floating.bounds": ("rounding_bounds",),
+    "navigation.courses.courses": (
         "Course",
         "course",
     ),
-    "simulation.motions": (
+    "lab.motions.motions": (
         "Motion",
         "motion",
     ),
-    "simulation.recording": (
+    "lab.recordings.recording": (
         "History",
         "InertialRecording",
         "Recording",
@@ -205,48 +205,48 @@ _NAMES = {
         "read_inertial",
         "read_rates",
     ),
-    "simulation.runs": (
+    "lab.simulate.runs": (
         "Run",
         "simulate",
     ),
-    "simulation.scipy_rotations": (
+    "lab.simulate.scipy_rotations": (
         "from_rotation",
         "to_rotation",
     ),
-    "simulation.users_motions": ("read_motion",),
-    "support.exceptions": (
+    "lab.motions.users_motions": ("read_motion",),
+    "ir.exceptions": (
         "CompilerError",
         "InputError",
         "InputTypeError",
         "MissingExtraError",
         "StrapgenError",
     ),
-    "symbolic.kernel": (
+    "kernel.kernel": (
         "Kernel",
         "KernelBuilder",
         "Stage",
         "resolution",
     ),
-    "systems.wiring": ("read_system",),
+    "navigation.systems.wiring": ("read_system",),
     "targets.registry": (
         "TARGETS",
         "Target",
     ),
-    "toolchain.compiler": ("compile_together",),
+    "run.compiler": ("compile_together",),
 }
 #: Modules whose functions belong together, by the names that they have here.
 _NAMESPACES = {
-    "algebra": "symbolic.algebra",
-    "exact": "backends.exact",
-    "formulas": "reports.formulas",
-    "gyro": "backends.increments",
+    "algebra": "kernel.algebra",
+    "exact": "run.exact",
+    "formulas": "results.display.formulas",
+    "gyro": "run.increments",
     "runge_kutta": "catalogue.methods.runge_kutta",
-    "sensors": "simulation.sensor_errors",
-    "study": "experiments.word_length",
+    "sensors": "lab.sensor_errors",
+    "study": "lab.word_length.word_length",
     "tableaux": "catalogue.methods.tableaux",
-    "unknowns": "analysis.unknowns",
-    "vibration": "vibration",
-    "window_design": "design.family",
+    "unknowns": "analysis.unknowns.unknowns",
+    "vibration": "analysis.vibration",
+    "window_design": "design.windows.family",
     "windows": "catalogue.methods.windows",
 }
 _EXPORTS = {name: module for module, names in _NAMES.items() for name in names}

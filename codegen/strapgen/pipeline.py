@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
 from strapgen.catalogue import Choice
+from strapgen.ir import stage_arguments
+from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.support import stages
-from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.support.suggestions import some
-from strapgen.support.timing import timed
+from strapgen.ir.suggestions import some
+from strapgen.ir.timing import timed
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from strapgen.catalogue.choice import AnyMethod
-    from strapgen.catalogue.layout import Layout
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.ir.recipe import Description
+    from strapgen.kernel.kernel import Kernel
 
 
 def lowered(choice: Choice) -> Program:
@@ -59,7 +59,7 @@ def derive(
     previous: int | None = None,
     ahead: int | None = None,
     constants: Mapping[str, Any] | None = None,
-    layout: str | Path | Layout | None = None,
+    layout: str | Path | Description | None = None,
 ) -> Kernel:
     """Derive an algorithm exactly.
 
@@ -79,7 +79,7 @@ def derive(
     constants : mapping of str to number, or to an array or nested sequence of numbers, optional
         Values of inputs of a kernel that is no attitude algorithm, in their units and row by row, by name. These are
         then no inputs; what is multiplied by zero vanishes.
-    layout : path or Layout, optional
+    layout : path or Description, optional
         Of the kernels "separate" and "torques": the TOML file that describes the three gyros.
 
     Raises
@@ -97,7 +97,7 @@ def derive(
     (difference/2 + nominal,)
     """
     if not isinstance(algorithm, Choice):
-        stages.require("derive", algorithm, str, os.PathLike, Choice)
+        stage_arguments.require("derive", algorithm, str, os.PathLike, Choice)
         algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants, layout)
     elif rates or any(x is not None for x in (method, increments, previous, ahead, constants, layout)):
         raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
@@ -123,9 +123,9 @@ def lower(kernel: Kernel) -> Program:
     0
     """
     from strapgen import lowering  # loads SymPy, as only deriving and lowering do
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
-    stages.require("lower", kernel, Kernel)
+    stage_arguments.require("lower", kernel, Kernel)
     kernel.require_known()
     with timed("lower", kernel.name):
         return lowering.lower(kernel)
@@ -151,7 +151,7 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     >>> str(fixed.formats["state"]), float(fixed.error_bounds["next"] * 2**30) < 1
     ('Q1.30', True)
     """
-    stages.require("quantize", program, Program)
+    stage_arguments.require("quantize", program, Program)
     _require_settings(settings)
     with timed("quantize", program.kernel):
         return fixedpoint.quantize(program, settings or Settings())
@@ -178,7 +178,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     >>> sorted(generate(lower(derive("euler")), "c").step_files)
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
-    stages.require("generate", program, Program, FixedProgram)
+    stage_arguments.require("generate", program, Program, FixedProgram)
     _require_target(target, settings)
     if isinstance(program, Program) and targets.TARGETS[target].fixed:
         program = quantize(program, settings)
@@ -193,11 +193,11 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
 def _require_target(target: Any, settings: Any) -> None:
     if not isinstance(target, str):
         names = some(targets.TARGETS)
-        raise InputTypeError(f"target is {stages.describe(target)}; a name is needed: {names}")
+        raise InputTypeError(f"target is {stage_arguments.describe(target)}; a name is needed: {names}")
     _require_settings(settings)
     targets.require(target, settings)
 
 
 def _require_settings(settings: Any) -> None:
     if settings is not None and not isinstance(settings, Settings):
-        raise InputTypeError(f"settings is {stages.describe(settings)}; strapgen.Settings is needed")
+        raise InputTypeError(f"settings is {stage_arguments.describe(settings)}; strapgen.Settings is needed")

@@ -22,8 +22,8 @@ import mathjax  # noqa: E402
 import reference_commands  # noqa: E402
 import reference_python  # noqa: E402
 import vendor  # noqa: E402
-from navigation import GENERATED, SECTIONS, site_file  # noqa: E402
 from repository_pages import MOST_PAGES, file_page, folder_page, tracked  # noqa: E402
+from site_navigation import GENERATED, SECTIONS, site_file  # noqa: E402
 from staging import IMAGES, Stage, home, landing, rewritten, with_program  # noqa: E402
 
 #: The page that runs strapgen in the browser, and its part of the page that is not Markdown.

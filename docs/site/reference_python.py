@@ -11,17 +11,17 @@ from typing import Any
 #: Titles of the pages by the folder of the package that defines the names, in the order of a reader's first day.
 GROUPS = {
     "pipeline": "The stages: derive, lower, quantize, generate",
-    "backends": "Back ends, which run generated code",
+    "run": "Back ends, which run generated code",
     "catalogue": "Algorithms, methods and windows",
-    "simulation": "Motions, runs and recordings",
-    "experiments": "Comparisons, orders and checks",
-    "symbolic": "Kernels of your own",
-    "ir": "Programs, formats and sources",
-    "rounding": "Bounds of rounding in floating point",
-    "systems": "Described systems",
+    "lab": "Motions, runs, recordings and comparisons",
+    "analysis": "Algorithms as objects",
+    "design": "Windows that answer late and now",
+    "navigation": "Two speeds, described systems and courses",
+    "firmware": "Checks of code",
+    "kernel": "Kernels of your own",
+    "ir": "Programs, formats, sources and errors",
+    "fixedpoint": "Bounds of rounding in floating point",
     "targets": "Targets, which print code",
-    "toolchain": "The compiler",
-    "support": "Errors",
 }
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 #: A folder with more files than this is listed, but its files are plain copies in place of pages.
-MOST_PAGES = 60
+MOST_PAGES = 70
 _LEXERS = {
     **{
         ".py": "python",

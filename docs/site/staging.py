@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from navigation import SECTIONS, Section, document, pages_present, questions, site_file
+from site_navigation import SECTIONS, Section, document, pages_present, questions, site_file
 
 #: A link or a picture in Markdown, up to its target; and the target of a picture in HTML.
 _LINK = re.compile(r"(\]\()([^)\s#]+)(#[^)\s]*)?(\))")

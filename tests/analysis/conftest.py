@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from strapgen.backends import backend
-from strapgen.simulation.runs import simulate
+from strapgen.lab.simulate.runs import simulate
+from strapgen.run.backends import backend
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "algorithms"
 

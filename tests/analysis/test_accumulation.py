@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from strapgen.analysis.accumulation import accumulate
-from strapgen.analysis.agreement import SETTINGS, agreement
-from strapgen.analysis.error_rate import error_rate
-from strapgen.analysis.motion_rates import TIME
-from strapgen.analysis.series import STEP
+from strapgen.analysis.agreement.agreement import SETTINGS, agreement
+from strapgen.analysis.agreement.agreement_report import agreement_text
+from strapgen.analysis.series.accumulation import accumulate
+from strapgen.analysis.series.error_rate import error_rate
+from strapgen.analysis.series.motion_rates import TIME
+from strapgen.analysis.series.series import STEP
 from strapgen.catalogue import MOTIONS, choose, choose_step
-from strapgen.reports.error_analysis.agreement import agreement_text
-from strapgen.simulation.motions import motion
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.motions import motion
 
 a, b, g = sp.symbols("a b g")
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from strapgen.analysis.constant_rate import ANGLE, STEPS, ConstantRate, constant_rate, errors_after
-from strapgen.analysis.prediction import parts_of
-from strapgen.backends import exact
+from strapgen.analysis.series.constant_rate import ANGLE, STEPS, ConstantRate, constant_rate, errors_after
+from strapgen.analysis.series.prediction import parts_of
 from strapgen.catalogue import ALGORITHMS, choose
-from strapgen.simulation.exact_attitudes import exact_attitudes
-from strapgen.simulation.motions import motion
+from strapgen.lab.motions.exact_attitudes import exact_attitudes
+from strapgen.lab.motions.motions import motion
+from strapgen.run import exact
 
 RATES = {
     "one axis": {"y_deg_s": 10},

@@ -10,14 +10,14 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.analysis.constant_rate import constant_rate
-from strapgen.analysis.growth import contraction, growth, stability
-from strapgen.analysis.motion_rates import TIME, model, parameters
-from strapgen.backends import backend
+from strapgen.analysis.growth.growth import contraction, growth, stability
+from strapgen.analysis.growth.growth_report import stability_text
+from strapgen.analysis.series.constant_rate import constant_rate
+from strapgen.analysis.series.motion_rates import TIME, model, parameters
 from strapgen.catalogue import ALGORITHMS, choose, choose_step
-from strapgen.reports.error_analysis.growth import stability_text
-from strapgen.simulation.motions import motion
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.motions import motion
+from strapgen.run.backends import backend
 
 SQUARE = sum(w**2 for w in sp.symbols("w_x w_y w_z"))
 

@@ -10,12 +10,12 @@ import mpmath
 import pytest
 import sympy as sp
 
-from strapgen.analysis import invariants
-from strapgen.analysis.one_step import errors, step
-from strapgen.backends import exact
+from strapgen.analysis.series import invariants
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
-from strapgen.symbolic.covariants import Frame
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.covariants import Frame
+from strapgen.kernel.kernel import Kernel
+from strapgen.lab.step_series.one_step import errors, step
+from strapgen.run import exact
 
 CASES = [
     ("rk1", 2, 0),

@@ -6,11 +6,11 @@ import mpmath
 import pytest
 import sympy as sp
 
-from strapgen.analysis.orthonormalization import ERROR, effect
-from strapgen.backends import exact
-from strapgen.backends.exact import interpreter
+from strapgen.analysis.series.orthonormalization import ERROR, effect
 from strapgen.catalogue import orthonormalizations
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.run import exact
+from strapgen.run.exact import interpreter
 
 P = ERROR
 K, Y = (P - P.T) / 2, (P + P.T) / 2

@@ -7,11 +7,11 @@ import json
 import pytest
 import sympy as sp
 
-from strapgen.analysis.overview import choices, methods, overview
+from strapgen.analysis.error_analysis.overview import choices, methods, overview
+from strapgen.analysis.error_analysis.overview_report import overview_text
 from strapgen.catalogue import METHODS, choose
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
-from strapgen.reports.error_analysis.overview import overview_text
 
 
 @pytest.mark.long

@@ -10,7 +10,8 @@ import sympy as sp
 
 import strapgen
 from strapgen import catalogue
-from strapgen.analysis.quantization_noise import (
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.step_series.quantization_noise import (
     PULSE,
     RATE,
     STEP,
@@ -19,7 +20,6 @@ from strapgen.analysis.quantization_noise import (
     polynomial_noise,
     quantization_noise,
 )
-from strapgen.support.exceptions import InputError
 
 c = sp.Symbol("c")
 THIRD = sp.Rational(1, 3)

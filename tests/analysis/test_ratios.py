@@ -7,10 +7,10 @@ import math
 import pytest
 import sympy as sp
 
-from strapgen.analysis.constant_rate import ANGLE, constant_rate
-from strapgen.analysis.ratios import claims, quotient, versus
+from strapgen.analysis.ratios.ratios import claims, quotient, versus
+from strapgen.analysis.ratios.ratios_report import claims_text, ratio_latex, ratio_text
+from strapgen.analysis.series.constant_rate import ANGLE, constant_rate
 from strapgen.catalogue import choose
-from strapgen.reports.error_analysis.ratios import claims_text, ratio_latex, ratio_text
 
 R = sp.Rational
 

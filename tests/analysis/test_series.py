@@ -7,12 +7,12 @@ import json
 import pytest
 import sympy as sp
 
-from strapgen.analysis.error_analysis import analyse
-from strapgen.analysis.notation import LATEX, covariant_text
-from strapgen.analysis.series import MOTIONS, STEP, series
+from strapgen.analysis.error_analysis.error_analysis import analyse
+from strapgen.analysis.error_analysis.series_report import series_latex, series_text
+from strapgen.analysis.series.notation import LATEX, covariant_text
+from strapgen.analysis.series.series import MOTIONS, STEP, series
 from strapgen.catalogue import ALGORITHMS, METHODS, choose, choose_step, derive, enough, nodes
-from strapgen.reports.error_analysis.series import series_latex, series_text
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 W = sp.symbols("w_x w_y w_z")
 RANK = {"rk1": 1, "rk2": 2, "rk3": 3, "rk4": 4}

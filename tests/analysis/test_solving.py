@@ -12,16 +12,17 @@ import sympy as sp
 from gathering import each
 
 import strapgen
-from strapgen.analysis import velocity_conditions, velocity_series
-from strapgen.analysis.conditions import conditions
-from strapgen.analysis.demands import Demand
-from strapgen.analysis.one_step import step
-from strapgen.analysis.series import series
-from strapgen.analysis.solving import SolvedStep, solve
+from strapgen.analysis.series import velocity_series
+from strapgen.analysis.series.series import series
+from strapgen.analysis.unknowns import velocity_conditions
+from strapgen.analysis.unknowns.conditions import conditions
+from strapgen.analysis.unknowns.demands import Demand
+from strapgen.analysis.unknowns.solving import SolvedStep, solve
 from strapgen.catalogue.choice import Choice
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.cli import main
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.step_series.one_step import step
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = str(ROOT / "examples" / "three_samples.py")

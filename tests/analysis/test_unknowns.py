@@ -12,10 +12,10 @@ import sympy as sp
 from gathering import each
 
 import strapgen
-from strapgen import vibration
-from strapgen.analysis.series import ErrorSeries, series
+from strapgen.analysis import vibration
+from strapgen.analysis.series.series import ErrorSeries, series
 from strapgen.cli import main
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 EXAMPLE = str(Path(__file__).resolve().parents[2] / "examples" / "three_samples.py")
 A, B = sp.symbols("a b", real=True)

@@ -10,8 +10,8 @@ from gathering import each
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, KERNELS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import RESOLUTION
-from strapgen.support.exceptions import InputError
 
 STANDARD = catalogue.standard()
 EVERY = each("choice", STANDARD, ids=lambda choice: choice.kernel)

@@ -14,20 +14,21 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import catalogue, vibration
-from strapgen.analysis.constant_rate import constant_rate
-from strapgen.analysis.prediction import predict
-from strapgen.analysis.series import series
-from strapgen.backends import backend
+from strapgen import catalogue
+from strapgen.analysis import vibration
+from strapgen.analysis.series.constant_rate import constant_rate
+from strapgen.analysis.series.prediction import predict
+from strapgen.analysis.series.series import series
 from strapgen.catalogue.methods import tableaux
 from strapgen.cli import main
-from strapgen.experiments import conformance
-from strapgen.experiments.comparison import compare
-from strapgen.experiments.convergence import converge
-from strapgen.library import generated_sources
-from strapgen.simulation.motions import GENERAL
-from strapgen.support.exceptions import InputError
-from strapgen.symbolic.kernel import Kernel
+from strapgen.firmware.check_code import conformance
+from strapgen.ir.exceptions import InputError
+from strapgen.kernel.kernel import Kernel
+from strapgen.lab.compare.comparison import compare
+from strapgen.lab.converge.convergence import converge
+from strapgen.lab.motions.motions import GENERAL
+from strapgen.run import generated_sources
+from strapgen.run.backends import backend
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
 FILE = str(Path(__file__).resolve().parents[1] / "data" / "algorithms" / "one_name.py")

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strapgen.catalogue.constants import number_text, options, read
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError, InputTypeError
 
 
 @each("value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"])

@@ -14,11 +14,11 @@ from precisions import single
 
 import strapgen
 from strapgen.catalogue import choose
-from strapgen.catalogue.kernels.gyro_model import source_structure
-from strapgen.catalogue.kernels.imu_errors import imu_compensate
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import InputError
+from strapgen.navigation.instruments.gyro_model import source_structure
+from strapgen.navigation.instruments.imu_errors import imu_compensate
+from strapgen.run import generated_sources
 
 #: No term of the error model has products of increments.
 NO_PRODUCTS = {

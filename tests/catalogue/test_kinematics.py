@@ -6,7 +6,7 @@ import sympy as sp
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, KINEMATICS
-from strapgen.symbolic.kernel import symbols
+from strapgen.kernel.kernel import symbols
 
 WX, WY, WZ = W = sp.symbols("wx wy wz", real=True)
 RATE = sp.Matrix(W)

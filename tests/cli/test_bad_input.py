@@ -12,7 +12,7 @@ import pytest
 from gathering import each
 
 from strapgen.cli import main
-from strapgen.reports.plots import figures
+from strapgen.results import figures
 
 # A warning would be a second line on stderr.
 pytestmark = pytest.mark.filterwarnings("error")
@@ -118,7 +118,7 @@ BAD = {
     # Commands and options
     "check": "Missing argument 'ALGORITHM': dcm, euler or cayley-klein, or a Python file of your own",
     "simulat": "No such command 'simulat' (did you mean simulate?). Allowed: list, derive, ",
-    "study wordlength": "No such command 'wordlength' (did you mean word-length?). Allowed: word-length, system",
+    "study wordlength": "No such command 'wordlength' (did you mean word-length?). Allowed: word-length, ",
     "simulate euler --methods rk4": "No such option: --methods (did you mean --method?); --help shows all",
     "simulate euler --method": "--method needs a value, NAME: integration method; strapgen list methods shows all",
     "simulate euler --method --increments 2": "--method needs a value, NAME: integration method",
@@ -716,11 +716,11 @@ def test_python_s_warnings_of_a_coefficient_are_not_shown(entry, folder, capsys)
     "source", ["--motion constant --set x_deg_s=1 --step 1e-3 --duration 3e3", "--increments-csv log.csv"]
 )
 def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
-    from strapgen.backends import Backend
-    from strapgen.cli.commands import simulate
+    from strapgen.lab.simulate import simulate_command
+    from strapgen.run.backends import Backend
 
     Path("log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(102)))
-    monkeypatch.setattr(simulate, "_MOST_RECORDS", 2_000_000 if "motion" in source else 50)
+    monkeypatch.setattr(simulate_command, "_MOST_RECORDS", 2_000_000 if "motion" in source else 50)
     with monkeypatch.context() as patch:
         patch.setattr(Backend, "propagate", None)  # the run does not begin
         with pytest.raises(SystemExit) as stop:
@@ -736,7 +736,7 @@ def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
 
 
 def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
-    from strapgen.simulation import runs
+    from strapgen.lab.simulate import runs
 
     def exhausted(*_: object) -> None:
         raise MemoryError

@@ -26,19 +26,19 @@ from tolerances import certified
 
 import strapgen
 from strapgen import catalogue, pipeline
-from strapgen.backends import BACKENDS, DEFAULT_BACKENDS, fitted
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods import coefficients, coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
-from strapgen.experiments.thesis_tables import TABLES
-from strapgen.library import standard_tree
-from strapgen.reports import formulas
-from strapgen.simulation.courses import NavigationFrame, course
-from strapgen.simulation.motions import motion as make_motion
-from strapgen.simulation.recording import read_inertial
-from strapgen.simulation.runs import largest_increment
+from strapgen.lab.motions.motions import motion as make_motion
+from strapgen.lab.recordings.recording import read_inertial
+from strapgen.lab.simulate.runs import largest_increment
+from strapgen.navigation.courses.courses import NavigationFrame, course
+from strapgen.results.display import formulas
+from strapgen.run import standard_tree
+from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, fitted
 from strapgen.targets import TARGETS
+from strapgen.thesis.thesis_tables import TABLES
 
 pytestmark = pytest.mark.filterwarnings("error")
 

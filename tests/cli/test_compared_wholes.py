@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapgen.backends.systems import system_runner
-from strapgen.backends.two_speed import TwoSpeed
 from strapgen.cli import main
-from strapgen.experiments.systems.loop_files import LoopFiles
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.support.exceptions import InputError
-from strapgen.systems.two_speed_sources import loops
-from strapgen.systems.wiring import described
+from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.wiring import described
+from strapgen.navigation.two_speed.loop_files import LoopFiles
+from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+from strapgen.navigation.two_speed.two_speed_sources import loops
 
 GYRO = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --duration 1"

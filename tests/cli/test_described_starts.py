@@ -80,9 +80,9 @@ def test_run_of_too_many_cycles_is_refused_before_it_begins(duration, system, ca
 
 
 def test_records_of_blocks_are_those_of_one_run(system, capsys, monkeypatch):
-    from strapgen.backends.systems import runner
+    from strapgen.navigation.systems import system_runner
 
     line = f"simulate {system('euler-update')} {CONING} --duration 1.5 --record 0.05 --format json"
     whole = json.loads(says(line, capsys)[1])
-    monkeypatch.setattr(runner, "BLOCK", 7)
+    monkeypatch.setattr(system_runner, "BLOCK", 7)
     assert json.loads(says(line, capsys)[1]) == whole

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from gathering import each
 
-from strapgen.backends import BACKENDS
 from strapgen.cli import main
-from strapgen.reports.plots import figures
+from strapgen.results import figures
+from strapgen.run.backends import BACKENDS
 
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
 WAVE = "--step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"

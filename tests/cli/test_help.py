@@ -8,9 +8,10 @@ from collections import defaultdict
 import pytest
 from typer.main import get_command
 
-from strapgen.cli import COMMANDS, app
+from strapgen.cli import app
+from strapgen.cli import headings as groups
 from strapgen.cli.help import PlainCommand
-from strapgen.support.suggestions import SYNONYMS
+from strapgen.ir.suggestions import SYNONYMS
 
 
 def commands(group, path=()):
@@ -50,7 +51,7 @@ def test_commands_stand_in_groups_with_a_whole_sentence_each(monkeypatch):
         ]
         for heading in headings[-5:]
     }
-    assert shown == {heading: list(names) for heading, names in COMMANDS.items()}
+    assert shown == groups()
     assert not [line for line in lines[1:] if line.endswith("...")]
     assert "stress" not in " ".join(lines)
 
@@ -95,7 +96,7 @@ def test_no_option_is_declared_in_the_plural():
 
 def test_every_synonym_leads_to_a_name_that_exists():
     from strapgen import catalogue
-    from strapgen.backends import BACKENDS
+    from strapgen.run.backends import BACKENDS
     from strapgen.targets import TARGETS
 
     names = {

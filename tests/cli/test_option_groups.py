@@ -12,7 +12,7 @@ from typer.main import get_command
 
 from strapgen.cli import app
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.sample_source import SampleSource
+from strapgen.lab.simulate.sample_source import SampleSource
 
 Speed = Annotated[str, typer.Option("--speed", help="Speed in m/s.")]
 Course = Annotated[str | None, typer.Option("--course", help="Course in deg.")]

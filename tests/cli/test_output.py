@@ -10,7 +10,7 @@ from gathering import each
 
 from strapgen.cli import main
 from strapgen.cli.output import Output
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 RUN = "--motion constant --set x_deg_s=1 --step 0.125 --duration 1"
 WITH_PLOTS = (

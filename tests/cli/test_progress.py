@@ -72,7 +72,7 @@ def test_a_file_that_takes_its_time_shows_that_it_is_derived(tmp_path, impatient
 
 def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_path, capsys):
     from strapgen.cli import main
-    from strapgen.simulation import recording
+    from strapgen.lab.recordings import recording
 
     (tmp_path / "log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(4)))
     stream = Terminal()

@@ -10,8 +10,8 @@ import pytest
 from gathering import each
 from typer.main import get_command
 
-from strapgen.backends import BACKENDS
 from strapgen.cli import app, main
+from strapgen.run.backends import BACKENDS
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 PROMISED = json.loads((DATA / "promised_command_line.json").read_text())

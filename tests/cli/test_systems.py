@@ -11,7 +11,7 @@ import pytest
 from small_systems import COUNTING
 
 from strapgen.cli import main
-from strapgen.simulation.motions import motion
+from strapgen.lab.motions.motions import motion
 
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10"
 

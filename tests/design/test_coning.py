@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 import strapgen
+from strapgen.analysis.vibration import Spectrum
 from strapgen.catalogue.methods import coning_drift, shaped_coning
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.shaped_coning import SHAPES, ShapedConing
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design import coning
-from strapgen.design.band_grid import REAL
-from strapgen.design.coning import ConingBrief, annulling, design
-from strapgen.design.coning_file import written
-from strapgen.design.lines import Lines, of_spectrum
-from strapgen.simulation.drift import steady_drift
-from strapgen.simulation.motions import IntegratedMotion
-from strapgen.simulation.rate_motions.rate_profiles import CosineSum
-from strapgen.simulation.reference_attitudes import ReferenceAttitude
-from strapgen.support.exceptions import InputError
-from strapgen.vibration import Spectrum
+from strapgen.design.coning import coning
+from strapgen.design.coning.coning import ConingBrief, annulling, design
+from strapgen.design.coning.coning_file import written
+from strapgen.design.coning.lines import Lines, of_spectrum
+from strapgen.design.filters.band_grid import REAL
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.motions import IntegratedMotion
+from strapgen.lab.motions.rate_profiles import CosineSum
+from strapgen.lab.motions.reference_attitudes import ReferenceAttitude
+from strapgen.lab.simulate.drift import steady_drift
 
 BAND = Fraction(13, 10)
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 import strapgen
+from strapgen.analysis.vibration.spectrum import Spectrum
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design import family_file, spectra
-from strapgen.design.band_grid import BITS, ONE
-from strapgen.design.family import FamilyBrief, design
-from strapgen.simulation.drift import drift
-from strapgen.support.exceptions import InputError
-from strapgen.vibration.spectrum import Spectrum
+from strapgen.design.filters import spectra
+from strapgen.design.filters.band_grid import BITS, ONE
+from strapgen.design.windows import family_file
+from strapgen.design.windows.family import FamilyBrief, design
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.simulate.drift import drift
 
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
 SMALL = FamilyBrief(2, 2, Fraction(1), conditions=3, degree=2)

@@ -7,9 +7,9 @@ from fractions import Fraction
 import pytest
 
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design import lawson
-from strapgen.design.band_grid import ONE, integer, magnitude, mean_grid
-from strapgen.design.unknowns import Shape
+from strapgen.design.filters import lawson
+from strapgen.design.filters.band_grid import ONE, integer, magnitude, mean_grid
+from strapgen.design.filters.unknowns import Shape
 
 BAND = Fraction(13, 10)
 

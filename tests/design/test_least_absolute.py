@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from strapgen.design import least_absolute
-from strapgen.design.band_grid import BITS, REAL
-from strapgen.design.exchange import Answers
-from strapgen.support.exceptions import InputError
+from strapgen.design.filters import least_absolute
+from strapgen.design.filters.band_grid import BITS, REAL
+from strapgen.design.filters.exchange import Answers
+from strapgen.ir.exceptions import InputError
 
 
 def integers(values) -> list[int]:

@@ -10,10 +10,10 @@ from scipy.special import spherical_jn
 
 from strapgen.catalogue.methods import window_conditions
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design import mean_square
-from strapgen.design.band_grid import ONE, REAL
-from strapgen.design.unknowns import Shape
-from strapgen.support.exceptions import InputError
+from strapgen.design.filters import mean_square
+from strapgen.design.filters.band_grid import ONE, REAL
+from strapgen.design.filters.unknowns import Shape
+from strapgen.ir.exceptions import InputError
 
 BAND = Fraction(13, 10)
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))

@@ -8,11 +8,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from strapgen.design import exchange, minimax
-from strapgen.design.band_grid import REAL
-from strapgen.design.rounding import rounded
-from strapgen.design.unknowns import Shape, Unknowns
-from strapgen.support.exceptions import InputError, MissingExtraError
+from strapgen.design.filters import exchange, minimax
+from strapgen.design.filters.band_grid import REAL
+from strapgen.design.filters.rounding import rounded
+from strapgen.design.filters.unknowns import Shape, Unknowns
+from strapgen.ir.exceptions import InputError, MissingExtraError
 
 BAND = Fraction(13, 10)
 

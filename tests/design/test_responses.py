@@ -13,8 +13,8 @@ from scipy.special import spherical_jn
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.design import responses
-from strapgen.design.band_grid import ONE, REAL, BandGrid
+from strapgen.design.filters import responses
+from strapgen.design.filters.band_grid import ONE, REAL, BandGrid
 
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
 

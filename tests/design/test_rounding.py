@@ -11,11 +11,11 @@ import pytest
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.design import responses
-from strapgen.design.rounding import rounded
-from strapgen.design.unknowns import Shape, Unknowns
-from strapgen.design.words import in_words
-from strapgen.support.exceptions import InputError
+from strapgen.design.filters import responses
+from strapgen.design.filters.rounding import rounded
+from strapgen.design.filters.unknowns import Shape, Unknowns
+from strapgen.design.filters.words import in_words
+from strapgen.ir.exceptions import InputError
 
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
 

@@ -12,7 +12,7 @@ from strapgen.catalogue import choose, choose_step
 from strapgen.evidence import actual_errors
 from strapgen.evidence.balls import ball
 from strapgen.evidence.subjects import Subject
-from strapgen.experiments.vectors import vectors_of_choice
+from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.ir.fixed_settings import Settings
 
 flint = pytest.importorskip("flint")

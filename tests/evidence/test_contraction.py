@@ -16,7 +16,7 @@ import pytest
 from derived import program
 
 from strapgen.catalogue import choose_step
-from strapgen.library import generated_sources
+from strapgen.run import generated_sources
 
 CPU = Path("/proc/cpuinfo")
 pytestmark = pytest.mark.skipif(

@@ -13,9 +13,9 @@ from strapgen.catalogue import Choice, choose, choose_step
 from strapgen.evidence import gappa
 from strapgen.evidence.gappa_floating import floating_script
 from strapgen.evidence.gappa_scripts import CannotFollowError, Script
+from strapgen.fixedpoint.floating.bounds import rounding_bounds
+from strapgen.fixedpoint.floating.number_formats import NUMBERS
 from strapgen.ir.program import Program
-from strapgen.rounding.bounds import rounding_bounds
-from strapgen.rounding.number_formats import NUMBERS
 
 pytestmark = pytest.mark.skipif(not gappa.TOOL.installed(), reason="gappa is not installed")
 

@@ -14,15 +14,15 @@ import pytest
 from strapgen.catalogue import Choice, choose
 from strapgen.evidence import style
 from strapgen.evidence.subjects import Subject
-from strapgen.experiments import project, two_speed_project
-from strapgen.experiments.vectors import vectors_of_choice
+from strapgen.firmware.project import project, two_speed_project
+from strapgen.firmware.vectors.vectors import vectors_of_choice
+from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
-from strapgen.library import generated_sources
-from strapgen.support.files import write_files
-from strapgen.support.resources import folder as shipped
-from strapgen.systems import two_speed_sources
-from strapgen.targets.vectors_c.emit import table_files
+from strapgen.navigation.two_speed import two_speed_sources
+from strapgen.run import generated_sources
+from strapgen.storage.files import write_files
+from strapgen.storage.resources import folder as shipped
 
 #: Words, error feedback, counts of a gyro with a state that saturates.
 SETTINGS = {

@@ -13,15 +13,15 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen import build, generate
-from strapgen.backends import backend as make_backend
-from strapgen.backends import evaluator as make_evaluator
-from strapgen.backends import exact
-from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice, standard
 from strapgen.fixedpoint import function_series
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
-from strapgen.support.exceptions import InputError
+from strapgen.run import exact
+from strapgen.run.backends import backend as make_backend
+from strapgen.run.backends import evaluator as make_evaluator
+from strapgen.run.fixed import ModelEvaluator
 
 STEPS = [choice for choice in standard() if choice.method]
 OTHERS = [choice for choice in FIXED_POINT if not choice.method]

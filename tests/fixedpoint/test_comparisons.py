@@ -16,7 +16,7 @@ from strapgen.fixedpoint.comparisons import (
     lower_selection,
 )
 from strapgen.fixedpoint.quantities import Computed, Maximum, NearestInteger, Selection
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 FINE = Known(4, -7, 7, Fraction(1, 100))
 COARSE = Known(2, -3, 3, Fraction(1, 9))

@@ -5,8 +5,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from strapgen import backends, catalogue
+from strapgen import catalogue
 from strapgen.ir.fixed_settings import Settings
+from strapgen.run import backends as run
 
 #: A count is 5/1024 of the unit of an output in this format.
 SCALE, FORMAT, UNIT = "5/1073741824", "Q-5.20", Fraction(1, 1 << 20)
@@ -18,7 +19,7 @@ def sent(backend, carry, counts):
         word=16, carry=carry, ranges={"count": Fraction(60)}, formats={"count": "Q15.0", "increment": FORMAT}
     )
     choice = catalogue.choose("angle-counts", constants={"scale": SCALE})
-    evaluator = backends.evaluator(choice, backend, settings)
+    evaluator = run.evaluator(choice, backend, settings)
     feedback, rows = evaluator.fresh(1), []
     for row in counts:
         (output,), feedback = evaluator.run([row[None]], feedback)
@@ -40,7 +41,7 @@ def test_sums_are_fed_back_too():
     names = {
         carry: [
             feedback.name
-            for feedback in backends.evaluator(
+            for feedback in run.evaluator(
                 "two-speed-fast-2", "fixed-model", Settings(carry=carry)
             ).interface.residuals
         ]

@@ -20,15 +20,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen import generate
-from strapgen.backends.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
 from strapgen.fixedpoint import can_lower, function_series, quantize
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.support.exceptions import InputError
+from strapgen.run import compiler
+from strapgen.run.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
 from strapgen.targets import emit
-from strapgen.toolchain import compiler
 
 PRECISE = mpmath.mp.clone()
 PRECISE.prec = 400

@@ -11,10 +11,10 @@ from small_programs import node, program
 
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.limits import largest_magnitude, limits
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.signals import Signal
-from strapgen.support.exceptions import InputError
 
 CODE = program({"y": node("add", "a", "b")}, {"a": Fraction(1, 60), "b": 3})
 STATE = Signal("state", (4,), ("s_x", "s_y", "s_z", "s_s"), constraint="unit")

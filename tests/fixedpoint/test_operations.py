@@ -14,9 +14,9 @@ from strapgen.fixedpoint import functions
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import Quantity
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Node, Program
 from strapgen.ir.signals import Signal
-from strapgen.support.exceptions import InputError
 
 UNIT_VECTOR = Signal("e", (4,), ("a", "b", "c", "d"), constraint="unit")
 

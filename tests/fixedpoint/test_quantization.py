@@ -12,10 +12,10 @@ from small_programs import node, program
 from strapgen import quantize
 from strapgen.fixedpoint.quantities import Quantities
 from strapgen.fixedpoint.quantization import _MOST_GUARD_BITS, _errors, _is_worse, _output
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerInput, IntegerSum, Term, Value
 from strapgen.ir.signals import Signal
-from strapgen.support.exceptions import InputError
 
 ZERO = Fraction(0)
 

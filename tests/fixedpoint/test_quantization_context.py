@@ -9,8 +9,8 @@ from small_integers import Known, context, quantity
 
 from strapgen.fixedpoint.quantities import Sum
 from strapgen.fixedpoint.quantization_context import integer_value
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import IntegerSum, Term
-from strapgen.support.exceptions import InputError
 
 
 @pytest.mark.parametrize("sign", [1, -1])

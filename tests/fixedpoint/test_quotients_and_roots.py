@@ -11,8 +11,8 @@ from small_integers import GRID, Known, Worst, at_corners, context, quantity, wo
 
 from strapgen.fixedpoint.quantities import Quotient, SquareRoot
 from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import Value
-from strapgen.support.exceptions import InputError
 
 ABOVE = Known(4, -15, 15, Fraction(1, 50))
 BELOW = Known(4, 16, 24, Fraction(1, 90))

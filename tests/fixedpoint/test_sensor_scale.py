@@ -13,14 +13,14 @@ from gathering import each
 
 import strapgen
 from strapgen import generate
-from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.sensor_scale import _note, in_counts
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Assignment, Reference
 from strapgen.ir.sensor import Sensor
-from strapgen.support.exceptions import InputError
-from strapgen.systems import two_speed_sources
+from strapgen.navigation.two_speed import two_speed_sources
+from strapgen.run.fixed import CFixedEvaluator, ModelEvaluator
 
 EULER, DCM, HEUN = Choice("euler", "rk4", 2), Choice("dcm", "rk4", 2), Choice("euler", "rk2", 1)
 #: A gyro of 16 bits at 100 Hz whose whole range is used, and the same up to 400 deg/s.

@@ -8,8 +8,8 @@ from derived import program, quantized
 
 import strapgen
 from strapgen.catalogue import Choice
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.support.exceptions import InputError
 
 RATES = {"max_rate_deg_s": 400, "step": "0.01", "increments": 2}
 
@@ -44,7 +44,7 @@ def test_the_bound_has_what_is_cut_off(algorithm, digits, rng):
     found = np.array([model.propagate(row)[-1] for row in increments]).reshape(500, -1)
     exact = np.array(
         [
-            strapgen.backends.exact.propagate(program(Choice(algorithm, "rk4", 2)), row)[-1]
+            strapgen.run.exact.propagate(program(Choice(algorithm, "rk4", 2)), row)[-1]
             for row in increments[:40]
         ]
     )

@@ -11,10 +11,10 @@ from derived import precisely, program, quantized
 from gathering import each
 
 import strapgen
-from strapgen.backends.exact import propagate
-from strapgen.backends.increments import windows
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
+from strapgen.run.exact import propagate
+from strapgen.run.increments import windows
 
 EXPONENTIALS = ("magnus2", "magnus4", "magnus6", "munthe-kaas4")
 
@@ -27,7 +27,7 @@ def unit_state(algorithm: str, rng: np.random.Generator) -> np.ndarray:
 
 
 def exact_step(
-    kernel: strapgen.symbolic.kernel.Kernel, state: np.ndarray, samples: np.ndarray
+    kernel: strapgen.kernel.kernel.Kernel, state: np.ndarray, samples: np.ndarray
 ) -> list[mpmath.mpf]:
     names = [name for signal in kernel.inputs for name in signal.elements]
     numbers = map(mpmath.mpf, [*state.ravel().tolist(), *samples.ravel().tolist()])

@@ -12,7 +12,7 @@ from strapgen import catalogue, fixedpoint
 from strapgen.catalogue import Choice
 from strapgen.ir import decimals
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
+from strapgen.run import generated_sources
 from strapgen.targets import contract
 
 ERROR = re.compile(r"error at most (\S+), (\S+) of the last place")

@@ -10,9 +10,9 @@ from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, finest
-from strapgen.support.exceptions import InputError
 
 
 @given(st.integers(8, 64), st.integers(-20, 200))

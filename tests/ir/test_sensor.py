@@ -10,10 +10,10 @@ import mpmath
 import pytest
 from gathering import each
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
-from strapgen.support.exceptions import InputError
 
 HUNDREDTH = Fraction(1, 100)
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 from gathering import each
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import FRAMES, Signal, after
-from strapgen.support.exceptions import InputError
 
 
 def test_a_matrix_names_its_elements_row_by_row():

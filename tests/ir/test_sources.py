@@ -16,10 +16,10 @@ from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.cli import main
 from strapgen.fixedpoint import can_lower
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.support.exceptions import InputError
 from strapgen.targets import TARGETS
 
 CHOICES = {choice.kernel: choice for choice in standard() if tells_more(choice)}

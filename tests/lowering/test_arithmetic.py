@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Reference, walk
+from strapgen.kernel.polynomials import Polynomial
 from strapgen.lowering.arithmetic import (
     chain,
     expanded,
@@ -20,7 +21,6 @@ from strapgen.lowering.arithmetic import (
     signed_sum,
     with_constant,
 )
-from strapgen.symbolic.polynomials import Polynomial
 
 SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 NAMES = "xyz"

@@ -8,8 +8,8 @@ from gathering import each
 
 from strapgen.ir.program import Constant, Operation, Program, Reference, walk
 from strapgen.ir.signals import Signal
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.lowering import lower
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 X, Y, Z = sp.symbols("x y z", real=True)
 x, y, z = (Reference(name) for name in "xyz")

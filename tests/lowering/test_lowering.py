@@ -15,10 +15,10 @@ from gathering import each
 from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.ir.program import RESOLUTION, Assignment, Constant, Node, Operation, Program, Reference, walk
+from strapgen.kernel.kernel import Kernel
+from strapgen.kernel.rational_constants import rationalized
 from strapgen.lowering import candidates, canonical
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
-from strapgen.symbolic.kernel import Kernel
-from strapgen.symbolic.rational_constants import rationalized
 
 STANDARD = catalogue.standard()
 EVERY = pytest.mark.parametrize(

@@ -26,9 +26,9 @@ from pycparser import c_ast, c_parser
 from strapgen.catalogue import choose, standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
+from strapgen.run import generated_sources
+from strapgen.run.compiler import C_FLAGS
 from strapgen.targets.c.emit import DOUBLE, FLOAT, CPrinter
-from strapgen.toolchain.compiler import C_FLAGS
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
 COMPILERS = {

@@ -15,13 +15,13 @@ from fixed_inputs import corners_and_random
 from gathering import each
 
 from strapgen import build, generate
-from strapgen.backends.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.catalogue import Choice
 from strapgen.ir.decimals import above, places_above
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.support.exceptions import InputError
+from strapgen.run import compiler
+from strapgen.run.fixed import CFixedEvaluator, ModelEvaluator
 from strapgen.targets.c_fixed.statements import _noted
-from strapgen.toolchain import compiler
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
 CHOICES = [choice for choice in FIXED_POINT if not (choice.method and choice.name == "cayley-klein")]

@@ -9,7 +9,7 @@ from gathering import each
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum, Value
-from strapgen.library import generated_sources
+from strapgen.run import generated_sources
 from strapgen.targets.contract import argument_text, value_text
 
 

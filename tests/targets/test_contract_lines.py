@@ -13,11 +13,11 @@ from small_programs import TYPES, computed
 
 import strapgen
 from strapgen import generate
-from strapgen.backends.fixed import CFixedEvaluator
 from strapgen.catalogue import Choice
 from strapgen.ir import decimals
 from strapgen.ir.fixed_settings import Settings
-from strapgen.support import resources
+from strapgen.run.fixed import CFixedEvaluator
+from strapgen.storage import resources
 from strapgen.targets.contract_lines import Contract
 
 

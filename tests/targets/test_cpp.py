@@ -13,13 +13,14 @@ from languages import DOUBLE, check_bits_of_c, check_lines
 import strapgen
 from strapgen import catalogue
 from strapgen.cli import main
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import CompilerError
+from strapgen.ir.exceptions import CompilerError
+from strapgen.run import generated_sources
+from strapgen.run.backends import of_sources
+from strapgen.run.shared_libraries import COMPILERS
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.cpp.fixed import _word
 from strapgen.targets.cpp.text import constants
 from strapgen.targets.definitions import Macro
-from strapgen.toolchain.shared_libraries import COMPILERS
 
 STRICT = (
     "-std=c++17",
@@ -160,5 +161,5 @@ def test_what_does_not_compile_is_told_in_one_line(cxx):
     sources = generated_sources.sources(catalogue.choose("euler-normalize"), "cpp")
     broken = {name: text.replace("std::sqrt(", "std::sqroot(") for name, text in sources.files.items()}
     with pytest.raises(CompilerError, match=r"failed on euler-normalize: .*sqroot") as caught:
-        strapgen.backends.of_sources(type(sources).restore(sources.interface(), broken))
+        of_sources(type(sources).restore(sources.interface(), broken))
     assert "\n" not in str(caught.value)

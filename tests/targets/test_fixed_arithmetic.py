@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
+from strapgen.run import generated_sources
 
 #: The product has a second form for processors that multiply words to words alone.
 PROCESSORS = {"any": [], "armv6-m": ["-D__ARM_ARCH_6M__"]}

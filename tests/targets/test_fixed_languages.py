@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from languages import check_integers_of_c, check_lines
 
-import strapgen
 from strapgen import catalogue
 from strapgen.catalogue import Choice
+from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import CompilerError, InputError
+from strapgen.run import generated_sources
+from strapgen.run.backends import of_sources
+from strapgen.run.shared_libraries import COMPILERS
 from strapgen.targets.contract_lines import Contract
-from strapgen.toolchain.shared_libraries import COMPILERS
 
 LANGUAGES = {"cpp-fixed": "C++", "rust-fixed": "Rust"}
 #: Words, what is carried, rounding and products: each value once.
@@ -110,7 +110,7 @@ def test_a_step_of_c_plus_plus_is_a_constant_expression(tmp_path, right, flags):
     sources = generated_sources.sources(choice, "cpp-fixed", settings)
     (name,) = sources.step_files
     (tmp_path / name).write_text(sources.files[name])
-    reference = strapgen.backends.of_sources(generated_sources.sources(choice, "c-fixed", settings))
+    reference = of_sources(generated_sources.sources(choice, "c-fixed", settings))
     state, increments = [0, 0, 0, 1 << 30], [1 << 20, 0, 0, 1 << 21, 0, 0]
     (outputs, _) = reference.run([_row(state), _row(increments)], reference.fresh(1))
     expected = int(outputs[0][0, 0]) + (not right)

@@ -15,9 +15,9 @@ import pytest
 from strapgen.catalogue import standard
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
-from strapgen.library import generated_sources
-from strapgen.support import resources
-from strapgen.systems import two_speed_sources
+from strapgen.navigation.two_speed import two_speed_sources
+from strapgen.run import generated_sources
+from strapgen.storage import resources
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("c", "c_float", "c_fixed")

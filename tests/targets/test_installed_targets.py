@@ -17,8 +17,8 @@ import strapgen
 from strapgen import catalogue, targets
 from strapgen.catalogue import Choice
 from strapgen.cli import main
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.run import generated_sources
 from strapgen.targets import registry
 
 TOY = Path(__file__).resolve().parents[2] / "examples" / "toy_target"

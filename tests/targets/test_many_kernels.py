@@ -15,8 +15,8 @@ from strapgen import catalogue
 from strapgen.catalogue import Choice
 from strapgen.catalogue.names import KERNELS
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
-from strapgen.support import resources
+from strapgen.run import generated_sources
+from strapgen.storage import resources
 from strapgen.targets.names import external
 
 #: The folders of generated/ with the ending of their names.

@@ -14,15 +14,14 @@ from languages import DOUBLE, SAMPLES, check_lines
 
 import strapgen
 from strapgen import catalogue
-from strapgen.backends import of_sources
 from strapgen.catalogue import Choice
 from strapgen.cli import main
+from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_files, generated_sources
-from strapgen.support.exceptions import CompilerError
+from strapgen.run import compiler, generated_files, generated_sources, octave_process
+from strapgen.run.backends import of_sources
 from strapgen.targets.matlab.emit import MatlabPrinter
 from strapgen.targets.matlab.names import MATLAB
-from strapgen.toolchain import compiler, octave
 
 #: Functions of MATLAB without a toolbox that Octave has too: all that generated code calls.
 COMMON = {
@@ -63,7 +62,7 @@ WORDS = {"function", "end", "if", "for"}
 @pytest.fixture
 def has_octave() -> None:
     """Skip a test where Octave is missing."""
-    if reason := octave.missing():
+    if reason := octave_process.missing():
         pytest.skip(reason)
 
 
@@ -103,7 +102,7 @@ def same_run(one: Sources, reference: Sources, rng: np.random.Generator) -> bool
     for row in rows:
         states.append(of_sources(reference).evaluate([states[-1], row], ())[0])
     name, shape = f"{one.function.name}_propagate", (*state.shape, STEPS + 1)
-    (history,) = octave.call([one], name, [start, np.moveaxis(rows, 0, -1)], [shape])
+    (history,) = octave_process.call([one], name, [start, np.moveaxis(rows, 0, -1)], [shape])
     return bits(np.moveaxis(history, -1, 0)) == bits(np.array(states))
 
 
@@ -264,7 +263,7 @@ def test_octave_that_has_ended_is_told_and_started_again(has_octave):
     with pytest.raises(CompilerError, match="Octave has ended before it was done"):
         of_sources(exits)([0.6, 0, 0, 0.8])
     assert kernel([0.6, 0, 0, 0.8])[0] == 0.6
-    (process,) = octave._running
+    (process,) = octave_process._running
     os.kill(process._process.pid, signal.SIGKILL)
     process._process.wait()
     assert kernel([0.6, 0, 0, 0.8])[0] == 0.6

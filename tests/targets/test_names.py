@@ -30,11 +30,10 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.targets import names
-from strapgen.targets.c import c_library
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.run import compiler, octave_process
+from strapgen.targets import c_library, names
 from strapgen.targets.matlab import names as matlab_names
-from strapgen.toolchain import compiler, octave
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 #: A file that includes all others.
@@ -267,7 +266,7 @@ def check_matlab(step: Lowered) -> None:
     """Check that the loop in MATLAB computes the run."""
     sources = strapgen.generate(step.program, "matlab")
     name, turns = f"{sources.function.name}_propagate", INCREMENTS[:, None].transpose(1, 2, 0)
-    (history,) = octave.call([sources], name, [START, turns], [(3, STEPS + 1)])
+    (history,) = octave_process.call([sources], name, [START, turns], [(3, STEPS + 1)])
     np.testing.assert_allclose(history.T, EXPECTED, rtol=0, atol=1e-14)
 
 
@@ -343,7 +342,7 @@ def test_every_target_computes_the_same_under_any_names(several, tmp_path_factor
         admission._require_formulas(kernel)
     steps = list(map(lowered, kernels))
     check_c(tmp_path_factory.mktemp("names"), steps, list(map(check_python, steps)))
-    if not octave.missing():
+    if not octave_process.missing():
         for one in steps:
             check_matlab(one)
 

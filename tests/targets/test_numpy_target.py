@@ -15,8 +15,8 @@ from gathering import each
 from strapgen.catalogue import standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
+from strapgen.run import compiler
 from strapgen.targets import emit
-from strapgen.toolchain import compiler
 
 KERNELS = [choice.kernel for choice in standard()]
 STEPS = [kernel for kernel in KERNELS if "-rk" in kernel]

@@ -20,11 +20,11 @@ from hypothesis import strategies as st
 
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
+from strapgen.run.compiler import C_FLAGS
 from strapgen.targets.c import emit
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.numpy_code.emit import NumpyPrinter
 from strapgen.targets.numpy_code.emit import emit as emit_numpy
-from strapgen.toolchain.compiler import C_FLAGS
 
 NAMES = ("x_1", "x_2", "x_3", "x_4")
 VALUES = dict(zip(NAMES, (1.1, -0.37, 3.0000000000000004, 7e-3), strict=True))

@@ -8,8 +8,8 @@ from fractions import Fraction
 import pytest
 from derived import programs
 
+from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
-from strapgen.rounding import rounding_bounds
 from strapgen.targets import emit
 from strapgen.targets.c.rounding_text import rounding_text
 

@@ -12,13 +12,14 @@ from languages import DOUBLE, check_bits_of_c, check_lines
 import strapgen
 from strapgen import catalogue
 from strapgen.cli import main
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import CompilerError
+from strapgen.ir.exceptions import CompilerError
+from strapgen.run import generated_sources
+from strapgen.run.backends import of_sources
+from strapgen.run.shared_libraries import COMPILERS
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.names import Naming
 from strapgen.targets.rust.fixed import _WORDS, RustStatementPrinter
 from strapgen.targets.rust.text import module_name
-from strapgen.toolchain.shared_libraries import COMPILERS
 
 #: A step that no other test compiles: what is loaded already needs no compiler.
 SIMULATE = "simulate euler --method rk1 --increments 7 --motion sinusoidal --set a_deg_s=1 b_deg_s=1 --step 1"
@@ -127,5 +128,5 @@ def test_what_does_not_compile_is_told_in_one_line(rustc):
         name: text.replace("unsafe { sqrt(", "unsafe { sqroot(") for name, text in sources.files.items()
     }
     with pytest.raises(CompilerError, match=r"failed on euler-normalize: .*error") as caught:
-        strapgen.backends.of_sources(type(sources).restore(sources.interface(), broken))
+        of_sources(type(sources).restore(sources.interface(), broken))
     assert "\n" not in str(caught.value)

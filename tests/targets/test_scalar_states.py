@@ -9,11 +9,11 @@ import pytest
 
 import strapgen
 from strapgen import KernelBuilder, Signal
-from strapgen.backends import of_sources
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import after
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.kernel import Kernel
+from strapgen.run.backends import of_sources
 
 STATE = Signal.scalar("level", meaning="output of a lag", bound=Fraction(1, 2))
 DRIVE = Signal.scalar("drive", meaning="input of a lag", bound=Fraction(1, 2))

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from strapgen.catalogue.constants import Constants, options
-from strapgen.catalogue.layout import Layout
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
-from strapgen.catalogue.names import KERNELS
-from strapgen.catalogue.user.user_kernel import UserKernel
-from strapgen.support.brief import full_text, short_repr
+from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
+from strapgen.catalogue.user_kernel import UserKernel
+from strapgen.ir import packages
+from strapgen.ir.notebook_display import full_text, short_repr
+from strapgen.ir.recipe import Description
 
 if TYPE_CHECKING:
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
 
 #: What chooses a method: its name, or the value that holds its coefficients.
@@ -44,8 +46,8 @@ class Choice:
     constants : tuple of (str, tuple of Fraction), optional
         Inputs that are constants, sorted by name, each with its numbers in row-major order; of kernels that are no
         attitude steps.
-    layout : Layout, optional
-        Gyros whose rate and acceleration the kernel separates, or whose torques it returns.
+    layout : Description, optional
+        What a file describes for the kernel, such as the gyros whose rate and acceleration it separates.
     """
 
     name: str
@@ -56,7 +58,7 @@ class Choice:
     # Equality compares the kernels; the hash leaves them out, because most choices differ in name or numbers.
     user_kernel: UserKernel | None = field(default=None, hash=False, repr=False)
     constants: Constants = ()
-    layout: Layout | None = None
+    layout: Description | None = None
 
     __repr__ = short_repr
 
@@ -120,7 +122,7 @@ class Choice:
             return f"{self.kernel} {self.user_kernel.text}"
         if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {full_text(self.method)} {self.method.file}"
-        words = [self.kernel, options(self.constants)]
+        words = [self.kernel, options(self.constants), _code(self.name)]
         if self.layout is not None:
             words += [full_text(self.layout), self.layout.file]
         return " ".join(filter(None, words))
@@ -170,3 +172,15 @@ def orthonormalizations(algorithm: str) -> list[str]:
     """Return the kernels that orthonormalize the state of an algorithm of the catalogue."""
     starts = (f"{algorithm}-orthonormalize", f"{algorithm}-normalize")
     return [name for name in KERNELS if name.startswith(starts)]
+
+
+def _code(name: str) -> str:
+    """Return a hash of the code of an installed package's kernel; "" for one of strapgen."""
+    recipe = KERNELS.brought(name) or LAYOUT_KERNELS.brought(name)
+    return "" if recipe is None else _digest(recipe.module)
+
+
+@cache
+def _digest(module: str) -> str:
+    """Return a hash of all files of a module's package."""
+    return hashlib.sha256(repr(packages.contents(module)).encode()).hexdigest()

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from strapgen import applications
 from strapgen.catalogue import constants as constant_values
-from strapgen.catalogue import layout as layout_files
 from strapgen.catalogue.choice import AnyMethod, Choice
-from strapgen.catalogue.layout import Layout
 from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
@@ -27,13 +26,14 @@ from strapgen.catalogue.names import (
     RESERVED,
 )
 from strapgen.catalogue.user import loading
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError, InputTypeError
-from strapgen.support.suggestions import some
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.recipe import Description
+from strapgen.ir.suggestions import some
 
 if TYPE_CHECKING:
     from strapgen.catalogue.constants import Constants
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
 #: What every message about an algorithm allows beside the names.
 _FILE = "a Python file"
@@ -47,7 +47,7 @@ def choose(
     previous: int | None = None,
     ahead: int | None = None,
     constants: Mapping[str, Any] | None = None,
-    layout: str | Path | Layout | None = None,
+    layout: str | Path | Description | None = None,
 ) -> Choice:
     """Check a choice of kernel and fill in the defaults: fourth order, two increments.
 
@@ -67,8 +67,8 @@ def choose(
         Values of inputs of a kernel that is no attitude step, in their units and row by row; they are then constants
         of its code. Of a user's kernel with unknowns, values of these. A float stands for its shortest decimal form.
         `derive` refuses what the kernel has no input for.
-    layout : path or Layout, optional
-        Of the kernels "separate" and "torques": the file that describes the gyros, see `layout.read`.
+    layout : path or Description, optional
+        Of the kernels "separate" and "torques": the file that describes the gyros, or what was read from it.
 
     Raises
     ------
@@ -110,15 +110,18 @@ def _with_values(kernel: Kernel, values: Constants) -> Kernel:
     return replace(chosen, arguments=f"{kernel.arguments} {constant_values.options(values)}".strip())
 
 
-def _with_layout(choice: Choice, layout: str | Path | Layout | None) -> Choice:
+def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Choice:
     """Return the choice of a kernel of a layout, which its file describes."""
     if choice.name not in LAYOUT_KERNELS:
         raise InputError(f"{choice.name} takes no layout; {' and '.join(LAYOUT_KERNELS)} do")
     if layout is None:
         others = ", ".join(name for name in KERNELS if name.startswith(f"{choice.name}-"))
         raise InputError(f"{choice.name} needs the file of a layout; kernels of built-in ones are {others}")
-    if not isinstance(layout, Layout):
-        layout = layout_files.read(layout)
+    if isinstance(layout, str | os.PathLike):
+        read: Callable[[str | os.PathLike[str]], Description] = applications.load(
+            LAYOUT_KERNELS[choice.name].reader
+        )
+        layout = read(layout)
     kernel = f"{choice.name}-{layout.name}"
     if kernel in KERNELS:
         raise InputError(f"a layout called {layout.name} would make the kernel {kernel}, which exists")

@@ -7,9 +7,9 @@ from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Any, TypeAlias
 
-from strapgen.support import checks
-from strapgen.support.exceptions import InputTypeError
-from strapgen.support.suggestions import shown
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputTypeError
+from strapgen.ir.suggestions import shown
 
 #: Constants as a value: the name of each input with its numbers in row-major order, sorted by the names.
 Constants: TypeAlias = tuple[tuple[str, tuple[Fraction, ...]], ...]

@@ -16,12 +16,13 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS
-from strapgen.support.exceptions import InputError
+from strapgen.ir import packages
+from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
     from strapgen.catalogue.methods.method import Method
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
 #: The package of the modules in `names`.
 _PACKAGE = __name__.rpartition(".")[0]
@@ -103,8 +104,13 @@ def _of_catalogue(choice: Choice) -> Kernel:
     if choice.method is None:
         described = choice.layout is not None
         recipe = LAYOUT_KERNELS[choice.name] if described else KERNELS[choice.name]
-        function = getattr(import_module(f"{_PACKAGE}.kernels.{recipe.module}"), recipe.function)
-        kernel: Kernel = function(*((choice.layout,) if described else recipe.arguments))
+        function = getattr(import_module(recipe.module), recipe.function)
+        arguments = (choice.layout,) if described else recipe.arguments
+        if (LAYOUT_KERNELS if described else KERNELS).brought(choice.name) is None:
+            kernel: Kernel = function(*arguments)
+            return kernel
+        with packages.guarded(f"kernel {choice.name}", "return a Kernel", packages.belongs_to(recipe.module)):
+            kernel = function(*arguments)
         return kernel
     if choice.name in VECTORS:
         vector = VECTORS[choice.name]

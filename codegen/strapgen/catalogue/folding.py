@@ -8,11 +8,11 @@ from dataclasses import replace
 import sympy as sp
 
 from strapgen.catalogue.constants import Constants, number_text, options
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
-from strapgen.support.exceptions import InputError
-from strapgen.support.suggestions import counted, needed, unknown
-from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.kernel import Kernel, Stage
+from strapgen.ir.suggestions import counted, needed, unknown
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import Kernel, Stage
 
 #: What an expression holds that has no real value.
 _UNDEFINED = (sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I)

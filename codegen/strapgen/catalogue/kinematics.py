@@ -13,9 +13,9 @@ from fractions import Fraction
 
 import sympy as sp
 
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import short_repr
-from strapgen.symbolic import rotations
+from strapgen.kernel import rotations
 
 THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229"
 SAVAGE = "P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3"

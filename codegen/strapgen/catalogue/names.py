@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from strapgen.catalogue.loop_names import LOOPS
+from collections.abc import Iterator, Mapping
+
+from strapgen import applications
+from strapgen.applications import Application
 from strapgen.catalogue.method_names import ALGORITHMS, VECTORS
 from strapgen.catalogue.methods.windows import EXACT_TERMS
-from strapgen.catalogue.navigation_names import NAVIGATION
-from strapgen.catalogue.output_names import OUTPUTS, TWO_ROWS
-from strapgen.catalogue.recipe import Recipe
-from strapgen.catalogue.redundancy_names import REDUNDANCY
-from strapgen.catalogue.sampling_names import SAMPLING
+from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.recipe import Recipe
+
+#: The folder of the modules that derive the kernels of the catalogue.
+_PACKAGE = "strapgen.catalogue.kernels"
 
 #: Largest number of angle increments in a step, and of increments beside them, from before the step and from after it.
 MOST_INCREMENTS = 8
@@ -25,16 +28,6 @@ MOTIONS = {
     "coning": dict.fromkeys("abg", "rad/s"),
     "polynomial": {"a0": "rad/s", **{f"a{k}": f"rad/s^{k + 1}" for k in range(1, 5)}},
 }
-
-#: Motions without kernels, which only runs know, and the unit of each of their parameters.
-RUN_MOTIONS = {
-    "cone": {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
-    "random": {"rate": "rad/s"},
-    "slew": {"onset": "s", "rate": "rad/s"},
-    "ramps": {"onset": "s", "rate": "rad/s"},
-    "vibration": {"angle": "rad", "gyro": "Hz"},
-}
-
 
 #: Degrees of the rate for which there are steps from its Legendre coefficients: to fourth order, and exact.
 LEGENDRE_DEGREES, EXACT_DEGREES = range(1, 5), range(1, 9)
@@ -99,25 +92,6 @@ _TWO_SPEED = {
     "navigation-velocity": Recipe(
         "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
     ),
-    **{
-        f"two-speed-fast-{form}": Recipe(
-            f"two speeds: fast loop with S{form}", "two_speed_loops", "fast", (form,)
-        )
-        for form in (1, 2)
-    },
-    **{
-        f"{name}-two-speed-slow-{form}": Recipe(
-            f"two speeds: slow loop with S{form}", "two_speed_loops", "slow", (name, form)
-        )
-        for name in ("dcm", "euler")
-        for form in (1, 2)
-    },
-    **{
-        f"{name}-two-speed-navigation": Recipe(
-            "two speeds: navigation loop", "two_speed_loops", "navigation", (name,)
-        )
-        for name in ("dcm", "euler")
-    },
     "dcm-rows-orthogonalize": Recipe(
         "rows made orthogonal, to first order", "orthonormal", "rows_orthogonalized"
     ),
@@ -153,43 +127,7 @@ TWO_SPEED = {
     name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
 }
 
-#: Kernels that correct the increments of sensors, and those that make their errors; they take no method.
-COMPENSATION = {
-    name: Recipe(title, module, function, tuple(arguments), standard=False)
-    for name, title, module, function, *arguments in (
-        ("imu-compensate", "compensation of a measurement unit", "imu_errors", "imu_compensate"),
-        ("imu-compensate-2", "compensation in two passes", "imu_errors", "imu_compensate", 2),
-        ("imu-errors", "errors of a measurement unit", "imu_errors", "imu_errors"),
-        ("pulse-compensate", "compensation of pulses by polarity", "pulses", "pulse_compensate"),
-        (
-            "pulse-compensate-exact",
-            "compensation of pulses, exact inverse",
-            "pulses",
-            "pulse_compensate",
-            True,
-        ),
-        ("pulse-errors", "pulses of a sensor with its errors", "pulses", "pulse_errors"),
-        (
-            "gyro-pulse-compensate",
-            "compensation of the pulses of a gyro",
-            "pulses",
-            "pulse_compensate",
-            False,
-            "gyro",
-        ),
-        ("gyro-pulse-errors", "pulses of a gyro with its errors", "pulses", "pulse_errors", "gyro"),
-        ("temperature-coefficient", "coefficient by two slopes", "pulses", "temperature_coefficient"),
-        ("scale-factor-heating", "scale factor by torquer heat", "torquer_heating", "scale_factor_heating"),
-        ("torquer-heating-errors", "errors by torquer heat", "torquer_heating", "scale_factor_heating", True),
-        ("separate-canonical", "rate and acceleration from torques", "separation", "separate", "canonical"),
-        ("separate-45", "separation, torquers at 45 degrees", "separation", "separate", "45"),
-        ("torques-canonical", "torques of mass-unbalanced gyros", "separation", "measure", "canonical"),
-        ("torques-45", "torques, torquers at 45 degrees", "separation", "measure", "45"),
-    )
-}
-
-#: Kernels that take no method.
-KERNELS = {
+_KERNELS = {
     **{
         f"{algorithm}-product": Recipe(
             f"{title}: state after a transition", "attitude_step", "product", (algorithm,)
@@ -244,26 +182,62 @@ KERNELS = {
         )
         for motion in MOTIONS
     },
-    **SAMPLING,
     **TWO_SPEED,
-    **COMPENSATION,
-    **NAVIGATION,
-    **REDUNDANCY,
-    **OUTPUTS,
-    **TWO_ROWS,
-    **LOOPS,
 }
 
 
-#: Kernels of a layout that a file describes.
-LAYOUT_KERNELS = {
-    "separate": Recipe(
-        "rate and acceleration from torques, of a layout file", "layouts", "separate", standard=False
-    ),
-    "torques": Recipe(
-        "torques of mass-unbalanced gyros, of a layout file", "layouts", "measure", standard=False
-    ),
-}
+class _Kernels(Mapping[str, Recipe]):
+    """Kernels that take no method: those of the catalogue, of the applications, and of installed ones.
+
+    Parameters
+    ----------
+    of_files : bool
+        Whether they are those that a file describes.
+    """
+
+    __repr__ = short_repr
+
+    def __init__(self, catalogue: Mapping[str, Recipe], of_files: bool) -> None:
+        self._of_files = of_files
+        self._built_in = dict(catalogue)
+        self._built_in.update(self._brought(applications.built_in()))
+
+    def _in_words(self) -> str:
+        return f"{len(self._built_in)} kernels"
+
+    def _brought(self, brought: Mapping[str, Application]) -> Iterator[tuple[str, Recipe]]:
+        for application in brought.values():
+            for table in application.kernels:
+                recipes: dict[str, Recipe] = applications.load(table)
+                yield from ((n, r) for n, r in recipes.items() if bool(r.reader) == self._of_files)
+
+    def _all(self) -> dict[str, Recipe]:
+        return dict(self._brought(applications.installed())) | self._built_in
+
+    def brought(self, name: str) -> Recipe | None:
+        """Return the recipe of a kernel of an installed package; None for one of strapgen."""
+        return None if name in self._built_in else self._all().get(name)
+
+    def __getitem__(self, name: str) -> Recipe:
+        return self._built_in[name] if name in self._built_in else self._all()[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._built_in or name in self._all()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._built_in | self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+
+#: Kernels that take no method.
+KERNELS = _Kernels(
+    {name: recipe._replace(module=f"{_PACKAGE}.{recipe.module}") for name, recipe in _KERNELS.items()}, False
+)
+#: Kernels of a description in a file.
+LAYOUT_KERNELS = _Kernels({}, True)
+
 
 #: Names that a user's algorithm cannot have.
 RESERVED = (*ALGORITHMS, *VECTORS, *KERNELS, *LAYOUT_KERNELS)

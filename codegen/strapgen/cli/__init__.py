@@ -4,94 +4,25 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import typer
 
+from strapgen import applications
+from strapgen.applications import Command
 from strapgen.cli import version_option
-from strapgen.cli.commands import (
-    check,
-    compare,
-    coning,
-    converge,
-    cost,
-    derive,
-    design,
-    evidence,
-    frontier,
-    generate,
-    listing,
-    rate_table,
-    redundancy,
-    report,
-    series,
-    simulate,
-    solve,
-    stability,
-    statements,
-    strapdown,
-    study,
-    study_attitude_form,
-    study_calibration,
-    study_loops,
-    study_monte_carlo,
-    study_output_filter,
-    study_pulse_torque,
-    study_redundancy,
-    study_sensor_errors,
-    study_system,
-    study_velocity_position,
-    system,
-    tableau,
-    tables,
-    two_speed,
-    vectors,
-    verify,
-    vibration,
-    window_generate,
-)
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
-from strapgen.support.exceptions import StrapgenError
-from strapgen.support.processes import prepare_for_derivations
+from strapgen.ir.exceptions import InputError, StrapgenError
+from strapgen.run.processes import prepare_for_derivations
 
-#: Headings of ``strapgen --help``, and the commands below each.
-COMMANDS: dict[str, dict[str, Any]] = {
-    "Derive": {
-        "list": listing.list_names,
-        "derive": derive.derive,
-        "tableau": tableau.tableau,
-        "solve": solve.solve,
-        "coning": coning.coning,
-        "window": window_generate.app,
-    },
-    "Generate": {
-        "generate": generate.generate,
-        "two-speed": two_speed.two_speed,
-        "system": system.system,
-        "redundancy": redundancy.redundancy,
-        "vectors": vectors.vectors,
-        "verify": verify.verify,
-        "evidence": evidence.evidence,
-    },
-    "Run": {"simulate": simulate.simulate, "strapdown": strapdown.strapdown, "compare": compare.compare},
-    "Analyse": {
-        "series": series.series,
-        "vibration": vibration.vibration,
-        "stability": stability.stability,
-        "converge": converge.converge,
-        "check": check.check,
-        "cost": cost.cost,
-        "frontier": frontier.frontier,
-        "design": design.design,
-        "report": report.report,
-    },
-    "Reproduce": {
-        "tables": tables.tables,
-        "statements": statements.statements,
-        "rate-table": rate_table.rate_table,
-        "study": study.app,
-    },
+#: Headings of ``strapgen --help`` in their order.
+HEADINGS = ("Derive", "Generate", "Run", "Analyse", "Reproduce")
+#: The commands of the compiler; the others are those of the applications.
+_COMPILER = {
+    "list": Command("strapgen.cli.list_command:list_names", "Derive"),
+    "derive": Command("strapgen.cli.derive_command:derive", "Derive"),
+    "generate": Command("strapgen.cli.generate_command:generate", "Generate"),
 }
 
 #: With which shells ask for the words that may follow.
@@ -103,22 +34,8 @@ _LONGEST_WORD, _CUT, _LONGEST_LINE = 300, 60, 2000
 class _Strapgen(PlainGroup):
     """The program itself."""
 
-    headings: ClassVar[dict[str, tuple[str, ...]]] = {
-        heading: tuple(commands) for heading, commands in COMMANDS.items()
-    }
+    headings: ClassVar[dict[str, list[str]]] = {heading: [] for heading in HEADINGS}
 
-
-study.app.command("system", cls=PlainCommand)(study_system.study_system)
-study.app.command("attitude-form", cls=PlainCommand)(study_attitude_form.study_attitude_form)
-study.app.command("output-filter", cls=PlainCommand)(study_output_filter.study_output_filter)
-
-study.app.command("redundancy", cls=PlainCommand)(study_redundancy.study_redundancy)
-study.app.command("calibration", cls=PlainCommand)(study_calibration.study_calibration)
-study.app.command("pulse-torque", cls=PlainCommand)(study_pulse_torque.study_pulse_torque)
-study.app.command("sensor-errors", cls=PlainCommand)(study_sensor_errors.study_sensor_errors)
-study.app.command("loops", cls=PlainCommand)(study_loops.study_loops)
-study.app.command("velocity-position", cls=PlainCommand)(study_velocity_position.study_velocity_position)
-study.app.command("monte-carlo", cls=PlainCommand)(study_monte_carlo.study_monte_carlo)
 
 app = typer.Typer(
     name="strapgen",
@@ -128,13 +45,50 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.callback()(version_option.options)
-for _commands in COMMANDS.values():
-    for _name, _command in _commands.items():
-        if isinstance(_command, typer.Typer):
-            app.add_typer(_command, name=_name)
+#: Groups of commands by name.
+_groups: dict[str, typer.Typer] = {}
+
+
+def headings() -> dict[str, list[str]]:
+    """Return the commands below each heading of ``strapgen --help``."""
+    return _Strapgen.headings
+
+
+def _add(commands: Mapping[str, Command]) -> None:
+    """Add commands to the program, those of a group after the group."""
+    for name, command in commands.items():
+        function = applications.load(command.function)
+        group, _, member = name.rpartition(" ")
+        if isinstance(function, typer.Typer):
+            app.add_typer(function, name=name)
+            _groups[name] = function
         else:
-            app.command(_name, cls=PlainCommand)(_command)
-app.command("stress", cls=PlainCommand, hidden=True)(rate_table.rate_table)  # its name in earlier releases
+            to = _groups[group] if group else app
+            to.command(member, cls=PlainCommand, hidden=command.hidden)(function)
+        if command.heading:
+            _Strapgen.headings.setdefault(command.heading, []).append(name)
+
+
+def _names() -> set[str]:
+    """Return the names of the commands of strapgen."""
+    return {*_COMPILER}.union(*(one.commands for one in applications.built_in().values()))
+
+
+def _add_installed() -> None:
+    """Add the commands of installed applications."""
+    known = _names()
+    for label, application in applications.installed().items():
+        for name in application.commands:
+            if name in known:
+                raise InputError(
+                    f"application {label}: strapgen has a command {name}; another name is needed"
+                )
+        _add(application.commands)
+
+
+_add(_COMPILER)
+for _application in applications.built_in().values():
+    _add(_application.commands)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -145,6 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     prepare_for_derivations()
     words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
+        if words[0] in _groups or words[0] not in _names():
+            _add_installed()
         status = app(words, prog_name="strapgen", standalone_mode=False)
         sys.stdout.flush()
     except StrapgenError as error:
@@ -163,6 +119,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stderr.write("strapgen: interrupted\n")
         sys.exit(130)
     except Exception as error:
+        if hasattr(error, "format_message") and (unusable := applications.broken()):
+            _fail(unusable[0])
         # Typer's errors of usage share no public base class over the releases that are allowed.
         if not hasattr(error, "format_message"):
             raise

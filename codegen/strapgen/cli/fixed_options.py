@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from strapgen.cli.options import one, option, pair, whole
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -184,8 +184,8 @@ class FixedOptions:
         """Return the settings of fixed point for so many increments in a step; None if no option is stated."""
         if not self.stated:
             return None
+        from strapgen.ir import checks
         from strapgen.ir.fixed_settings import Settings
-        from strapgen.support import checks
 
         self._check_pairs()
         bits = whole("word", self.word)
@@ -238,7 +238,7 @@ class FixedOptions:
         """Refuse a largest rate or angle for a kernel that takes neither."""
         from strapgen.fixedpoint.sensor_scale import counted
         from strapgen.ir.fixed_settings import TURNING
-        from strapgen.library import generated_sources
+        from strapgen.run import generated_sources
 
         of_gyro = {*self.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
         of_angle = {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}
@@ -263,8 +263,8 @@ class FixedOptions:
 
     def check_backend(self, backend: str) -> None:
         """Refuse options of fixed point for a back end in floating point."""
-        from strapgen.backends import BACKENDS
-        from strapgen.support import checks
+        from strapgen.ir import checks
+        from strapgen.run.backends import BACKENDS
 
         one("--backend", backend)
         checks.choice("backend", backend, BACKENDS)
@@ -302,8 +302,8 @@ class FixedOptions:
         InputError
             If the back end's words have another length than the one stated.
         """
-        from strapgen.backends import BACKENDS
         from strapgen.ir.fixed_settings import Settings
+        from strapgen.run.backends import BACKENDS
 
         if not BACKENDS[backend].fixed:
             return None
@@ -317,7 +317,7 @@ class FixedOptions:
 
 
 def _numbers(texts: Iterable[str]) -> dict[str, Fraction]:
-    from strapgen.support import checks
+    from strapgen.ir import checks
 
     pairs = (pair("--range", text) for text in texts)
     return {name: checks.number(f"range of {name}", value, positive=True) for name, value in pairs}

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 
 from typer.core import TyperCommand, TyperGroup
 
-from strapgen.support.exceptions import StrapgenError
-from strapgen.support.suggestions import alternatives, suggestions
+from strapgen.ir.exceptions import StrapgenError
+from strapgen.ir.suggestions import alternatives, suggestions
 
 #: Narrowest and widest help in characters.
 _NARROWEST, _WIDEST = 40, 100
@@ -46,11 +46,11 @@ class PlainGroup(TyperGroup):
     """A group of commands, which its help lists under headings."""
 
     #: Headings and their commands; a command that is listed nowhere is not shown.
-    headings: ClassVar[dict[str, tuple[str, ...]]] = {}
+    headings: ClassVar[dict[str, list[str]]] = {}
 
     def get_help(self, ctx: Any) -> str:
         """Return the help: usage, text, options and the commands under their headings."""
-        headings = self.headings or {"Commands": tuple(self.commands)}
+        headings = self.headings or {"Commands": list(self.commands)}
         lines = _help(self, ctx)
         width = max(len(name) for names in headings.values() for name in names)
         for heading, names in headings.items():

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import typer
 
 from strapgen.cli.progress import waiting
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -352,7 +352,7 @@ def listed(option: str, text: str) -> list[str]:
 
 def backends(option: str, text: str | None, default: Sequence[str]) -> list[str]:
     """Return the back ends of a list, checked; the default without one."""
-    from strapgen.backends import BACKENDS
+    from strapgen.run.backends import BACKENDS
 
     if text is None:
         return list(default)

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import typer
 
 from strapgen.cli.options import option
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError
-from strapgen.support.suggestions import alternatives
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.suggestions import alternatives
 
 if TYPE_CHECKING:
-    from strapgen.reports.report import Report
+    from strapgen.results.report import Report
 
 _TABLE = ("text", "json", "csv", "markdown", "latex")
 _PLAIN = ("text", "json")
@@ -93,9 +93,9 @@ class Output:
             if path is not None and os.path.realpath(path) in files:
                 raise InputError(f"{name} {path} is a file that the command reads; another one is needed")
         if self.plot is not None:
-            from strapgen.reports import plots
+            from strapgen.results.figures import require_kind
 
-            plots.require_kind(self.plot)
+            require_kind(self.plot)
 
     @property
     def file(self) -> Path | None:
@@ -118,7 +118,7 @@ class Output:
 
     def deliver(self, text: str, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr says which were written."""
-        from strapgen.support.files import write_files
+        from strapgen.storage.files import write_files
 
         text = text.rstrip("\n")
         files: dict[str, str | bytes] = {}
@@ -144,6 +144,6 @@ def check_format(value: str) -> str:
 
 def print_json(data: Any) -> None:
     """Print data as JSON."""
-    from strapgen.reports.report import as_json
+    from strapgen.results.report import as_json
 
     sys.stdout.write(as_json(data) + "\n")

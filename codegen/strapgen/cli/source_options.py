@@ -11,7 +11,7 @@ import typer
 
 from strapgen.cli.options import option
 from strapgen.cli.output import Project, WithRuns, print_json
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.targets.names import Naming
@@ -97,8 +97,8 @@ class SourceOptions:
 
     def write(self, files: Mapping[str, str]) -> list[Path]:
         """Write files into the folder, but over none that has another contract, unless that is forced."""
-        from strapgen.library.generated_files import command_of, text_of
-        from strapgen.support.files import write_files
+        from strapgen.run.generated_files import command_of, text_of
+        from strapgen.storage.files import write_files
 
         folder = self.out or Path()
         for name, text in files.items():
@@ -117,7 +117,7 @@ class SourceOptions:
 
     def compare(self, files: Mapping[str, str]) -> str:
         """Return how the files in the folder differ from generated ones; "" if they do not."""
-        from strapgen.library import generated_files
+        from strapgen.run import generated_files
 
         return generated_files.difference(self.out or Path(), files)
 

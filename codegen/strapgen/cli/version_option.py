@@ -11,7 +11,7 @@ import typer
 def _show(chosen: bool) -> None:
     if not chosen:
         return
-    from strapgen.toolchain.versions import versions
+    from strapgen.run.versions import versions
 
     typer.echo("\n".join(f"{name} {version}" for name, version in versions().items()))
     raise typer.Exit

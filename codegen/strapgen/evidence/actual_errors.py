@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import choose
 from strapgen.evidence.balls import ball, column_of, multiplied, outcome, outcomes
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
-from strapgen.experiments.vectors import MODEL, vectors_of_choice
+from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
 from strapgen.ir.angle_accumulation import AngleAccumulation
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Program
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import InputError
+from strapgen.run import generated_sources
+from strapgen.run.fixed import ModelEvaluator
 
 #: Calls, and steps of a run; steps from one look at the state to the next.
 COUNT, BETWEEN = 10_000, 100

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Verdict
-from strapgen.support import checks
-from strapgen.support.processes import end_with_parent
+from strapgen.ir import checks
+from strapgen.run.processes import end_with_parent
 
 #: The checks by the names that ``--tool`` takes: the module and its function, which takes a subject and the folder for
 #: its files and returns a list of verdicts.

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
+from strapgen.evidence.fuzz_c import driver_files, driver_name
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.sources import Sources
-from strapgen.support.drafts import temporary_folder
-from strapgen.support.files import write_files
-from strapgen.targets.fuzz_c.emit import driver_files, driver_name
+from strapgen.storage.drafts import temporary_folder
+from strapgen.storage.files import write_files
 
 #: Inputs that are tried for the evidence of a kernel, and the seed of the fuzzer.
 INPUTS, SEED = 100_000, 1

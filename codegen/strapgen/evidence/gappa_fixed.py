@@ -21,7 +21,7 @@ from strapgen.ir.integer_program import (
     Term,
     Value,
 )
-from strapgen.symbolic import polynomials
+from strapgen.kernel import polynomials
 
 #: Degree up to which a value is expanded in the inputs for its range, and terms that this may take.
 _DEGREE, _MOST_TERMS = 2, 60

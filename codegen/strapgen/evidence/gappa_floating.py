@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from strapgen.evidence.gappa_scripts import SIGNS, CannotFollowError, Script, number, product, total
+from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions
+from strapgen.fixedpoint.floating.number_formats import NUMBERS
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import is_power_of_two
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import RESOLUTION, Program
-from strapgen.rounding.expressions import CONSTANT, INPUT, Expression, Expressions
-from strapgen.rounding.number_formats import NUMBERS
-from strapgen.symbolic import polynomials
+from strapgen.kernel import polynomials
 
 #: Gappa's names of the types.
 _FORMATS = {"double": "float<ieee_64,ne>", "float": "float<ieee_32,ne>"}

@@ -21,13 +21,13 @@ from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.same_bits import Draws, tool_of
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
+from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import CompilerError
-from strapgen.support.files import write_files
+from strapgen.lab.cost.runner_c import LongRun, long_run_files
+from strapgen.lab.cost.runners import RUNNERS
+from strapgen.run import generated_sources
+from strapgen.storage.files import write_files
 from strapgen.targets.contract import options
-from strapgen.targets.runner_c.emit import LongRun, long_run_files
-from strapgen.toolchain.runners import RUNNERS
 
 #: The step of the standard catalogue that takes a million steps.
 STEP = "euler-rk4-2"

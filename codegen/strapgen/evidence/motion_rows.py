@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.backends import evaluator
 from strapgen.ir.fixed_interface import Argument, Interface
-from strapgen.simulation.motions import GENERAL, Motion, motion
+from strapgen.lab.motions.motions import GENERAL, Motion, motion
+from strapgen.run.backends import evaluator
 
 #: Time between two rows in s.
 _STEP = Fraction(1, 8)

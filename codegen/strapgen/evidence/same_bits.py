@@ -9,17 +9,17 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from strapgen.backends.fixed import ModelEvaluator
 from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
-from strapgen.experiments.vectors import MODEL, model_call
-from strapgen.library import generated_sources
-from strapgen.support.exceptions import CompilerError
-from strapgen.support.files import write_files
-from strapgen.targets.runner_c.emit import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
-from strapgen.targets.vectors_c.emit import CallVector
-from strapgen.toolchain.runners import RUNNERS, Runner
+from strapgen.firmware.vectors.vectors import MODEL, model_call
+from strapgen.firmware.vectors.vectors_c import CallVector
+from strapgen.ir.exceptions import CompilerError
+from strapgen.lab.cost.runner_c import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
+from strapgen.lab.cost.runners import RUNNERS, Runner
+from strapgen.run import generated_sources
+from strapgen.run.fixed import ModelEvaluator
+from strapgen.storage.files import write_files
 
 #: Rows of the motion, which a run goes through again and again.
 ROWS = 250

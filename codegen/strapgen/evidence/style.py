@@ -13,11 +13,11 @@ from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.same_bits import LONGEST_WORD, ROWS
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
-from strapgen.experiments.vectors import vectors_of_choice
-from strapgen.library import generated_sources
-from strapgen.support.files import write_files
-from strapgen.targets.runner_c.emit import CallRun, run_files
-from strapgen.targets.vectors_c.emit import table_files
+from strapgen.firmware.vectors.vectors import vectors_of_choice
+from strapgen.firmware.vectors.vectors_c import table_files
+from strapgen.lab.cost.runner_c import CallRun, run_files
+from strapgen.run import generated_sources
+from strapgen.storage.files import write_files
 
 #: Checks of clang-tidy. That parameters of one type can be swapped is left out: an input, an output and a state are
 #: arrays of one type by nature, and their names stand in the header.

@@ -13,10 +13,10 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.library import generated_sources
-from strapgen.support.version import VERSION
-from strapgen.systems.fitting import fitted
-from strapgen.systems.wiring import Description
+from strapgen.ir.version import VERSION
+from strapgen.navigation.systems.fitting import fitted
+from strapgen.navigation.systems.wiring import Description
+from strapgen.run import generated_sources
 from strapgen.targets.names import UNNAMED, Naming
 
 

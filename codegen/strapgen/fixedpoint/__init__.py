@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Operation, Program, walk
-from strapgen.support.exceptions import InputError
 
 __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can_lower", "quantize"]
 
@@ -29,9 +29,7 @@ def quantize(program: Program, settings: Settings) -> FixedProgram:
     InputError
         If an input has no known range, a stated format does not hold its values, or the word is too short.
     """
-    from strapgen.fixedpoint.quantization import (
-        lowered,  # numpy and the proofs are loaded when they are needed
-    )
+    from strapgen.fixedpoint.quantization import lowered
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 
     if settings.input_bits is not None and not counted(program):

@@ -16,18 +16,11 @@ from strapgen.fixedpoint.derivation_context import DerivationContext, free_name,
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.operations import derive_operation
 from strapgen.fixedpoint.products import SUM_OPERATIONS, store, terms_of
-from strapgen.fixedpoint.quantities import (
-    InputElement,
-    Operand,
-    Quantities,
-    Quantity,
-    Selection,
-    used_by,
-)
+from strapgen.fixedpoint.quantities import InputElement, Operand, Quantities, Quantity, Selection, used_by
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.fixedpoint.terms import up
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
-from strapgen.support.exceptions import InputError
 
 
 def quantities(

@@ -7,21 +7,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.fixedpoint.limits import Limit, state_fraction, stated_format
-from strapgen.fixedpoint.quantities import (
-    InputElement,
-    Quantities,
-    Quotient,
-    Sum,
-    exponent,
-    is_power_of_two,
-)
+from strapgen.fixedpoint.quantities import InputElement, Quantities, Quotient, Sum, exponent, is_power_of_two
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import IntegerInput, Value
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import Signal
-from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)

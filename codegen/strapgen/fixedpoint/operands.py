@@ -10,8 +10,8 @@ from fractions import Fraction
 from strapgen.fixedpoint.quantities import Operand, is_dyadic
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.terms import largest_wide, nearest
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import Scaled
-from strapgen.support.exceptions import InputError
 
 
 @dataclass(frozen=True)

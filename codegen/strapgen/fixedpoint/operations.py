@@ -39,8 +39,8 @@ from strapgen.fixedpoint.quantities import (
     combined,
     scaled,
 )
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Node, Operation, Reference
-from strapgen.support.exceptions import InputError
 
 #: Functions on samples.
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

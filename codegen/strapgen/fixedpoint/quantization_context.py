@@ -10,11 +10,11 @@ from fractions import Fraction
 from strapgen.fixedpoint.format_plan import FormatPlan
 from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity, Sum, used_by
 from strapgen.fixedpoint.terms import up
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import ROUNDINGS, Format
 from strapgen.ir.integer_program import IntegerDefinition, Value
 from strapgen.ir.program import Program
-from strapgen.support.exceptions import InputError
 
 #: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
 _LARGEST_PART = Fraction(1, 2)

@@ -9,22 +9,15 @@ from fractions import Fraction
 
 from strapgen.fixedpoint.format_plan import carried_input
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantities import (
-    Monomial,
-    Quantity,
-    Sum,
-    exponent,
-    is_dyadic,
-    is_power_of_two,
-)
+from strapgen.fixedpoint.quantities import Monomial, Quantity, Sum, exponent, is_dyadic, is_power_of_two
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, binary, largest_wide, nearest, up
 from strapgen.fixedpoint.words.filters import Factor, filter_words, nearest_word
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Coefficient, IntegerSum, Term, Value
 from strapgen.ir.signed_digits import from_digits, signed_digits
-from strapgen.support.exceptions import InputError
 
 
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
-from strapgen.support.brief import short_repr
+from strapgen.ir.notebook_display import short_repr
 
 #: Fraction bits to which the root of a square is rounded up.
 _ROOT_BITS = 64

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.formats import SHORTEST_WORD, Format, check_rounding, check_word
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sensor import DEFAULT_BITS, Sensor
 from strapgen.ir.signed_digits import MULTIPLICATIONS
-from strapgen.support import checks
-from strapgen.support.brief import short_repr
-from strapgen.support.exceptions import InputError
 
 #: Rounding errors that are fed back from step to step.
 CARRIES = {

@@ -9,7 +9,7 @@ from typing import Any
 
 from strapgen.ir.decimals import above, float_above, float_below
 from strapgen.ir.fixed_interface import RoundingAccumulation
-from strapgen.support.brief import short_repr
+from strapgen.ir.notebook_display import short_repr
 
 
 @dataclass(frozen=True)

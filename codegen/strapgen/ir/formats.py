@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 
 #: The roundings of a value to its format, with the largest error in units of the last place.
 ROUNDINGS = {"nearest": Fraction(1, 2), "truncation": Fraction(1)}

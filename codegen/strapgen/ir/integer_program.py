@@ -14,8 +14,8 @@ from typing import Any
 from strapgen.ir.decimals import above, float_above, float_below
 from strapgen.ir.fixed_interface import ErrorFeedback, Interface
 from strapgen.ir.formats import Format
+from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.program import Program
-from strapgen.support.brief import notebook_html, short_repr
 
 
 @dataclass(frozen=True)

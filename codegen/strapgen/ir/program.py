@@ -15,10 +15,10 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from strapgen.ir.attitude_step import Companions
+from strapgen.ir.notebook_display import notebook_html, short_repr
+from strapgen.ir.once import once
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import notebook_html, short_repr
-from strapgen.support.once import once
 
 
 @dataclass(frozen=True)

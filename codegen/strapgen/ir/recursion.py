@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from strapgen.support.brief import short_repr
+from strapgen.ir.notebook_display import short_repr
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from strapgen.support import checks, units
-from strapgen.support.exceptions import InputError
+from strapgen.ir import checks, units
+from strapgen.ir.exceptions import InputError
 
 #: The unit of an angle a count.
 _ANGLE = "rad"

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from strapgen.support import checks
-from strapgen.support.brief import short_repr
+from strapgen.ir import checks
+from strapgen.ir.notebook_display import short_repr
 
 #: Frames that the components of a signal can be in.
 FRAMES = {

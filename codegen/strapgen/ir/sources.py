@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import notebook_html, short_repr
 
 if TYPE_CHECKING:
     from strapgen.ir.program import Program

@@ -13,13 +13,13 @@ from dataclasses import replace
 from itertools import count
 
 from strapgen.ir.program import Assignment, Node, Program, Reference, Result
+from strapgen.kernel.kernel import Kernel, Stage
+from strapgen.kernel.rational_constants import rationalized
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
 from strapgen.lowering.passes import PASSES, cost, optimize
 from strapgen.lowering.passes.rewriting import rewritten
 from strapgen.lowering.share import share
-from strapgen.symbolic.kernel import Kernel, Stage
-from strapgen.symbolic.rational_constants import rationalized
 
 __all__ = ["PASSES", "candidates", "lower"]
 

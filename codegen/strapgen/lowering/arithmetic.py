@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Any
 
 from strapgen.ir.program import Constant, Node, Operation
-from strapgen.symbolic.polynomials import Polynomial
+from strapgen.kernel.polynomials import Polynomial
 
 #: A sign, True for plus, and the node that is added or subtracted.
 Term = tuple[bool, Node]

@@ -14,11 +14,11 @@ from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, Stri
 
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
+from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.names import FACTOR
 from strapgen.lowering.share import Shared
-from strapgen.symbolic.evaluation import Direction, Wrapped
-from strapgen.symbolic.kernel import Kernel
 
 _FUNCTIONS = {
     sp.sin: "sin",

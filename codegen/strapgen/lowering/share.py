@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.names import SHARED
-from strapgen.symbolic.kernel import Kernel
 
 
 @dataclass(frozen=True)

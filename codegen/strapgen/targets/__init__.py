@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Function, Sources
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError
 from strapgen.targets import registry
 from strapgen.targets.registry import BUILT_IN, TARGETS, Target, titles
 

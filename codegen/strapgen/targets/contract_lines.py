@@ -19,7 +19,7 @@ from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
-from strapgen.support.version import VERSION
+from strapgen.ir.version import VERSION
 from strapgen.targets.printer import ExactPrinter
 
 #: The sentence that begins the block in a header.

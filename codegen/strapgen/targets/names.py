@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING, TypeVar
 
-from strapgen.support.exceptions import InputError
-from strapgen.targets.c.c_library import LIBRARY
+from strapgen.ir.exceptions import InputError
+from strapgen.targets.c_library import LIBRARY
 
 if TYPE_CHECKING:
     from strapgen.ir.integer_program import FixedProgram

@@ -10,18 +10,19 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from strapgen.ir import checks, packages
+from strapgen.ir.exceptions import InputError, StrapgenError
+from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.packages import entry_points
 from strapgen.ir.sources import Sources
-from strapgen.support import checks, packages
-from strapgen.support.brief import short_repr
-from strapgen.support.cache import digest
-from strapgen.support.exceptions import InputError, StrapgenError
-from strapgen.support.packages import entry_points
+from strapgen.storage.cache import digest
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     from strapgen.ir.integer_program import FixedProgram
     from strapgen.ir.program import Program
 

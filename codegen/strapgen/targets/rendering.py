@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen.support import resources
+from strapgen.storage import resources
 from strapgen.targets import contract
 from strapgen.targets.contract import elements_text, operations_text, range_text
 from strapgen.targets.lines import fill, fill_arguments, fill_definition, fill_lines

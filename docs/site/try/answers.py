@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import strapgen
-from strapgen.analysis.error_analysis import analyse
+from strapgen.analysis.error_analysis.error_analysis import analyse
+from strapgen.analysis.error_analysis.series_report import series_latex, series_text
 from strapgen.catalogue.methods import tableaux
+from strapgen.fixedpoint.floating import proved, rounding_bounds
 from strapgen.ir.program import Program
-from strapgen.reports.error_analysis.series import series_latex, series_text
-from strapgen.reports.formulas import as_latex
-from strapgen.reports.html_report.mathml import equations
-from strapgen.rounding import proved, rounding_bounds
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.kernel import Kernel
+from strapgen.report.mathml import equations
+from strapgen.results.display.formulas import as_latex
 
 #: The method that stands for the reader's own tableau, and the file that the tableau goes into.
 OWN = "own"

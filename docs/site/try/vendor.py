@@ -25,10 +25,10 @@ import strapgen
 from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.names import MOST_INCREMENTS
-from strapgen.library import generated_sources
-from strapgen.rounding import proved, rounding_bounds
-from strapgen.support import cache, resources
-from strapgen.support.exceptions import InputError
+from strapgen.fixedpoint.floating import proved, rounding_bounds
+from strapgen.ir.exceptions import InputError
+from strapgen.run import generated_sources
+from strapgen.storage import cache, resources
 
 HERE = Path(__file__).resolve().parent
 #: Python for WebAssembly.

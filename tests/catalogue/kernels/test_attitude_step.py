@@ -19,7 +19,7 @@ from strapgen.catalogue.methods.samples import increments_signal, label, labels,
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX, read
 from strapgen.ir.attitude_step import Order
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.kernel import Kernel
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 

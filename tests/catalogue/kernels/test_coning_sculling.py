@@ -8,8 +8,8 @@ import sympy as sp
 
 import strapgen
 from strapgen import derive
-from strapgen.backends import BACKENDS
-from strapgen.symbolic.rotations import cross_elements
+from strapgen.kernel.rotations import cross_elements
+from strapgen.run.backends import BACKENDS
 
 RING, T, *SYMBOLS = sp.ring(
     "T " + " ".join(f"{v}{k}{axis}" for v in "wabuex" for k in (0, 1) for axis in "xyz"), sp.QQ

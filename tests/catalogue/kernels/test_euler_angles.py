@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen import derive
-from strapgen.backends import BACKENDS, Evaluator
+from strapgen.run.backends import BACKENDS, Evaluator
 
 EPS = 2.0**-52
 TURN = 2 * np.pi

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen.catalogue import choose
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.support.exceptions import InputError
 
 #: Methods of every way to differentiate: few vectors, a rotation vector, stage by stage; with their samples.
 QUICK = {

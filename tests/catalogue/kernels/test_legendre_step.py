@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.catalogue.methods.late_filters import LateFilters
 from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.design.commit_late.late_filters import LateFilters
 
 
 @pytest.mark.long

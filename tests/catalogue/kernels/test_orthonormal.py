@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen import derive, lower
-from strapgen.symbolic import rotations
+from strapgen.kernel import rotations
 
 EPS = np.finfo(float).eps
 SCHEME = "dcm-orthonormalize"

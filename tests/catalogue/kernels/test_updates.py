@@ -12,10 +12,10 @@ from gathering import each
 
 import strapgen
 from strapgen import derive
-from strapgen.backends import BACKENDS
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.ir.fixed_settings import Settings
-from strapgen.symbolic import rotations
+from strapgen.kernel import rotations
+from strapgen.run.backends import BACKENDS
 
 ORDERS = [1, 2, 3, 4, 5, 7, pytest.param(12, marks=pytest.mark.long)]
 PRECISE = mpmath.mp.clone()

@@ -15,12 +15,12 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen.analysis import velocity_series
+from strapgen.analysis.series import velocity_series
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.windows import named_window
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.support.exceptions import InputError
-from strapgen.symbolic.power_series import Powers, outputs
+from strapgen.kernel.power_series import Powers, outputs
 
 NAME = "velocity-position"
 #: A method of every family with its samples: of the step, from before it, from after it.

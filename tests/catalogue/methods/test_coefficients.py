@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.catalogue.methods.coefficients import number, text
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 QUICK = settings(derandomize=True, database=None, deadline=None)
 ROOT = sp.sqrt(21)

@@ -19,14 +19,15 @@ from tolerances import one_call
 
 import strapgen
 from strapgen import derive
-from strapgen.backends import BACKENDS, evaluator, exact
 from strapgen.catalogue import MOST_INCREMENTS, Choice, choose
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods import rotation_series as series
 from strapgen.catalogue.methods.coning import method, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.ir.fixed_settings import Settings
-from strapgen.symbolic.rotations import cross_elements
+from strapgen.kernel.rotations import cross_elements
+from strapgen.run import exact
+from strapgen.run.backends import BACKENDS, evaluator
 
 #: Every number of samples, and of those kept.
 ALL = [(n, p) for n in range(1, MOST_INCREMENTS + 1) for p in range(4)]

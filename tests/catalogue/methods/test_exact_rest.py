@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import strapgen
 from strapgen import choose, derive
 from strapgen.catalogue.methods import coning_coefficients
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 #: Motion and its parameters, with the drift in deg/h at 100 Hz over 60 s of 8 samples and 3 before, and of 5 and 3,
 #: which others computed from the formulas.

@@ -22,8 +22,8 @@ from peano_baker import (
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS
 from strapgen.catalogue.methods import magnus
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, evaluate_stages
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, evaluate_stages
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from strapgen import backend, derive, motion, simulate
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel.kernel import Kernel
 
 #: Samples of a step, and those before it.
 SAMPLES = pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from strapgen import derive
 from strapgen.catalogue import ALGORITHMS
 from strapgen.catalogue.methods import munthe_kaas
 from strapgen.catalogue.methods.munthe_kaas import bortz
-from strapgen.symbolic.kernel import evaluate_stages
+from strapgen.kernel.kernel import evaluate_stages
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -15,10 +15,10 @@ from derived import turns
 import strapgen
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER
 from strapgen.catalogue.methods import polynomial_rotation
-from strapgen.simulation.reference_attitudes import KNOT, ReferenceAttitude
-from strapgen.symbolic import rotations
-from strapgen.symbolic.evaluation import evaluate
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.evaluation import evaluate
+from strapgen.kernel.kernel import KernelBuilder
+from strapgen.lab.motions.reference_attitudes import KNOT, ReferenceAttitude
 
 #: Legendre coefficients of a rate times the step in rad, the largest of about 1 rad.
 COEFFICIENTS = np.array(

@@ -10,8 +10,8 @@ import sympy as sp
 from strapgen import derive
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.munthe_kaas import bortz
-from strapgen.symbolic import rotations
-from strapgen.symbolic.rotations import cross_elements
+from strapgen.kernel import rotations
+from strapgen.kernel.rotations import cross_elements
 
 A = sp.Symbol("alpha", positive=True)
 #: alpha . w, and the coefficients of the derivative of alpha along w, alpha x w and alpha.

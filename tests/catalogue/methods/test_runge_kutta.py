@@ -17,7 +17,7 @@ from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.methods.runge_kutta import method
 from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 METHOD = pytest.mark.parametrize("method", STANDARD_METHODS)

@@ -12,7 +12,7 @@ import strapgen
 from strapgen import choose, derive
 from strapgen.catalogue.methods import shaped_coning
 from strapgen.catalogue.methods.shaped_coning import SHAPES, read
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 FOLDER = Path(shaped_coning.__file__).parent / "coning_shapes"
 

@@ -18,8 +18,8 @@ from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.order_conditions import largest_residual
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX, read, verify
-from strapgen.support import resources
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.storage import resources
 
 FOLDER = Path(tableaux.__file__).parent / "butcher_tableaux"
 BUILT_IN = pytest.mark.parametrize("name", TABLEAUX)

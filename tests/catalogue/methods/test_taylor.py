@@ -10,7 +10,7 @@ from peano_baker import evaluated, generic_rate, increments, local_error, true_r
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -12,8 +12,8 @@ import sympy as sp
 from strapgen import InputError, backend, choose, derive, motion, simulate
 from strapgen.catalogue import ALGORITHMS
 from strapgen.catalogue.methods import rate_fit
-from strapgen.simulation.motions import Motion
-from strapgen.symbolic.kernel import Kernel, evaluate_stages
+from strapgen.kernel.kernel import Kernel, evaluate_stages
+from strapgen.lab.motions.motions import Motion
 
 
 def cone(frequency_hz: float) -> Motion:

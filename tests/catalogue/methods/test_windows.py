@@ -16,8 +16,8 @@ from gathering import each
 from strapgen.catalogue.methods import window_conditions, windows
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOW_TITLES, WINDOWS, read, verify
-from strapgen.support import resources
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
+from strapgen.storage import resources
 
 FOLDER = Path(windows.__file__).parent / "window_filters"
 FAMILIES = pytest.mark.parametrize("name", WINDOW_TITLES)

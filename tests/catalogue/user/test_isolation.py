@@ -11,7 +11,7 @@ import pytest
 from users_files import beside, written
 
 import strapgen
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 
 def title(path: str) -> str:

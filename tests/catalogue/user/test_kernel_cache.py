@@ -17,9 +17,9 @@ import strapgen
 from strapgen.catalogue import choose
 from strapgen.catalogue.user import kernel_cache, loading
 from strapgen.cli import main
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
-from strapgen.support import cache
-from strapgen.support.exceptions import InputError
+from strapgen.storage import cache
 
 #: Says on stderr that the file runs.
 SAYS = "print('derived')\n"

@@ -22,7 +22,7 @@ from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.user import loading
 from strapgen.cli import main
-from strapgen.support.exceptions import InputError, InputTypeError
+from strapgen.ir.exceptions import InputError, InputTypeError
 
 FOLDER = Path(__file__).resolve().parents[2] / "data" / "algorithms"
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 5"
@@ -150,7 +150,7 @@ STEP = """
 from fractions import Fraction
 import sympy as sp
 from strapgen.ir.attitude_step import Companions
-from strapgen.symbolic.kernel import Kernel, KernelBuilder, Stage
+from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage
 from strapgen.ir.signals import Signal
 
 def algorithm():

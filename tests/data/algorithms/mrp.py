@@ -9,8 +9,8 @@ from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "M. D. Shuster, J. Astronaut. Sci. 41 (1993) 439-517"
 STATE = Signal.vector(

@@ -6,8 +6,8 @@ from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.kernel import KernelBuilder
-from strapgen.symbolic.rotations import cross
+from strapgen.kernel.kernel import KernelBuilder
+from strapgen.kernel.rotations import cross
 
 
 def algorithm():

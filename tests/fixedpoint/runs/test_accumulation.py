@@ -15,7 +15,6 @@ from derived import program, quantized
 from small_integers import computed, with_feedback
 
 from strapgen import generate
-from strapgen.backends.fixed import ModelEvaluator
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
@@ -40,6 +39,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.ir.program import OPERATIONS, Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
+from strapgen.run.fixed import ModelEvaluator
 
 
 def test_a_sum_of_products_moves_by_no_more_than_is_told():

@@ -10,12 +10,12 @@ from gathering import each
 from strapgen import catalogue, derive
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, walk
 from strapgen.ir.signals import Signal
+from strapgen.kernel.covariants import NotCovariantError
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.kernel.rotations import dot, quaternion_product, skew
 from strapgen.lowering import lower
 from strapgen.lowering.canonical import extract_core
 from strapgen.lowering.canonical.core import Core, decompose, extract, verify
-from strapgen.symbolic.covariants import NotCovariantError
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.symbolic.rotations import dot, quaternion_product, skew
 
 #: Two vectors in one signal.
 PAIR = Signal("increments", (2, 3), tuple(f"d{k}_{axis}" for k in (1, 2) for axis in "xyz"))

@@ -12,9 +12,9 @@ from derived import kernel, program
 
 from strapgen import catalogue
 from strapgen.catalogue import Choice
+from strapgen.kernel.kernel import evaluate_stages
 from strapgen.lowering import canonical
 from strapgen.lowering.canonical.core import decompose
-from strapgen.symbolic.kernel import evaluate_stages
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -11,9 +11,9 @@ from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.signals import Signal
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.lowering import lower
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
 
 
 def two_sample(stage: str, prefix: str, transition: tuple[str, ...], increments: tuple[str, str]) -> Kernel:

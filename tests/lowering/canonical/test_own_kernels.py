@@ -8,10 +8,10 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.kernel.rotations import cross, dot, quaternion_product, skew
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.passes import cost, optimize
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.symbolic.rotations import cross, dot, quaternion_product, skew
 
 #: Elements of state and increment of a step from one.
 NAMES = ("e_x", "e_y", "e_z", "e_s", "d1_x", "d1_y", "d1_z")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from gathering import each
 
+from strapgen.kernel.polynomials import ONE
 from strapgen.lowering.canonical.plan import _axes
-from strapgen.symbolic.polynomials import ONE
 
 
 @each(

@@ -10,11 +10,11 @@ import pytest
 from derived import kernel
 
 from strapgen.catalogue import Choice
+from strapgen.kernel.kernel import evaluate_stages
+from strapgen.kernel.polynomials import Polynomial
+from strapgen.kernel.rotations import cross_elements, dot
 from strapgen.lowering.canonical import extract_core
 from strapgen.lowering.canonical.vector_form import Sum, VectorForm, vector_form
-from strapgen.symbolic.kernel import evaluate_stages
-from strapgen.symbolic.polynomials import Polynomial
-from strapgen.symbolic.rotations import cross_elements, dot
 
 Vectors = dict[str, list[Fraction]]
 

@@ -10,9 +10,9 @@ from strapgen.catalogue.kernels.coning_sculling import ANGLE_SUM, SCULLING, VELO
 from strapgen.catalogue.kernels.updates import NAVIGATION_ROTATION
 from strapgen.catalogue.kinematics import DCM_MEANING, KINEMATICS, SAVAGE, UNIT
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.symbolic.rotations import cross
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.kernel.rotations import cross
 
 TRANSFORMED = Signal.vector(
     "transformed",

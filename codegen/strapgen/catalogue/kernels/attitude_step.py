@@ -13,8 +13,8 @@ from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.attitude_step import Companions, Order, Truncation
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.symbolic.rotations import dot
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.kernel.rotations import dot
 
 
 def step(

@@ -11,8 +11,8 @@ import sympy as sp
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, SAVAGE, THESIS, Kinematics
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 _CONVERTED = Signal.matrix(
     "attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound, constraint="rotation", frame="b to n"

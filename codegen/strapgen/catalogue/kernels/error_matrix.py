@@ -6,7 +6,7 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS, UNIT
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
 def error_matrix() -> Kernel:

@@ -10,8 +10,8 @@ import sympy as sp
 from strapgen.catalogue.kinematics import DCM, SAVAGE
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import ANY, Signal
-from strapgen.symbolic.evaluation import Direction, Wrapped
-from strapgen.symbolic.kernel import Kernel, KernelBuilder, resolution
+from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.kernel import Kernel, KernelBuilder, resolution
 
 ANGLES = Signal(
     "angles",

@@ -18,12 +18,12 @@ from strapgen.catalogue.kinematics import DCM, EULER, KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import PHI, Method
 from strapgen.catalogue.methods.samples import Samples, increments_signal
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.covariant_derivatives import CovariantFunction
-from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError
-from strapgen.symbolic.degrees import degree
-from strapgen.symbolic.kernel import Kernel, KernelBuilder, Stage, evaluate_stages
-from strapgen.symbolic.tangents import add_tangents
+from strapgen.kernel import rotations
+from strapgen.kernel.covariant_derivatives import CovariantFunction
+from strapgen.kernel.covariants import Decomposition, Frame, NotCovariantError
+from strapgen.kernel.degrees import degree
+from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, evaluate_stages
+from strapgen.kernel.tangents import add_tangents
 
 #: Most vectors of a transition that is differentiated as a function of them, and of a rotation vector.
 _FEW, _SOME = 2, 6

@@ -13,7 +13,7 @@ from strapgen.catalogue.methods import rate_fit, windowed
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Window
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 _SOURCE = "the rate as a Legendre series"
 

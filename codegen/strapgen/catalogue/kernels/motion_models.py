@@ -13,8 +13,8 @@ import sympy as sp
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
 from strapgen.catalogue.names import MOTIONS as MOTION_PARAMETERS
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 Formula = Callable[..., sp.Matrix]
 

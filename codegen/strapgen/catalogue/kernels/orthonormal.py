@@ -6,8 +6,8 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, SAVAGE, THESIS, UNIT, Kinematics
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 _COMPUTED = Signal.matrix(
     "computed", "C", meaning=f"{DCM_MEANING}, as computed", bound=UNIT, constraint="rotation", frame="b to n"

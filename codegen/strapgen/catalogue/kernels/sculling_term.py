@@ -10,9 +10,9 @@ from strapgen.catalogue.kernels.attitude_step import chosen
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import increments_signal, sample_names, velocities_signal
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
-from strapgen.symbolic.rotations import cross
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.kernel.rotations import cross
 
 
 def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:

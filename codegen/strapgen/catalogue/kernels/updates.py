@@ -10,8 +10,8 @@ import sympy as sp
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE, Kinematics
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 ROTATION_VECTOR = Signal.vector(
     "rotation_vector",

@@ -28,10 +28,10 @@ from strapgen.catalogue.methods.samples import Samples, increments_signal, veloc
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windowed import DEGREE
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import Kernel, KernelBuilder, symbols
-from strapgen.symbolic.rotations import cross, dot
-from strapgen.symbolic.tangents import add_tangents
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import Kernel, KernelBuilder, symbols
+from strapgen.kernel.rotations import cross, dot
+from strapgen.kernel.tangents import add_tangents
 
 #: Highest power of the rotation vector in the left Jacobian, and of the angles in a method's own exponentials.
 SERIES = 12

@@ -9,8 +9,8 @@ from typing import Any
 
 from strapgen.catalogue.methods import coefficients
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 
 _FRACTION = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
 #: Most characters of a fraction; those of filters for a gyro are long.

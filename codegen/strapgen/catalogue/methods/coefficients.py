@@ -13,7 +13,7 @@ import warnings
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     import sympy as sp

@@ -13,9 +13,9 @@ from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples, sample_names
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.kernel import KernelBuilder
-from strapgen.symbolic.rotations import cross
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import KernelBuilder
+from strapgen.kernel.rotations import cross
 
 #: Most Legendre coefficients of the rate in the terms of third and fourth order.
 MOST_COEFFICIENTS = 6

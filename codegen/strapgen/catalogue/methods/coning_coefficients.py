@@ -27,9 +27,9 @@ from sympy.polys.matrices import DomainMatrix
 
 from strapgen.catalogue.methods import rotation_series
 from strapgen.catalogue.methods.rotation_series import Scalars, fraction
-from strapgen.support import checks
-from strapgen.support.brief import notebook_latex, short_repr
-from strapgen.support.exceptions import InputError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import notebook_latex, short_repr
 
 SOURCES = {
     "compressed": "M. B. Ignagni, J. Guid. Control Dyn. 13 (1990) 363-369",

@@ -14,8 +14,8 @@ from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = (
     "P. E. Crouch, R. Grossman, J. Nonlinear Sci. 3 (1993) 1-33; coefficients as in E. Hairer, C. Lubich, G. Wanner, "

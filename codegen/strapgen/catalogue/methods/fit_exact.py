@@ -11,7 +11,7 @@ from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import polynomial_rotation
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel.kernel import KernelBuilder
 
 #: Increments of a step in a part that has a series of its own: with 16 terms in each, more terms or more parts change
 #: the drift by less than 1e-4 of itself on a cone of 15 deg at a fifth of the sampling rate.

@@ -12,8 +12,8 @@ import sympy as sp
 from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "S. Blanes, F. Casas, J. A. Oteo, J. Ros, Phys. Rep. 470 (2009) 151-238, section 5.3"
 

@@ -17,8 +17,8 @@ from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Window
 from strapgen.ir.attitude_step import Order, Truncation
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import KernelBuilder
 
 #: Signal of the rotation vector of a step.
 PHI = Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step")

@@ -17,8 +17,8 @@ import sympy as sp
 from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
 from strapgen.catalogue.methods import rate_fit
 from strapgen.ir.signals import Signal
-from strapgen.symbolic import rotations
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel import rotations
+from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), I.8"
 

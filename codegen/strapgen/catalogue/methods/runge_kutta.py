@@ -13,7 +13,7 @@ from strapgen.catalogue.methods.order_conditions import attitude_order
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.kernel import Kernel, KernelBuilder
+from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
 def method(tableau: Tableau) -> Method:

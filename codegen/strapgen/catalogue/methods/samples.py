@@ -11,9 +11,9 @@ from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.ir.attitude_step import Order
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import Signal
-from strapgen.support.brief import short_repr
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel.kernel import KernelBuilder
 
 
 def sample_names(count: int, previous: int = 0, ahead: int = 0, letter: str = "d") -> list[str]:

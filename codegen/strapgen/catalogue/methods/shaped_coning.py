@@ -16,14 +16,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files
 from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, rational
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.support import checks, toml_files
-from strapgen.support.brief import notebook_latex, short_repr
-from strapgen.support.exceptions import InputError
-from strapgen.support.suggestions import counted
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.suggestions import counted
 
 #: Keys of a file, and those of them that are optional.
 KEYS = (

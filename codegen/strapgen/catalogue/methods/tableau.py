@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from strapgen.support.brief import notebook_latex, short_repr
+from strapgen.ir.notebook_display import notebook_latex, short_repr
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number

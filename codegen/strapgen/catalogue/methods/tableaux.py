@@ -13,13 +13,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
 from strapgen.catalogue.methods.coefficient_files import entries
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.support import checks, toml_files
-from strapgen.support.brief import short_repr
-from strapgen.support.exceptions import InputError
-from strapgen.support.suggestions import counted, needed
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.suggestions import counted, needed
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number

@@ -14,7 +14,7 @@ from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
 from strapgen.catalogue.methods import polynomial_rotation
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.symbolic.kernel import KernelBuilder
+from strapgen.kernel.kernel import KernelBuilder
 
 #: Lowest degree of the polynomial for which the series is taken from the middle of the step.
 _CENTRED = 2

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
-from strapgen.support.brief import notebook_latex, short_repr
-from strapgen.support.exceptions import InputError
-from strapgen.support.suggestions import counted
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.suggestions import counted
 
 #: A filter: a weight for each sample of the window, the oldest first.
 Taps = tuple[Fraction, ...]

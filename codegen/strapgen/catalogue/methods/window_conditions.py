@@ -11,7 +11,7 @@ from fractions import Fraction
 from math import comb, factorial
 
 from strapgen.catalogue.methods.window import GyroResponse, Taps, Window
-from strapgen.support.exceptions import InputError
+from strapgen.ir.exceptions import InputError
 
 #: A rational that rounds to pi in double precision; with it the conditions of a gyro are rational.
 PI = Fraction(245850922, 78256779)

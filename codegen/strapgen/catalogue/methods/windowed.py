@@ -23,9 +23,9 @@ from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.signals import Signal
-from strapgen.symbolic.evaluation import exact
-from strapgen.symbolic.kernel import KernelBuilder
-from strapgen.symbolic.rotations import cross, dot
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import KernelBuilder
+from strapgen.kernel.rotations import cross, dot
 
 #: Highest degree of the Legendre coefficients in the rotation vector, and order of a step with its terms.
 DEGREE, _FOURTH = 4, 6

@@ -14,13 +14,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, coefficients, window_conditions
 from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
-from strapgen.support import checks, toml_files
-from strapgen.support.brief import short_repr
-from strapgen.support.exceptions import InputError
-from strapgen.support.suggestions import counted
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.suggestions import counted
 
 #: Keys of a file, and those of them that are optional.
 KEYS = (

@@ -12,13 +12,13 @@ import sympy as sp
 from strapgen.catalogue.derivation import companion as derived_companion
 from strapgen.catalogue.methods.samples import beside
 from strapgen.catalogue.names import RESERVED
+from strapgen.ir import checks
 from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import RESOLUTION
-from strapgen.support import checks
-from strapgen.support.exceptions import InputError
-from strapgen.symbolic import reading
-from strapgen.symbolic.evaluation import Direction, Wrapped
-from strapgen.symbolic.kernel import Kernel
+from strapgen.kernel import reading
+from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.kernel import Kernel
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 #: Endings of the names of a kernel's functions in all targets.

@@ -22,8 +22,8 @@ from types import CodeType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from strapgen.support.cache import digest
-from strapgen.support.resources import PACKAGE
+from strapgen.storage.cache import digest
+from strapgen.storage.resources import PACKAGE
 
 #: Audit events beyond reading a file. The files read cannot tell whether a kernel that depends on one has changed.
 _OUTSIDE = {

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.user.isolation import Record, installed_folders
-from strapgen.catalogue.user.user_kernel import UserKernel, packed
-from strapgen.support import cache
-from strapgen.support.exceptions import InputError
-from strapgen.support.timing import from_cache, timed
+from strapgen.catalogue.user_kernel import UserKernel, packed
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.timing import from_cache, timed
+from strapgen.storage import cache
 
 if TYPE_CHECKING:
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
 _KIND = "kernels"
 _KERNEL, _HEAD, _RECORD = "kernel.pickle", "head.pickle", "record.json"

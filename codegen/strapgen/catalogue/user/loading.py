@@ -15,16 +15,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue.user import isolation, kernel_cache
-from strapgen.catalogue.user.user_kernel import UserKernel
-from strapgen.support import cache, checks, packages
-from strapgen.support.brief import full_text
-from strapgen.support.exceptions import InputError
-from strapgen.support.packages import entry_points
+from strapgen.catalogue.user_kernel import UserKernel
+from strapgen.ir import checks, packages
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import full_text
+from strapgen.ir.packages import entry_points
+from strapgen.storage import cache
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
 #: Entry points of installed packages.
 GROUP = "strapgen.algorithms"
@@ -149,7 +150,7 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
 def _require(name: str, kernel: Any) -> None:
     """Check that a user's function returned a kernel that the stages can work on."""
     from strapgen.catalogue.user import admission
-    from strapgen.symbolic.kernel import Kernel
+    from strapgen.kernel.kernel import Kernel
 
     if not isinstance(kernel, Kernel):
         raise InputError(f"{name}: {FUNCTION}() returned {type(kernel).__name__}; a Kernel is needed")

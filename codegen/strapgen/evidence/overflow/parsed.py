@@ -8,7 +8,7 @@ from functools import cached_property
 
 from pycparser import c_ast, c_parser
 
-from strapgen.support.drafts import temporary_folder
+from strapgen.storage.drafts import temporary_folder
 
 _BITS = (8, 16, 32, 64)
 _STDINT = "\n".join(

@@ -19,7 +19,7 @@ from strapgen.fixedpoint.runs.accumulation import StepErrors, norm, root, stretc
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
-from strapgen.symbolic.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
+from strapgen.kernel.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
 
 #: Elements of the vectors whose attitude turns by twice their angle: Euler and Cayley-Klein parameters.
 _PARAMETERS = 4

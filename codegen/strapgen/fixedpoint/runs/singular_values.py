@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.program import Program, Result
-from strapgen.symbolic.bernstein import Cube, Powers, eigenvalue_bounds
-from strapgen.symbolic.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
+from strapgen.kernel.bernstein import Cube, Powers, eigenvalue_bounds
+from strapgen.kernel.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
 
 #: Dimensions of space, and elements of a quaternion.
 _SPACE, _QUATERNION = 3, 4

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 
 from strapgen.ir.program import Assignment
+from strapgen.kernel.covariants import NotCovariantError
+from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.canonical.core import Core, decompose, extract, verify
 from strapgen.lowering.canonical.search import plans
 from strapgen.lowering.canonical.vectors import independent
 from strapgen.lowering.canonical.writing import NameClashError, Writer
-from strapgen.symbolic.covariants import NotCovariantError
-from strapgen.symbolic.kernel import Kernel
 
 __all__ = ["Core", "expansion", "extract_core", "forms", "verify"]
 

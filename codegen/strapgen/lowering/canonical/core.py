@@ -10,10 +10,10 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
+from strapgen.kernel.covariants import Decomposition, Frame, NotCovariantError
+from strapgen.kernel.degrees import degree
+from strapgen.kernel.kernel import Kernel, Stage, evaluate_stages
 from strapgen.lowering.canonical.vectors import Form, components, independent
-from strapgen.symbolic.covariants import Decomposition, Frame, NotCovariantError
-from strapgen.symbolic.degrees import degree
-from strapgen.symbolic.kernel import Kernel, Stage, evaluate_stages
 
 
 @dataclass(frozen=True)

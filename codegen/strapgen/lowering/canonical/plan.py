@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 
+from strapgen.kernel.covariants import Coefficients, Covariant, Decomposition
+from strapgen.kernel.polynomials import ONE, Polynomial, add, ratio, scale
 from strapgen.lowering.canonical.vectors import Form, Pool
-from strapgen.symbolic.covariants import Coefficients, Covariant, Decomposition
-from strapgen.symbolic.polynomials import ONE, Polynomial, add, ratio, scale
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Sequence
 from fractions import Fraction
 
+from strapgen.kernel.polynomials import Polynomial, atom, atoms, substitute
 from strapgen.lowering.canonical.vectors import Form, components
-from strapgen.symbolic.polynomials import Polynomial, atom, atoms, substitute
 
 #: The weight of a scalar product in the cost, in factors of a term.
 _PRODUCT = 3

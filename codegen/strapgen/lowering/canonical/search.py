@@ -6,6 +6,8 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
+from strapgen.kernel.covariants import Decomposition, transform
+from strapgen.kernel.polynomials import Polynomial, atoms
 from strapgen.lowering.canonical.core import Core
 from strapgen.lowering.canonical.plan import Cross, Opened, Plan, Planner, Sides, without_triples
 from strapgen.lowering.canonical.vectors import (
@@ -18,8 +20,6 @@ from strapgen.lowering.canonical.vectors import (
     proportion,
 )
 from strapgen.lowering.canonical.writing import unsigned
-from strapgen.symbolic.covariants import Decomposition, transform
-from strapgen.symbolic.polynomials import Polynomial, atoms
 
 #: How many bases, those with the lowest first guess, are planned in every way.
 _PLANNED = 30

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from strapgen.kernel.covariants import Coefficients, Covariant, Decomposition, NotCovariantError, transform
+from strapgen.kernel.kernel import Kernel
+from strapgen.kernel.polynomials import Polynomial, atoms, scale
 from strapgen.lowering.canonical import expansion, extract_core
 from strapgen.lowering.canonical.core import Core, decompose
 from strapgen.lowering.canonical.plan import Plan, without_triples
 from strapgen.lowering.canonical.products import choose_products
 from strapgen.lowering.canonical.search import plans
 from strapgen.lowering.canonical.vectors import Form, all_components, independent
-from strapgen.symbolic.covariants import Coefficients, Covariant, Decomposition, NotCovariantError, transform
-from strapgen.symbolic.kernel import Kernel
-from strapgen.symbolic.polynomials import Polynomial, atoms, scale
 
 #: How many bases, those in which the code is shortest first, are compared for a reader.
 _READ = 8

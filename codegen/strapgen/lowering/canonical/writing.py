@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Reference
+from strapgen.kernel.polynomials import Polynomial, ratio
+from strapgen.kernel.rotations import CROSS
 from strapgen.lowering.arithmetic import (
     Term,
     chain,
@@ -19,8 +21,6 @@ from strapgen.lowering.arithmetic import (
 )
 from strapgen.lowering.canonical.plan import Cross, Plan, Sides, Weighted
 from strapgen.lowering.canonical.products import choose_products
-from strapgen.symbolic.polynomials import Polynomial, ratio
-from strapgen.symbolic.rotations import CROSS
 
 #: A summand of a vector: its coefficient, its weight unless that is a number, and the name of the vector.
 _Summand = tuple[Fraction, Reference | None, str]

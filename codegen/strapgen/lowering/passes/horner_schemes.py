@@ -6,9 +6,9 @@ from fractions import Fraction
 from functools import lru_cache
 
 from strapgen.ir.program import Constant, Node, Operation, Program
+from strapgen.kernel.polynomials import ONE, Polynomial, add, atom, multiply, scale
 from strapgen.lowering.arithmetic import horner, operation_count, plain
 from strapgen.lowering.passes.rewriting import REMEMBERED, with_values
-from strapgen.symbolic.polynomials import ONE, Polynomial, add, atom, multiply, scale
 
 #: Most terms of a polynomial that is rewritten: expanding a longer one takes long and saves no operations.
 _MOST_TERMS = 60

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, names_in, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
-from strapgen.rounding import rounding_bounds
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c.rounding_text import rounding_text, with_names
 from strapgen.targets.lines import fill_expression

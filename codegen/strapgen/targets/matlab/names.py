@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Program
-from strapgen.support.exceptions import InputError
 from strapgen.targets.names import Language, function_name
 
 #: Keywords of MATLAB and of Octave, and what either takes for a number or a value.

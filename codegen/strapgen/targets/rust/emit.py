@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
+from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, walk
 from strapgen.ir.sources import Function, Sources
-from strapgen.rounding import rounding_bounds
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c import emit as c
 from strapgen.targets.c.rounding_text import rounding_text, with_names

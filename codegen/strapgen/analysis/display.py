@@ -1,0 +1,101 @@
+"""How the objects of the analysis show themselves in a notebook."""
+
+from __future__ import annotations
+
+from strapgen.analysis.algorithm import AttitudeAlgorithm
+from strapgen.analysis.error_analysis.error_analysis import ErrorAnalysis
+from strapgen.analysis.growth.growth import Stability
+from strapgen.analysis.growth.growth_report import stability_latex
+from strapgen.analysis.series.notation import LATEX, covariant_text
+from strapgen.analysis.series.series import PARTS, STEP, ErrorSeries
+from strapgen.analysis.series.velocity_series import VelocitySeries
+from strapgen.analysis.series.velocity_series_report import velocity_series_latex
+from strapgen.analysis.unknowns import unknowns_latex
+from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
+from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep
+from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
+from strapgen.results.display import formulas
+from strapgen.results.display.expressions import expression_latex
+from strapgen.results.display.latex import equations
+from strapgen.results.display.objects import latex
+
+#: Most lines of a formula in a notebook.
+_LINES = 24
+
+
+@latex.register
+def _(stability: Stability) -> str | None:
+    return stability_latex([stability])
+
+
+@latex.register
+def _(tableau: UnknownTableau) -> str | None:
+    return unknowns_latex.unknown_tableau_latex(tableau)
+
+
+@latex.register
+def _(equation: Equation) -> str | None:
+    return unknowns_latex.conditions_latex([equation])
+
+
+@latex.register
+def _(family: Family) -> str | None:
+    return unknowns_latex.family_latex(family)
+
+
+@latex.register
+def _(solution: PolynomialSolution) -> str | None:
+    return unknowns_latex.solution_latex(solution)
+
+
+@latex.register
+def _(solved: SolvedStep) -> str | None:
+    return unknowns_latex.solved_latex(solved)
+
+
+@latex.register
+def _(error: LeadingError) -> str | None:
+    return unknowns_latex.leading_latex(error)
+
+
+@latex.register
+def _(series: VelocitySeries) -> str | None:
+    text = velocity_series_latex(series)
+    return text if len(text.splitlines()) <= _LINES else None
+
+
+@latex.register
+def _(analysis: ErrorAnalysis) -> str | None:
+    return latex(analysis.step)
+
+
+@latex.register
+def _(series: ErrorSeries) -> str | None:
+    """Return the leading terms of drift, scale and skew: in vectors for a general rate."""
+    rows = []
+    if series.invariant:
+        power = min(series.invariant)
+        one = series.invariant[power]
+        rows.append((rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX)))
+        if one.symmetric:
+            rows.append(
+                (
+                    rf"h^{{{power}}}\!:\ \mathbf{{Y}}",
+                    covariant_text(one.symmetric, symmetric=True, notation=LATEX),
+                )
+            )
+    else:
+        for part in PARTS:
+            if coefficients := series.coefficients(part):
+                power = min(coefficients)
+                rows += [
+                    (rf"\mathrm{{{part}}}_{axis}", expression_latex(coefficients[power][k] * STEP**power))
+                    for k, axis in enumerate("xyz")
+                ]
+    text = equations(rows) if rows else "$0$"
+    return text if len(text.splitlines()) <= _LINES else None
+
+
+@latex.register
+def _(algorithm: AttitudeAlgorithm) -> str | None:
+    return formulas.short_latex(algorithm.derive())

@@ -1,0 +1,198 @@
+"""The overview compares algorithms by order, leading error terms, operations of a step and error at equal work."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue, pipeline
+from strapgen.analysis.growth.growth import contraction
+from strapgen.analysis.series.accumulation import accumulate
+from strapgen.analysis.series.constant_rate import constant_rate
+from strapgen.analysis.series.motion_rates import is_plain, parameters
+from strapgen.analysis.series.notation import covariant_text, intervals_text
+from strapgen.analysis.series.series import series
+from strapgen.catalogue import Choice
+from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.run import generated_sources
+
+#: Highest order of a series in the overview; with higher orders the error is far below that of any gyro.
+_HIGHEST_SERIES = 8
+#: Rates a, b and g of coning in deg/s, and step in s, for numerical values: those of table 5 of the thesis.
+CONING_DEG_S, STEP_S = 10.0, 0.125
+#: Operations per second at equal work: those of the fourth-order step of Euler parameters at `STEP_S`.
+WORK = 544.0
+
+
+@dataclass(frozen=True)
+class OverviewRow:
+    """The errors and the operations of one algorithm.
+
+    Parameters
+    ----------
+    kernel : str
+    increments : int
+    order : int or None
+        Order of the step on a general motion.
+    operations : int
+        Operations of a step, of all kinds.
+    constant_power, constant : int, Expr or None
+        At a constant rate the angle in rad lost in a step is ``constant x^constant_power`` with x = |w| h; None if no
+        angle is lost.
+    coning_power, coning : int, Expr or None
+        On coning the secular drift rate is the vector (0, b + g, a) times ``coning h^coning_power``; None if there is
+        no drift.
+    general : str
+        Leading term of the drift of a step on a general motion.
+    contractive : str
+        Angles of a step, in rad, at which no state grows.
+    """
+
+    kernel: str
+    increments: int
+    order: int | None
+    operations: int
+    constant_power: int | None
+    constant: sp.Expr | None
+    coning_power: int | None
+    coning: sp.Expr | None
+    general: str
+    contractive: str
+
+    def coning_rate(self, step: float = STEP_S) -> float | None:
+        """Return the leading secular drift rate in rad/s on the motion of table 5 of the thesis, for a step in s.
+
+        Parameters
+        ----------
+        step : float, optional
+            In s.
+
+        Returns
+        -------
+        float or None
+            None if there is no drift.
+        """
+        if self.coning is None or self.coning_power is None:
+            return None
+        rate = math.radians(CONING_DEG_S)
+        factor = float(self.coning.subs({name: rate for name in parameters("coning")}))
+        return abs(factor) * step**self.coning_power * math.sqrt(5) * rate
+
+    @property
+    def per_operation(self) -> float | None:
+        """Leading secular drift of a step in rad, divided by its operations."""
+        rate = self.coning_rate()
+        return None if rate is None else rate * STEP_S / self.operations
+
+    @property
+    def at_equal_work(self) -> float | None:
+        """Leading secular drift rate in rad/s if the step is so long that it takes `WORK` operations per second."""
+        return self.coning_rate(self.operations / WORK)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row as plain JSON data."""
+        rate = self.coning_rate()
+        return {
+            "kernel": self.kernel,
+            "increments": self.increments,
+            "order": self.order,
+            "operations": self.operations,
+            "constant_power": self.constant_power,
+            "constant": None if self.constant is None else sp.sstr(self.constant),
+            "coning_power": self.coning_power,
+            "coning": None if self.coning is None else sp.sstr(self.coning),
+            "general": self.general,
+            "contractive": self.contractive,
+            "coning_drift_deg_h": None if rate is None else math.degrees(rate) * 3600,
+            "drift_per_operation_rad": self.per_operation,
+            "drift_at_equal_work_deg_h": (
+                None if self.at_equal_work is None else math.degrees(self.at_equal_work) * 3600
+            ),
+        }
+
+
+def methods() -> list[str]:
+    """Return the methods of the catalogue, without series of very high order."""
+    others = [
+        name for name, integrator in catalogue.INTEGRATORS.items() if integrator.order <= _HIGHEST_SERIES
+    ]
+    return [*TABLEAUX, *others]
+
+
+def choices(
+    algorithms: Sequence[str] = tuple(catalogue.ALGORITHMS), names: Iterable[str] | None = None
+) -> list[Choice]:
+    """Return every algorithm with every method, on as many increments as its order needs.
+
+    Parameters
+    ----------
+    algorithms : sequence of str, optional
+    names : iterable of str, optional
+        Methods; by default those of `methods`.
+
+    Returns
+    -------
+    list of Choice
+    """
+    return [
+        catalogue.choose(algorithm, name, catalogue.enough(name))
+        for algorithm in algorithms
+        for name in (methods() if names is None else names)
+    ]
+
+
+def overview(chosen: Iterable[Choice]) -> Iterator[OverviewRow]:
+    """Derive the rows of a comparison.
+
+    Parameters
+    ----------
+    chosen : iterable of Choice
+        Attitude steps that are linear in their state.
+
+    Yields
+    ------
+    OverviewRow
+
+    Examples
+    --------
+    >>> (row,) = overview([catalogue.choose("dcm", "rk2", 1)])
+    >>> row.order, row.constant_power, row.constant, row.general
+    (2, 3, -1/6, '-1/6 |w0|^2 w0 + 1/12 w0 x w1')
+    """
+    for choice in chosen:
+        yield _row(choice)
+
+
+def _row(choice: Choice) -> OverviewRow:
+    kernel = pipeline.derive(choice)
+    general = series(choice, "general", 1)
+    fixed = constant_rate(choice)
+    lost = fixed.series(1)
+    run = accumulate(choice, "coning", 1)
+    constant_power = next(iter(lost), None)
+    coning_power, coning = next(iter(run.secular.items()), (None, None))
+    a = parameters("coning")[0]
+    drift = min(general.drift, default=None)
+    counts = generated_sources.program(choice).operations
+    return OverviewRow(
+        kernel.name,
+        choice.increments_per_step,
+        general.order,
+        sum(counts.values()),
+        constant_power,
+        None if constant_power is None else lost[constant_power],
+        coning_power,
+        None if coning is None else _along(coning, a),
+        "0" if drift is None else covariant_text(general.invariant[drift].drift),
+        intervals_text(contraction(fixed)),
+    )
+
+
+def _along(vector: sp.Matrix, a: sp.Symbol) -> sp.Expr:
+    """Return the factor of a vector along the axis (0, b + g, a)."""
+    factor = vector[2] / a
+    return sp.factor(sp.cancel(factor)) if is_plain(factor) else factor

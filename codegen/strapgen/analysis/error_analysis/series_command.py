@@ -1,0 +1,274 @@
+"""The command ``strapgen series`` derives truncation-error series."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import (
+    Duration,
+    MethodOptions,
+    OptionalStepAlgorithm,
+    SeveralMethods,
+    listed,
+    option,
+    whole,
+)
+from strapgen.cli.output import Output, format_option, plot_option
+from strapgen.cli.progress import track
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, pairs
+
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+
+_Text = str | None
+#: The kernel of the catalogue for the velocity and position of a step.
+VELOCITY_POSITION = "velocity-position"
+
+
+@dataclass(frozen=True)
+class Versus:
+    """Options of the second algorithm, with which the first one is compared."""
+
+    panel: ClassVar[str] = "Second algorithm"
+
+    versus: Annotated[
+        _Text,
+        option(
+            "--versus",
+            metavar="ALGORITHM",
+            help="Second algorithm: show the errors of both and their exact ratio.",
+        ),
+    ] = None
+    versus_method: Annotated[
+        _Text,
+        option(
+            "--versus-method",
+            metavar="NAME",
+            help="Method of the second algorithm.  [default: that of the first]",
+        ),
+    ] = None
+    versus_increments: Annotated[
+        _Text,
+        option(
+            "--versus-increments",
+            metavar="N",
+            help="Number of increments in a step of the second algorithm.  [default: that of the first]",
+        ),
+    ] = None
+
+    def choose(self, algorithm: str, method: MethodOptions) -> Choice:
+        """Return the second algorithm; method and increments are those of the first one unless stated."""
+        if self.versus_method is not None:
+            method = replace(method, method=self.versus_method, tableau=None, window=None, coning=None)
+        if self.versus_increments is not None:
+            method = replace(method, increments=self.versus_increments)
+        return method.choose(algorithm)
+
+
+@dataclass(frozen=True)
+class DriftPlot:
+    """Options of the plot of predicted and simulated drift."""
+
+    panel: ClassVar[str] = "Plot"
+
+    settings: MotionSettings = None
+    steps: Annotated[
+        _Text,
+        option(
+            *("--step", "--steps"),
+            metavar="S,...",
+            help="Step lengths of the plot in s.  [default: 1/8 to 1/64]",
+        ),
+    ] = None
+    duration: Duration = "2"
+
+    def draw(self, choice: Choice, motion: str, count: int | None, path: Path) -> bytes:
+        """Return the image of the drift on a motion of the catalogue."""
+        from strapgen.analysis.agreement import agreement
+        from strapgen.analysis.agreement.agreement_plot import agreement_image
+        from strapgen.catalogue import MOTIONS
+        from strapgen.lab.motions import motions
+
+        checks.choice("motion", motion, MOTIONS)
+        settings = pairs(self.settings) if self.settings else agreement.SETTINGS[motion]
+        ladder = agreement.default_steps(choice)
+        if self.steps is not None:
+            ladder = tuple(listed("--step", self.steps))
+        profile = motions.motion(motion, **settings)
+        agreements = [
+            agreement.agreement(choice, profile, ladder, self.duration, powers)
+            for powers in ((1,) if count == 1 else (1, 3))  # every other power may be without drift
+        ]
+        words = ", ".join(f"{key}={value}" for key, value in settings.items())
+        title = (
+            f"{agreements[0].kernel}: drift, predicted and simulated\n"
+            f"{self.duration} s of {motion} motion, {words}"
+        )
+        return agreement_image(agreements, title, path)
+
+
+@dataclass(frozen=True)
+class SeriesOutput(Output):
+    """Where the series go, and in which format."""
+
+    plot: Annotated[
+        Path | None,
+        plot_option("the predicted and the simulated drift on --motion with the parameters --set"),
+    ] = None
+    format: Annotated[
+        _Text, format_option(("text", "latex", "json"), " With --all: csv and markdown too.")
+    ] = "text"
+    formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex", "csv", "markdown")
+
+
+@grouped
+def series(
+    algorithm: OptionalStepAlgorithm = None,
+    *,
+    methods: SeveralMethods,
+    all_of_them: Annotated[
+        bool,
+        option(
+            "--all",
+            help="Show the catalogue side by side, each method on as many increments as it needs; ALGORITHM or "
+            "--method NAME,... selects some of it.",
+            panel="Algorithm",
+        ),
+    ] = False,
+    motion: Annotated[
+        str,
+        option(
+            "--motion",
+            metavar="NAME",
+            help=f"Motion: general (any smooth rate), {MOTION_NAMES}, or a Python file with a rate in SymPy.",
+            panel="Input",
+        ),
+    ] = "general",
+    terms: Annotated[
+        str,
+        option(
+            "--terms",
+            metavar="N",
+            help="Number of nonzero terms to show of drift, scale and skew, 1 to 6.",
+            panel="Output",
+        ),
+    ] = "2",
+    versus: Versus,
+    plot: DriftPlot,
+    output: SeriesOutput,
+) -> None:
+    """Derive drift, scale and skew of a step as exact power series.
+
+    Without --motion the series in the step length h hold for every smooth rate w0 + w1 t + w2 t^2/2 + ... and are sums
+    of vectors and cross products; S(a, b) stands for a b' + b a'. With --motion they are in the symbols of that motion,
+    where t is the time at the beginning of the step, and the drift of a whole run follows where it has a series; at a
+    constant rate all errors are also in closed form.
+
+    The algorithm velocity-position stands for the velocity and position change of a step, whose errors are sums of
+    vectors and cross products of the rate w0 + w1 t + ... and of the specific force f0 + f1 t + ...; the position is
+    divided by h. A file with a step of velocity and position has such a series too.
+
+    Example: strapgen series euler --method rk4 --increments 2 --motion constant
+
+    Example: strapgen series dcm --method rk1 --motion constant --versus euler
+    """
+    output.check(algorithm, *methods.files)
+    count = whole("terms", terms)
+    if all_of_them:
+        _overview(algorithm, methods, versus, output)
+        return
+    if algorithm is None:
+        raise InputError("an algorithm is needed, or --all")
+    if output.format in ("csv", "markdown"):
+        raise InputError(
+            f"--format {output.format} goes with --all; without it text, latex and json are allowed"
+        )
+    _check_plot(motion, versus, plot, output)
+    choices = methods.choices(algorithm, step=not _may_be_velocity(algorithm))
+    if choices[0].takes_velocity:
+        _of_velocity(choices, motion, count, versus, output)
+        return
+    if len(choices) > 1 and (output.plot is not None or versus.versus is not None):
+        raise InputError("--plot and --versus go with one method")
+    most = 2 if count is None else count
+    if versus.versus is not None:
+        from strapgen.analysis.ratios import ratios
+        from strapgen.analysis.ratios.ratios_report import ratio_report
+
+        second = versus.choose(versus.versus, methods)
+        output.report(ratio_report(ratios.versus(choices[0], second, motion, most)))
+        return
+    from strapgen.analysis.error_analysis.error_analysis import analyse
+    from strapgen.analysis.error_analysis.series_report import series_report
+
+    image = None if output.plot is None else plot.draw(choices[0], motion, count, output.plot)
+    output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)
+
+
+def _may_be_velocity(algorithm: str) -> bool:
+    """Return whether an algorithm may be a step of velocity and position."""
+    from strapgen.catalogue.user import loading
+
+    return algorithm == VELOCITY_POSITION or algorithm.endswith(".py") or algorithm in loading.installed()
+
+
+def _of_velocity(
+    choices: list[Choice], motion: str, terms: int | None, versus: Versus, output: Output
+) -> None:
+    """Deliver the series of velocity and position, which hold for any smooth motion and specific force."""
+    if motion != "general" or versus.versus is not None or output.plot is not None:
+        raise InputError(
+            f"series of {choices[0].name} hold for any motion; --motion, --versus and --plot go with an attitude"
+        )
+    from strapgen.analysis.series import velocity_series
+    from strapgen.analysis.series.velocity_series_report import velocity_series_report
+
+    most = 1 if terms is None else terms
+    output.report(velocity_series_report([velocity_series.series(choice, most) for choice in choices]))
+
+
+def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:
+    """Check that the options of a plot and of another algorithm go together."""
+    if versus.versus is None and (versus.versus_method or versus.versus_increments):
+        raise InputError("--versus-method and --versus-increments need --versus")
+    if output.plot is None and (plot.settings or plot.steps):
+        raise InputError("--set and --step are for --plot")
+    if output.plot is not None and (versus.versus is not None or motion == "general"):
+        raise InputError("--plot needs a --motion of the catalogue, and no --versus")
+
+
+def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: Output) -> None:
+    """Deliver the table of all algorithms and methods side by side."""
+    for name, value in {
+        "--versus": versus.versus,
+        "--plot": output.plot,
+        "--tableau": method.tableau,
+        "--window": method.window,
+        "--coning": method.coning,
+        "--increments": method.increments,
+        "--previous": method.previous,
+        "--ahead": method.ahead,
+        "--rates": method.rates or None,
+        "--constant": method.constant or None,
+    }.items():
+        if value is not None:
+            raise InputError(f"--all and {name} do not go together")
+    from strapgen import catalogue
+    from strapgen.analysis.error_analysis import overview
+    from strapgen.analysis.error_analysis.overview_report import overview_report
+
+    algorithms = list(catalogue.ALGORITHMS)
+    if algorithm is not None:
+        algorithms = [checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)]
+    names = None
+    if method.method is not None:
+        names = [
+            checks.choice("method", name, catalogue.METHODS) for name in listed("--method", method.method)
+        ]
+    choices = overview.choices(algorithms, names)
+    output.report(overview_report(list(track(overview.overview(choices), "deriving", len(choices)))))

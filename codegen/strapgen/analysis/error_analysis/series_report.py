@@ -1,0 +1,159 @@
+"""Reports the error analysis of one algorithm on one motion as text and LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import sympy as sp
+
+from strapgen.analysis.error_analysis.error_analysis import ErrorAnalysis
+from strapgen.analysis.growth.growth import Growth, contraction
+from strapgen.analysis.series.motion_rates import is_plain
+from strapgen.analysis.series.notation import LATEX, covariant_text, intervals_text, scalar_text
+from strapgen.analysis.series.series import PARTS, STEP
+from strapgen.results.display.expressions import expression_latex
+from strapgen.results.display.latex import equations
+from strapgen.results.report import Report
+
+
+def series_text(analysis: ErrorAnalysis) -> str:
+    """Return a report as text."""
+    step = analysis.step
+    lines = [f"{step.kernel}, {step.motion} motion: what one step of length h loses"]
+    if step.order is None:
+        lines.append(f"nothing, to the power {step.known} of h")
+    else:
+        lines.append(f"order {step.order}; terms to the power {step.known} of h were looked at")
+    if step.invariant:
+        lines.append(
+            "w0, w1, ... : the rate and its derivatives; a x b: cross product; S(a, b) = a b' + b a'"
+        )
+        for power, one in step.invariant.items():
+            lines += ["", f"h^{power}  drift           {covariant_text(one.drift)}"]
+            if one.symmetric:
+                lines.append(f"     scale and skew  {covariant_text(one.symmetric, symmetric=True)}")
+    elif step.order is not None:
+        for part in PARTS:
+            lines += ["", *_vector(part, step.expressions(part))]
+    if analysis.run is not None and analysis.run.motion != "polynomial":
+        lines += ["", "in a run, orthonormalized or not, to first order in the error"]
+        if min(analysis.run.secular, default=0) >= 2 * min(analysis.growth_powers, default=9):
+            lines[-1] = (
+                "in a run that is not orthonormalized; what adds up is known to all orders in the error"
+            )
+        lines += _vector("drift gained in a second", _sums(analysis.run.secular), "drift that adds up: none")
+        if analysis.run.bounded:
+            lines += _vector("drift that is bounded", _sums(analysis.run.bounded))
+    if analysis.no_run:
+        lines += ["", f"no closed form of a run: {analysis.no_run}"]
+    if analysis.constant is not None:
+        constant = analysis.constant
+        lines += [
+            "",
+            "in closed form, x = |w| h",
+            f"angle lost in a step = {sp.sstr(constant.angle_lost)}",
+            f"square of the stretch across the axis = {sp.sstr(constant.stretch_squared)}",
+            f"no state grows where x is: {intervals_text(contraction(constant))}",
+            "after N steps the drift is stretch^N sin(N angle lost) along w; orthonormalized sin(N angle lost)",
+        ]
+    lines += ["", *_growth_lines(analysis.growth)]
+    return "\n".join(lines)
+
+
+def series_report(analyses: Sequence[ErrorAnalysis]) -> Report:
+    """Return one analysis, or several side by side, as a report."""
+
+    def data() -> Any:
+        every = [analysis.as_dict() for analysis in analyses]
+        return every if len(every) > 1 else every[0]
+
+    return Report(
+        lambda: "\n\n".join(map(series_text, analyses)),
+        data,
+        latex=lambda: "\n\n".join(map(series_latex, analyses)),
+    )
+
+
+def _growth_lines(gain: Growth) -> Iterator[str]:
+    yield "growth in a step"
+    for name, title in (("length", "length of the state - 1"), ("determinant", "determinant of C - 1")):
+        terms = getattr(gain, name)
+        if terms is None:
+            continue
+        if gain.invariant:
+            rows = gain.invariant[name]
+            text = " + ".join(f"h^{power} ({scalar_text(one)})" for power, one in rows.items())
+            yield f"{title} = {text or 0}"
+        else:
+            yield f"{title} = {_series(sp.Add(*(x * STEP**p for p, x in terms.items())))}"
+
+
+def _sums(rows: Mapping[int, sp.Matrix]) -> list[sp.Expr]:
+    return [sp.Add(*(row[axis] * STEP**power for power, row in rows.items())) for axis in range(3)]
+
+
+def _vector(title: str, expressions: Sequence[sp.Expr], none: str = "") -> list[str]:
+    if none and not any(expressions):
+        return [none]
+    return [
+        f"{title}, {axis} = {_series(expression)}"
+        for axis, expression in zip("xyz", expressions, strict=True)
+    ]
+
+
+def _series(expression: sp.Expr) -> str:
+    """Return a series as text, every coefficient in factors, from the lowest power on."""
+    collected = sp.collect(sp.expand(expression), STEP, evaluate=False)
+    text = ""
+    for power in sorted(collected, key=lambda power: sp.degree(power, STEP)):
+        coefficient = collected[power]
+        term = sp.sstr((sp.factor(coefficient) if is_plain(coefficient) else coefficient) * power)
+        sign, term = ("-", term[1:]) if term.startswith("-") else ("+", term)
+        text += f" {sign} {term}" if text else term if sign == "+" else f"-{term}"
+    return text or "0"
+
+
+def series_latex(analysis: ErrorAnalysis) -> str:
+    """Return a report as LaTeX: lines of an align environment of the package amsmath."""
+    step = analysis.step
+    rows: list[tuple[str, str]] = []
+    if step.invariant:
+        for power, one in step.invariant.items():
+            rows.append((rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX)))
+            if one.symmetric:
+                text = covariant_text(one.symmetric, symmetric=True, notation=LATEX)
+                rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", text))
+    else:
+        for part in PARTS:
+            rows += _latex_rows(rf"\mathrm{{{part}}}", step.expressions(part))
+    if analysis.run is not None:
+        rows += _latex_rows(r"\dot{\mathrm{drift}}", _sums(analysis.run.secular))
+        rows += _latex_rows(r"\mathrm{bounded}", _sums(analysis.run.bounded))
+    if analysis.constant is not None:
+        rows.append((r"\delta(x)", expression_latex(analysis.constant.angle_lost)))
+        rows.append((r"\rho(x)^{2}", expression_latex(analysis.constant.stretch_squared)))
+    for name, symbol in (("length", r"|e| - 1"), ("determinant", r"\det C - 1")):
+        terms = getattr(analysis.growth, name)
+        if terms is None:
+            continue
+        if analysis.growth.invariant:
+            text = " + ".join(
+                rf"h^{{{power}}} \left({scalar_text(one, LATEX)}\right)"
+                for power, one in analysis.growth.invariant[name].items()
+            )
+            rows.append((symbol, text or "0"))
+        else:
+            rows.append((symbol, expression_latex(sp.Add(*(x * STEP**p for p, x in terms.items())))))
+    head = (
+        f"% {step.kernel}, {step.motion} motion: what one step of length h loses\n"
+        "% d: drift; Y: scale and skew, S(a, b) = a b' + b a'; delta: angle lost, rho: stretch, x = |w| h"
+    )
+    return f"{head}\n{equations(rows, head='  ')}"
+
+
+def _latex_rows(name: str, expressions: Sequence[sp.Expr]) -> list[tuple[str, str]]:
+    return [
+        (f"{name}_{axis}", expression_latex(expression))
+        for axis, expression in zip("xyz", expressions, strict=True)
+    ]

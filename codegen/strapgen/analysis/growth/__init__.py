@@ -1,0 +1,1 @@
+"""Growth of the length of the state, and stability."""

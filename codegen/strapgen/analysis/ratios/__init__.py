@@ -1,0 +1,1 @@
+"""Ratios of errors between methods."""

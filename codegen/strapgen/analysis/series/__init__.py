@@ -1,0 +1,1 @@
+"""Truncation-error series."""

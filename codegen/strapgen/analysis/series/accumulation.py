@@ -1,0 +1,308 @@
+"""The drift of a run has a part that grows with time and a part that stays bounded; both follow from the error rate.
+
+To first order in the error, the error matrix of a run is the integral of the error rate, carried along with the motion.
+If the frame turns at a constant rate about an axis s, the component of the drift rate along s accumulates, and the
+components across it oscillate with the angle |s| t. To the same order, orthonormalization does not change the drift,
+and it prevents scale and skew from accumulating.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import sympy as sp
+
+from strapgen import catalogue
+from strapgen.analysis.series.error_rate import ErrorRate, error_rate
+from strapgen.analysis.series.motion_rates import TIME, is_plain, parameters
+from strapgen.analysis.series.series import MOST_TERMS, STEP
+from strapgen.catalogue import Choice
+from strapgen.ir import checks
+from strapgen.kernel import rotations
+from strapgen.kernel.power_series import Powers
+from strapgen.lab.step_series import one_step
+
+
+@dataclass(frozen=True)
+class RunDrift:
+    """The drift of a run that begins at time 0.
+
+    Parameters
+    ----------
+    kernel, motion : str
+    secular : dict of int to Matrix, 3 x 1
+        Drift rate in rad/s, reference axes: coefficients by power of the step length.
+    bounded : dict of int to Matrix, 3 x 1
+        Oscillating part of the drift in rad as a function of the time t, zero at time 0; to first order in the error.
+    growth : dict of int to Expr
+        Rate in 1/s at which the logarithm of the scale across the drift grows, by power of the step length.
+    """
+
+    kernel: str
+    motion: str
+    secular: dict[int, sp.Matrix]
+    bounded: dict[int, sp.Matrix]
+    growth: dict[int, sp.Expr]
+
+    def drift(self, time: sp.Expr = TIME) -> list[sp.Expr]:
+        """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms.
+
+        Parameters
+        ----------
+        time : Expr, optional
+            By default the symbol t.
+
+        Returns
+        -------
+        list of Expr
+        """
+        total = sp.zeros(3, 1)
+        for power, row in self.secular.items():
+            total += time * row * STEP**power
+        for power, row in self.bounded.items():
+            total += row.subs(TIME, time) * STEP**power
+        return list(total)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the terms as plain JSON data: a sum for each axis, in the symbols h and t."""
+
+        def sums(rows: dict[int, sp.Matrix]) -> list[str]:
+            return [
+                sp.sstr(sp.Add(*(row[axis] * STEP**p for p, row in rows.items())), order="lex")
+                for axis in range(3)
+            ]
+
+        return {
+            "drift_rate": sums(self.secular),
+            "drift_bounded": sums(self.bounded),
+            "growth_rate": sp.sstr(sp.Add(*(x * STEP**p for p, x in self.growth.items())), order="lex"),
+        }
+
+
+def accumulate(choice: Choice, motion: str, terms: int = 2) -> RunDrift:
+    """Derive the drift of a run on a motion of the catalogue.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step that is linear in its state.
+    motion : str
+    terms : int, optional
+        Number of terms of the growing and of the bounded drift. The search covers twice as many powers of the error
+        rate, since every other one may be zero.
+
+    Returns
+    -------
+    RunDrift
+
+    Raises
+    ------
+    InputError
+        If a name or number is not allowed, or the algorithm has no closed form of a run.
+
+    Examples
+    --------
+    >>> from strapgen import catalogue
+    >>> run = accumulate(catalogue.choose("dcm", "rk2"), "coning", terms=1)
+    >>> sp.factor(run.secular[2][1])
+    -(b + g)*(a**4 + a**2*b**2 + a**2*b*g + 2*a**2*g**2 + b*g**3 + g**4)/(6*(a**2 + b**2 + 2*b*g + g**2))
+    """
+    checks.choice("motion", motion, catalogue.MOTIONS)
+    checks.count("terms", terms, largest=MOST_TERMS)
+    error = error_rate(choice, motion, 2 * terms)
+    run = _steady(error) if error.steady else _about_an_axis(error)
+    return replace(
+        run,
+        secular=_first(run.secular, terms),
+        bounded=_first(run.bounded, terms),
+        growth=_first(run.growth, terms),
+    )
+
+
+def _first(rows: dict[int, Any], terms: int) -> dict[int, Any]:
+    return dict(list(rows.items())[:terms])
+
+
+def _steady(error: ErrorRate) -> RunDrift:
+    """Return the drift of a motion whose frame turns at a constant rate.
+
+    The sum of the frame's rate and the error rate has the eigenvalues of the run. Their imaginary part, minus the
+    frame's rate, is the secular drift to all orders in the error.
+    """
+    powers = list(error.matrices)
+    if not powers:
+        return RunDrift(error.kernel, error.motion, {}, {}, {})
+    shifts = _eigenvalue(error, max(powers))
+    secular, growth = {}, {}
+    for power, (real, imaginary) in shifts.items():
+        row = (-imaginary * error.axis).applyfunc(_short)
+        if any(row):
+            secular[power] = row
+        if real := _short(real):
+            growth[power] = real
+    bounded = {}
+    # From twice the first power on, products of two errors are missing, so the bounded drift ends before that power.
+    known = [power for power in powers if power < 2 * powers[0]]
+    for power in known if error.motion != "constant" else ():
+        row = _swing(_drift(error.matrices[power]), error.axis)
+        if any(row):
+            bounded[power] = row
+    return RunDrift(error.kernel, error.motion, secular, bounded, growth)
+
+
+def _drift(matrix: sp.Matrix) -> sp.Matrix:
+    return sp.Matrix(one_step.split(list(matrix))["drift"])
+
+
+def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
+    """Return the integral of a drift rate that turns with a frame, without its component along the axis."""
+    square = rotations.dot(axis, axis)
+    across = drift - rotations.dot(drift, axis) / square * axis
+    turned = rotations.cross(axis, drift)
+    length = sp.sqrt(sp.expand(square))
+    return across.applyfunc(_short) * sp.sin(length * TIME) / length + turned.applyfunc(_short) * (
+        1 - sp.cos(length * TIME)
+    ) / sp.expand(square)
+
+
+def _short(expression: sp.Expr) -> sp.Expr:
+    """Return an expression in lowest terms and factored if its numbers are short fractions, otherwise unchanged."""
+    return sp.factor(sp.cancel(expression)) if is_plain(expression) else expression
+
+
+def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]]:
+    """Return the eigenvalue of the run near i |s| as pairs (u, v) by power of the step, for u + i |s| v.
+
+    With y = i |s| and S = s . s the characteristic polynomial at power 0 is y^3 + S y, and its derivative is -2 S.
+    Each further coefficient therefore follows from those before it by one division.
+    """
+    ring = error.ring
+    first = min(error.matrices)
+    names = [str(symbol) for symbol in ring.symbols]
+    extended, y, half, *_ = sp.ring(["y", "half_over_S", *names], ring.domain)
+
+    def lifted(element: Powers) -> Powers:
+        # Division of log(M R') by h lowers each power by one. Below the first power of the error rate only rounding
+        # is left.
+        parts = {
+            power - 1: part.set_ring(extended)
+            for power, part in element.parts.items()
+            if power == 1 or power > first
+        }
+        return Powers(extended, parts, top)
+
+    m = [[lifted(element) for element in row] for row in error.raw]
+    trace = m[0][0] + m[1][1] + m[2][2]
+    minors = sum(
+        (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
+        Powers(extended, {}, top),
+    )
+    determinant = rotations.dot(m[0], rotations.cross_elements(m[1], m[2]))
+    axis = [extended.from_expr(sp.expand(x)) for x in error.axis]
+    square = rotations.dot(axis, axis)
+    value = Powers(extended, {0: y}, top)
+    shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}
+    for power in range(first, top + 1):
+        cubic = ((value - trace) * value + minors) * value - determinant
+        shift = cubic.parts.get(power, extended.zero).rem([y**2 + square]) * half
+        value = value + Powers(extended, {power: shift}, top)
+        imaginary = shift.diff(y)
+        shifts[power] = (_quotient(shift - imaginary * y, square), _quotient(imaginary, square))
+    return {power: pair for power, pair in shifts.items() if any(pair)}
+
+
+def _quotient(element: Any, square: Any) -> sp.Expr:
+    """Return a polynomial in the second generator, half_over_S, as an expression with 1/(2 S) for it.
+
+    With short fractions it is one fraction in lowest terms: S is a sum of squares, which no other factor divides.
+    """
+    ring = element.ring
+    half = ring.gens[1]
+    if ring.domain != sp.QQ or not all(
+        is_plain(number) for number in map(ring.domain.to_sympy, element.coeffs())
+    ):
+        return element.as_expr().subs(half.as_expr(), 1 / (2 * square.as_expr()))
+    depth = element.degree(half)
+    above = ring.zero
+    for exponents, number in element.terms():
+        rest = ring.from_dict({(exponents[0], 0, *exponents[2:]): number})
+        above += rest * (2 * square) ** (depth - exponents[1])
+    while depth > 0:
+        lower, remainder = above.div(2 * square)
+        if remainder:
+            break
+        above, depth = lower, depth - 1
+    return above.as_expr() / (2 * square.as_expr()) ** max(depth, 0)
+
+
+def _about_an_axis(error: ErrorRate) -> RunDrift:
+    """Return the drift of a motion about a fixed axis, which is the integral of the error rate."""
+    secular, bounded, growth = {}, {}, {}
+    for power, matrix in error.matrices.items():
+        mean, swing = _integrated(_drift(matrix), error)
+        if any(mean):
+            secular[power] = mean
+        if any(swing):
+            bounded[power] = swing
+        across = (matrix[0, 0] + matrix[2, 2]) / 2
+        (gained,), _ = _integrated(sp.Matrix([across]), error)
+        if gained:
+            growth[power] = gained
+    return RunDrift(error.kernel, error.motion, secular, bounded, growth)
+
+
+def _integrated(rates: sp.Matrix, error: ErrorRate) -> tuple[sp.Matrix, sp.Matrix]:
+    """Return the mean of rates, for a polynomial zero, and the integral from time 0 of the rest."""
+    if error.motion == "polynomial":
+        return sp.zeros(*rates.shape), rates.applyfunc(lambda x: sp.Poly(x, TIME).integrate().as_expr())
+    b = sp.Symbol("b")
+    means, swings = [], []
+    for rate in rates:
+        mean, swing = _fourier(rate, b)
+        means.append(_short(mean))
+        swings.append(swing)
+    return sp.Matrix(means), sp.Matrix(swings)
+
+
+def antiderivative(matrix: sp.Matrix, error: ErrorRate) -> sp.Matrix:
+    """Return the integral from time 0 to t of a term of the error rate of a motion about a fixed axis.
+
+    Parameters
+    ----------
+    matrix : Matrix, 3 x 3
+        The term in 1/s, a function of the time t.
+    error : ErrorRate
+        The error rate to which it belongs.
+
+    Returns
+    -------
+    Matrix, 3 x 3
+    """
+    if error.motion == "polynomial":
+        variables = (TIME, *parameters(error.motion))
+        return matrix.applyfunc(lambda x: sp.Poly(x, *variables).integrate(TIME).as_expr())
+    mean, swing = _integrated(matrix, error)
+    return mean.reshape(*matrix.shape) * TIME + swing.reshape(*matrix.shape)
+
+
+@lru_cache(256)
+def _fourier(expression: sp.Expr, b: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
+    """Return the mean of a polynomial in cos(b t) and sin(b t), and the integral from 0 to t of its waves."""
+    z = sp.Symbol("z")
+    cosine, sine = (z + 1 / z) / 2, (z - 1 / z) / (2 * sp.I)
+    written = sp.expand(sp.expand(expression).subs({sp.cos(b * TIME): cosine, sp.sin(b * TIME): sine}))
+    mean, swing = sp.S.Zero, sp.S.Zero
+    terms = sp.collect(written, z, evaluate=False)
+    for term, coefficient in terms.items():
+        harmonic = int(sp.degree(term, z)) if term.is_polynomial(z) else -int(sp.degree(1 / term, z))
+        if harmonic == 0:
+            mean += coefficient
+        elif harmonic > 0:
+            other = terms.get(z**-harmonic, sp.S.Zero)
+            even, odd = sp.expand(coefficient + other), sp.expand(sp.I * (coefficient - other))
+            angle = harmonic * b * TIME
+            swing += _short(even / (harmonic * b)) * sp.sin(angle)
+            swing += _short(odd / (harmonic * b)) * (1 - sp.cos(angle))
+    return sp.expand(mean), swing

@@ -1,0 +1,1 @@
+"""Tableaux: coefficients, order conditions, families."""

@@ -1,0 +1,1 @@
+"""Methods with unknown coefficients: order conditions and their solution."""

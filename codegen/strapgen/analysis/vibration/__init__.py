@@ -1,0 +1,59 @@
+"""The mean drift and sculling rates that an algorithm computes under vibration, derived from its kernel.
+
+Source: P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3, equations (65) to (83).
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from strapgen.analysis.vibration.assessment import drift as drift
+    from strapgen.analysis.vibration.assessment import of as of
+    from strapgen.analysis.vibration.assessment import sculling as sculling
+    from strapgen.analysis.vibration.assessment import two_speed as two_speed
+    from strapgen.analysis.vibration.gyro import through_gyro as through_gyro
+    from strapgen.analysis.vibration.gyro import through_gyros as through_gyros
+    from strapgen.analysis.vibration.mean_rates import Assessment as Assessment
+    from strapgen.analysis.vibration.mean_rates import Rates as Rates
+    from strapgen.analysis.vibration.spectrum import RandomRates as RandomRates
+    from strapgen.analysis.vibration.spectrum import Spectrum as Spectrum
+    from strapgen.analysis.vibration.spectrum import random_rates as random_rates
+    from strapgen.analysis.vibration.spectrum import read_spectrum as read_spectrum
+
+__all__ = [
+    "Assessment",
+    "RandomRates",
+    "Rates",
+    "Spectrum",
+    "drift",
+    "of",
+    "random_rates",
+    "read_spectrum",
+    "sculling",
+    "through_gyro",
+    "through_gyros",
+    "two_speed",
+]
+
+#: The modules of the names above, imported when one is first used.
+_MODULES = {
+    "drift": "assessment",
+    "of": "assessment",
+    "sculling": "assessment",
+    "two_speed": "assessment",
+    "through_gyro": "gyro",
+    "through_gyros": "gyro",
+    "Assessment": "mean_rates",
+    "Rates": "mean_rates",
+    "RandomRates": "spectrum",
+    "Spectrum": "spectrum",
+    "random_rates": "spectrum",
+    "read_spectrum": "spectrum",
+}
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return getattr(_import_module(f"{__name__}.{_MODULES[name]}"), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,249 @@
+"""Assessment of a kernel: its mean rates under vibration are derived and set beside the true ones.
+
+`drift` and `sculling` take a kernel, `of` takes a choice of the catalogue, and `two_speed` a whole algorithm in two
+speeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import lru_cache
+
+import sympy as sp
+
+from strapgen import catalogue, pipeline
+from strapgen.analysis.vibration import response, systems
+from strapgen.analysis.vibration.mean_rates import Assessment
+from strapgen.analysis.vibration.response import Form
+from strapgen.analysis.vibration.systems import ANGLES, T_M, VELOCITIES, T
+from strapgen.catalogue import Choice
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.kernel.kernel import Kernel
+
+
+def drift(
+    kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0, ahead: int = 0
+) -> Assessment:
+    """Assess the mean drift rate of a kernel about z, in rad/s.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        An attitude step of the catalogue or of a user, the rotation vector of a step, or a recursion that sums coning.
+    nodes : sequence of Fraction or Expr, optional
+        Nodes of a step that takes rates, as fractions of the step.
+    previous, ahead : int, optional
+        Numbers of samples from before the step and from after it, for the rotation vector of a step; an attitude step
+        has these numbers.
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    InputError
+        If the kernel is none of these, or has no expansion to second order.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> drift(derive("euler", "rk1", 1)).text("computed")
+    '-pi*f*theta_x*theta_y*sin(phi)*(sin(2*pi*T*f)/(2*pi*T*f))'
+    """
+    system = systems.of(kernel, "rad", nodes, previous, ahead)
+    if system.unit != "rad":
+        raise InputError(f"kernel {kernel.name} computes a velocity; it has a sculling rate, not a drift")
+    endless = system.slow_cycle is None
+    return Assessment(
+        kernel.name, "rad/s", not endless, response.forms(system), response.true_forms("coning", endless)
+    )
+
+
+def sculling(
+    kernel: Kernel, *, nodes: Sequence[Fraction | sp.Expr] = (), previous: int = 0, ahead: int = 0
+) -> Assessment:
+    """Assess the mean sculling rate of a kernel about z, in m/s^2.
+
+    A kernel without velocity increments is assessed by duality, in which the cross product of two angle increments
+    becomes that of an angle and a velocity increment.
+
+    Parameters
+    ----------
+    kernel, nodes, previous, ahead
+        As for `drift`. The kernel may also be the sculling term of a step or a recursion that sums sculling.
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    InputError
+        If the kernel is none of these, or has neither an expansion to second order nor a dual.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> sculling(derive("sculling-fast-2")).expression("continuous").has(systems.T_M)
+    True
+    """
+    if not _takes_velocities(systems.checked(kernel)):
+        if kernel.recursion is not None and kernel.companions is None:
+            raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
+        return _dual(drift(kernel, nodes=nodes, previous=previous, ahead=ahead))
+    system = systems.of(kernel, "m/s", nodes, previous, ahead)
+    computed = response.forms(system)
+    if not all(set(pair) & set(ANGLES) and set(pair) & set(VELOCITIES) for pair in computed):
+        raise InputError(f"kernel {kernel.name} gives a velocity that is no product of angles and velocities")
+    endless = system.slow_cycle is None
+    compensated = any(form.real != 0 for form in computed.values())
+    true = response.true_forms("S1" if compensated and not endless else "S2", endless)
+    return Assessment(kernel.name, "m/s^2", not endless, computed, true)
+
+
+def _takes_velocities(kernel: Kernel) -> bool:
+    return any(signal.name in systems.SAMPLES and signal.unit == "m/s" for signal in kernel.inputs)
+
+
+def _dual(assessment: Assessment) -> Assessment:
+    """Return the assessment of the sculling term that is dual to a coning term."""
+    pair = ANGLES
+    form = assessment.computed.get(pair, Form(sp.S.Zero, sp.S.Zero))
+    if set(assessment.computed) - {pair} or form.real != 0:
+        raise InputError(
+            f"kernel {assessment.kernel} has other terms of second order than cross products of samples; "
+            "sculling has no dual of it"
+        )
+    turned = Form(sp.S.Zero, -form.imaginary)
+    computed = {("angle_x", "velocity_y"): form, ("angle_y", "velocity_x"): turned}
+    return Assessment(assessment.kernel, "m/s^2", False, computed, response.true_forms("S2", endless=True))
+
+
+#: For each quantity the fast loop, and the vector of a slow cycle with one sample, of an algorithm in two speeds.
+_LOOPS = {
+    "drift": ("coning-fast", ("rotation-vector", "coning-compressed", 1)),
+    "sculling": ("sculling-fast-2", ("sculling", "coning-compressed", 1)),
+}
+
+
+@lru_cache
+def two_speed(quantity: str = "drift") -> Assessment:
+    """Assess a whole algorithm in two speeds, the fast loop together with the slow loop.
+
+    The slow loop treats the sum of the increments as the one sample of its cycle, and adds the second-order sums of the
+    fast loop to the result. The navigation frame does not rotate.
+
+    Parameters
+    ----------
+    quantity : str, optional
+        "drift" or "sculling".
+
+    Returns
+    -------
+    Assessment
+        Its continuous part is the true rate, without a term in T_m.
+
+    Raises
+    ------
+    InputError
+        If the quantity is unknown.
+
+    Examples
+    --------
+    >>> two_speed().text("computed")
+    '-pi*f*theta_x*theta_y*sin(phi)*(2*sin(2*pi*T_l*f)/(3*pi*T_l*f) - sin(4*pi*T_l*f)/(12*pi*T_l*f))'
+    """
+    fast, slow = _LOOPS[checks.choice("quantity", quantity, tuple(_LOOPS))]
+    parts = [of(catalogue.choose(fast), quantity), of(catalogue.choose(*slow), quantity)]
+    none = Form(sp.S.Zero, sp.S.Zero)
+    computed = {}
+    for pair in {**parts[0].computed, **parts[1].computed}:
+        forms = [part.computed.get(pair, none) for part in parts]
+        real, imaginary = (sp.Add(*(form[k].subs(T, T_M) for form in forms)) for k in range(2))
+        computed[pair] = Form(real, imaginary)
+    return Assessment("two-speed", parts[0].unit, True, computed, parts[1].continuous)
+
+
+def quantities(choice: Choice) -> tuple[str, ...]:
+    """Return which of "drift" and "sculling" can be assessed for a kernel of the catalogue; at least one can.
+
+    Parameters
+    ----------
+    choice : Choice
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    InputError
+        If the kernel takes no angle increments.
+
+    Examples
+    --------
+    >>> [quantities(catalogue.choose(name)) for name in ("euler", "sculling", "two-speed-fast-2")]
+    [('drift', 'sculling'), ('sculling',), ('drift', 'sculling')]
+    """
+    assessable = []
+    reason = None
+    for quantity in ("drift", "sculling"):
+        try:
+            of(choice, quantity)
+        except InputError as error:
+            reason = reason or error
+        else:
+            assessable.append(quantity)
+    if not assessable and reason is not None:
+        raise reason
+    return tuple(assessable)
+
+
+def of(choice: Choice, quantity: str = "drift") -> Assessment:
+    """Assess a kernel of the catalogue.
+
+    Parameters
+    ----------
+    choice : Choice
+        A kernel, from `catalogue.choose`.
+    quantity : str, optional
+        "drift" or "sculling".
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    InputTypeError
+        If `choice` is no `Choice`.
+    InputError
+        As for `drift` and `sculling`.
+
+    Examples
+    --------
+    >>> assessment = of(catalogue.choose("dcm", "rk4", 2))
+    >>> rates = assessment.rates(10, 0.02, theta_x=0.01, theta_y=0.01, phase=1)
+    >>> [float(f"{rate:.6g}") for rate in rates]
+    [-0.00264356, -0.00263046, 1.31029e-05]
+    """
+    if not isinstance(choice, Choice):
+        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
+    checks.choice("quantity", quantity, ("drift", "sculling"))
+    if choice.user_kernel is not None:  # whose file may change: not to be held for good
+        return _of(choice, quantity)
+    return _of_catalogue(choice, quantity)
+
+
+def _of(choice: Choice, quantity: str) -> Assessment:
+    kernel = pipeline.derive(choice)
+    if quantity == "sculling" and kernel.companions is not None:
+        return _dual(of(choice))
+    assess = {"drift": drift, "sculling": sculling}[quantity]
+    return assess(kernel, nodes=catalogue.nodes(choice), previous=choice.previous, ahead=choice.ahead)
+
+
+_of_catalogue = lru_cache(maxsize=64)(_of)

@@ -1,0 +1,394 @@
+"""The command ``strapgen vibration`` assesses an algorithm under vibration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import typer
+
+from strapgen.analysis.vibration.band_options import GyroDamping
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import MethodOptions, SeveralMethods, option, whole
+from strapgen.cli.output import Output, plot_option
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.analysis.vibration import Assessment
+    from strapgen.analysis.vibration.vibration_report import AssessedCase, CaseRates
+
+_Text = str | None
+
+#: Lowest and highest frequency of a plot, by the sampling frequency.
+_PLOTTED = 1e-6, 100.0
+#: The fast loop and the slow loop together.
+_TWO_SPEED = "two-speed"
+
+
+@dataclass(frozen=True)
+class AssessedMethods(SeveralMethods):
+    """Options that choose the methods to assess side by side, and the numbers of increments of each."""
+
+    increments: Annotated[
+        _Text,
+        option(
+            "--increments",
+            metavar="N,...",
+            help="Numbers of angle increments in a step, 1 to 8; enough: as many as each method needs; of a fast loop "
+            "and of two-speed, the fast cycles in a slow cycle.  [default: 2]",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class VibrationSource:
+    """Options of the vibration: at one frequency, or random with a spectrum from a file."""
+
+    panel: ClassVar[str] = "Input"
+
+    step: Annotated[
+        _Text,
+        option(
+            "--step",
+            metavar="S",
+            help="Step length T in s; for a fast loop and two-speed, the length of the slow cycle.",
+        ),
+    ] = None
+    frequency: Annotated[
+        _Text, option("--frequency-hz", metavar="HZ", help="Frequency f of the vibration in Hz.")
+    ] = None
+    theta_x: Annotated[
+        _Text, option("--theta-x-rad", metavar="RAD", help="Amplitude X of the angle about x in rad.")
+    ] = None
+    theta_y: Annotated[
+        _Text, option("--theta-y-rad", metavar="RAD", help="Amplitude Y of the angle about y in rad.")
+    ] = None
+    phase: Annotated[
+        _Text, option("--phase-rad", metavar="RAD", help="Phase P in rad by which y leads x.")
+    ] = None
+    acceleration: Annotated[
+        _Text,
+        option(
+            "--acceleration-y",
+            metavar="M_S2",
+            help="Amplitude of the acceleration along y in m/s^2, to assess sculling as well.",
+        ),
+    ] = None
+    spectrum: Annotated[
+        Path | None,
+        option(
+            "--spectrum",
+            metavar="FILE",
+            help="CSV file of random vibration, in place of one frequency: columns frequency_hz, density, angle_x_rad, "
+            "angle_x_phase_rad, ...",
+        ),
+    ] = None
+
+    gyro_bandwidth_hz: Annotated[
+        _Text,
+        option(
+            "--gyro-bandwidth-hz",
+            metavar="HZ",
+            help="Natural frequency of a gyro of second order, through which the algorithm sees the angles; X,Y for "
+            "one about each axis.",
+        ),
+    ] = None
+    gyro_damping: GyroDamping = None
+
+    def through_gyro(self, assessment: Assessment) -> Assessment:
+        """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
+        if self.gyro_bandwidth_hz is None or self.gyro_damping is None:
+            return assessment
+        from strapgen.analysis import vibration
+
+        frequencies, dampings = (
+            self._two(name, text)
+            for name, text in (
+                ("--gyro-bandwidth-hz", self.gyro_bandwidth_hz),
+                ("--gyro-damping", self.gyro_damping),
+            )
+        )
+        x, y = zip(frequencies, dampings, strict=True)
+        return vibration.through_gyros(assessment, x, y)
+
+    @staticmethod
+    def _two(name: str, text: str) -> list[str]:
+        """Return the numbers of the gyros about x and y; one number is that of both."""
+        numbers = text.split(",")
+        if len(numbers) > 2:
+            raise InputError(f"{name} is {text!r}; one number or two with a comma between are needed")
+        return numbers * (3 - len(numbers))
+
+    @property
+    def gyro_words(self) -> str:
+        """The gyro for a reader; empty without one."""
+        if self.gyro_bandwidth_hz is None:
+            return ""
+        return f", through a gyro of {self.gyro_bandwidth_hz} Hz, damping {self.gyro_damping}"
+
+    def check(self, output: VibrationOutput) -> None:
+        """Check that there is one frequency or a spectrum, with all that goes with it."""
+        if (self.gyro_bandwidth_hz is None) != (self.gyro_damping is None):
+            missing = "--gyro-damping" if self.gyro_damping is None else "--gyro-bandwidth-hz"
+            raise InputError(f"--gyro-bandwidth-hz and --gyro-damping go together; {missing} is missing")
+        if self.step is None:
+            raise InputError("--step in s is needed")
+        needed = {
+            "--frequency-hz": self.frequency,
+            "--theta-x-rad": self.theta_x,
+            "--phase-rad": self.phase,
+        }
+        if self.spectrum is not None:
+            amplitudes = {"--theta-y-rad": self.theta_y, "--acceleration-y": self.acceleration}
+            plot = {"--plot": output.plot, "--plot-hz": output.span}
+            for name, value in {**needed, **amplitudes, **plot}.items():
+                if value is not None:
+                    raise InputError(f"{name} goes with one frequency, not with --spectrum")
+            if output.format == "latex":
+                raise InputError(
+                    "--format latex writes closed forms of one frequency; "
+                    "with --spectrum text, json, csv and markdown are allowed"
+                )
+            return
+        for name, value in needed.items():
+            if value is None:
+                raise InputError(f"{name} is needed, or a --spectrum")
+        if self.theta_y is None and self.acceleration is None:
+            raise InputError("--theta-y-rad is needed for the drift, or --acceleration-y for sculling")
+        if output.span is not None and output.plot is None:
+            raise InputError("--plot-hz goes with --plot")
+
+    @property
+    def amplitudes(self) -> dict[str, Any]:
+        """The vibration at one frequency, by the parameters of its assessment."""
+        return {
+            "theta_x": self.theta_x,
+            "theta_y": "0" if self.theta_y is None else self.theta_y,
+            "phase": self.phase,
+            "acceleration_y": "0" if self.acceleration is None else self.acceleration,
+        }
+
+    @property
+    def words(self) -> str:
+        """The amplitudes of the vibration at one frequency, for a reader."""
+        words = f"amplitudes {self.theta_x} rad about x"
+        words += "" if self.theta_y is None else f", {self.theta_y} rad about y"
+        words += "" if self.acceleration is None else f", {self.acceleration} m/s^2 along y"
+        return f"{words}, phase {self.phase} rad{self.gyro_words}"
+
+    def rates(self, cases: list[AssessedCase]) -> tuple[list[CaseRates], str]:
+        """Return the mean rates of every case that the vibration moves, and what it is in words."""
+        from strapgen.analysis import vibration
+        from strapgen.analysis.vibration.vibration_report import CaseRates
+
+        step = self.step or ""
+        if self.spectrum is None:
+            outcomes = []
+            for case in cases:
+                rates = case.assessment.rates(
+                    self.frequency or "", step, cycles=case.cycles, **self.amplitudes
+                )
+                outcomes.append(CaseRates(case, rates))
+            return outcomes, f"{self.frequency} Hz, {self.words}"
+        shaken = vibration.read_spectrum(self.spectrum)
+        outcomes = []
+        for case in cases:
+            if case.moved(set(shaken.transfers)):
+                random = vibration.random_rates(case.assessment, shaken, step, cycles=case.cycles)
+                outcomes.append(CaseRates(case, random.rates, random.quadrature))
+        if not outcomes:
+            raise InputError(
+                f"{self.spectrum} moves {', '.join(shaken.transfers)}; angles about x and y, or an angle and "
+                f"an acceleration across it, are needed for {cases[0].assessment.kernel}"
+            )
+        return (
+            outcomes,
+            f"spectrum {self.spectrum.name}, {shaken.edges[0]:g} to {shaken.edges[-1]:g} Hz{self.gyro_words}",
+        )
+
+
+@dataclass(frozen=True)
+class VibrationOutput(Output):
+    """Where the mean rates go, and in which format; over frequency into an image file."""
+
+    plot: Annotated[Path | None, plot_option("the errors over frequency")] = None
+    span: Annotated[
+        _Text,
+        option(
+            "--plot-hz",
+            metavar="LOW,HIGH",
+            help="Lowest and highest frequency of the plot in Hz.  [default: up to half the sampling frequency]",
+        ),
+    ] = None
+
+    def frequencies(self, sampling: float, marked: float) -> tuple[float, float]:
+        """Return the ends of the plot in Hz, checked like the marked frequency against the sampling frequency."""
+        low, high = sampling / 200, sampling / 2
+        if self.span is not None:
+            ends = self.span.split(",")
+            if len(ends) != 2:
+                raise InputError(f"--plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
+            low, high = (float(checks.number("--plot-hz", end, positive=True)) for end in ends)
+        lowest, highest = (times * sampling for times in _PLOTTED)
+        for name, end in (("--plot-hz", low), ("--plot-hz", high), ("--frequency-hz", marked)):
+            if not lowest <= end <= highest < math.inf:
+                raise InputError(
+                    f"{name} is {end:g}; a plot takes {lowest:g} to {highest:g} Hz, "
+                    f"{_PLOTTED[0]:g} to {_PLOTTED[1]:g} times the sampling frequency"
+                )
+        return low, high
+
+
+@grouped
+def vibration(
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            metavar="ALGORITHM",
+            help="dcm, euler, cayley-klein, rotation-vector, sculling, a fast loop (coning-fast, sculling-fast-1, "
+            "sculling-fast-2, two-speed-fast-1, two-speed-fast-2), two-speed (both loops), or a Python file of your "
+            "own.",
+        ),
+    ],
+    *,
+    methods: AssessedMethods,
+    source: VibrationSource,
+    output: VibrationOutput,
+) -> None:
+    """Show the drift that an algorithm computes under vibration.
+
+    You see the mean drift rate about z that it computes, the true one, and the error. The angles are X sin(2 pi f t)
+    about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too. The rates are closed forms to
+    second order in the amplitudes, derived from the algorithm itself. Several methods, or numbers of increments, are
+    shown side by side.
+
+    Of a kernel of your own that holds unknowns you see the closed forms, without numbers of a vibration.
+
+    For a fast loop alone, the continuous and the computed rate leave out a term in the slow cycle T_m: the slow loop
+    adds that to both, so that the error is that of both loops.
+
+    Example: strapgen vibration euler --method coning-compressed --increments 4 --frequency-hz 10 --step 0.04
+    --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
+    """
+    output.check(algorithm, *methods.files, source.spectrum)
+    from strapgen.analysis.vibration.vibration_report import closed_forms_report, vibration_report
+
+    if cases := _cases_with_unknowns(algorithm, methods, source, output):
+        output.report(closed_forms_report(cases))
+        return
+    source.check(output)
+    cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
+    outcomes, words = source.rates(cases)
+    output.report(
+        vibration_report(outcomes, cases, f"{words}; step {source.step} s"),
+        lambda path: _image(cases, source, output, path),
+    )
+
+
+def _cases_with_unknowns(
+    algorithm: str, methods: AssessedMethods, source: VibrationSource, output: VibrationOutput
+) -> list[AssessedCase]:
+    """Return the cases of a user's kernel with unknowns, whose rates have closed forms but no numbers."""
+    if not algorithm.endswith(".py"):
+        return []
+    choices = methods.choices(algorithm, step=False)
+    if not any(choice.user_kernel is not None and choice.user_kernel.unknowns for choice in choices):
+        return []
+    if output.plot or source.spectrum or output.format not in ("text", "json"):
+        raise InputError(
+            f"{algorithm} holds unknowns: its rates have closed forms, as text or json, and no numbers"
+        )
+    source = replace(source, theta_y=source.theta_y or "0")
+    return [case for method in methods.each() for case in _assessed(algorithm, method, source)]
+
+
+def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
+    """Check that an algorithm is one that can be assessed: a name, or a user's."""
+    from strapgen import catalogue
+    from strapgen.catalogue.user import loading
+
+    if algorithm in names or algorithm.endswith(".py") or algorithm in loading.installed():
+        return
+    if algorithm not in catalogue.RESERVED:
+        checks.choice("algorithm", algorithm, names, "a Python file")
+    raise InputError(
+        f"algorithm {algorithm!r} has no rate under vibration; allowed: {', '.join(names)}, or a Python file"
+    )
+
+
+def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
+    """Return a case for each quantity of an algorithm that the options ask for."""
+    from strapgen.analysis.vibration import assessment, systems
+    from strapgen.analysis.vibration.vibration_report import AssessedCase
+
+    _check_known(algorithm, (*systems.NAMES, _TWO_SPEED))
+    if algorithm == _TWO_SPEED:
+        cycles = _cycles(algorithm, method, "is in two speeds")
+        _check_plain(algorithm, method)
+        quantities = _quantities(algorithm, ("drift", "sculling"), source)
+        return [
+            AssessedCase(source.through_gyro(assessment.two_speed(quantity)), cycles, cycles)
+            for quantity in quantities
+        ]
+    fast = None
+    if algorithm in systems.RECURSIONS:
+        fast = _cycles(algorithm, method, "is a recursion")
+        method = replace(method, increments=None)
+    choice = method.choose(algorithm, step=False)
+    of = partial(assessment.of, choice)
+    quantities = _quantities(algorithm, assessment.quantities(choice), source)
+    samples = fast or choice.increments_per_step
+    return [AssessedCase(source.through_gyro(of(quantity)), fast, samples) for quantity in quantities]
+
+
+def _cycles(algorithm: str, method: MethodOptions, loop: str) -> int:
+    """Return the fast cycles in a step."""
+    if method.increments is None:
+        raise InputError(f"{algorithm} {loop}: --increments must say how many of its cycles make a step")
+    return checks.count("increments", whole("increments", method.increments), largest=checks.MOST)
+
+
+def _check_plain(algorithm: str, method: MethodOptions) -> None:
+    """Refuse the options of a method for an algorithm that has its own."""
+    for name, value in (
+        ("--method", method.method),
+        ("--tableau", method.tableau),
+        ("--window", method.window),
+        ("--coning", method.coning),
+        ("--previous", method.previous),
+        ("--ahead", method.ahead),
+        ("--rates", method.rates or None),
+    ):
+        if value is not None:
+            raise InputError(f"{algorithm} takes no {name}")
+
+
+def _quantities(algorithm: str, possible: tuple[str, ...], source: VibrationSource) -> list[str]:
+    """Return the quantities to assess: those that the vibration at one frequency moves, or all that are possible."""
+    if source.spectrum is not None:
+        return list(possible)
+    moved = {"drift": source.theta_y is not None, "sculling": source.acceleration is not None}
+    quantities = [name for name, is_moved in moved.items() if is_moved and name in possible]
+    if not quantities:
+        needed = {"drift": "--theta-y-rad", "sculling": "--acceleration-y"}[possible[0]]
+        raise InputError(f"{algorithm} has {' and '.join(possible)} rates alone; {needed} is needed")
+    return quantities
+
+
+def _image(cases: list[AssessedCase], source: VibrationSource, output: VibrationOutput, path: Path) -> bytes:
+    from strapgen.analysis.vibration import curves
+    from strapgen.analysis.vibration.vibration_plot import vibration_image
+
+    step = source.step or ""
+    sampling = max(case.samples for case in cases) / float(checks.number("step", step, positive=True))
+    marked = float(checks.number("--frequency-hz", source.frequency or ""))
+    hertz = curves.frequencies(*output.frequencies(sampling, marked))
+    drawn = [
+        (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
+        for case in cases
+    ]
+    return vibration_image(drawn, f"Errors under vibration, step {step} s\n{source.words}", path, marked)

@@ -1,0 +1,245 @@
+"""Reports mean rates under vibration as plain data, text and LaTeX."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from strapgen.analysis.vibration import Assessment
+from strapgen.analysis.vibration.mean_rates import Rates
+from strapgen.ir.exceptions import InputError
+from strapgen.results.display.expressions import expression_latex
+from strapgen.results.display.latex import equations
+from strapgen.results.report import Report, flat_table
+from strapgen.results.table import READABLE_UNITS, Column, TextTable
+
+#: The units as parts of the names of data.
+_UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
+#: The name of the fast loop and the slow loop together.
+_TWO_SPEED = "two-speed"
+_FAST_LOOP_NOTE = (
+    "continuous and computed are the part of the fast loop within a slow cycle T_m; the slow loop adds the term in T_m "
+    "to both, so that the error is that of both loops"
+)
+#: What of Savage's paper is repaired behind the rates of a unit.
+_REPAIRS = {
+    "rad/s": (
+        "drift has the sign of the angles as (65) of the source prints them; it prints (66) to (68) and (75) to (78) "
+        "with the other"
+    ),
+    "m/s^2": (
+        "the accelerations (69) to (72) of the source are reconstructed, their page is not in the scan; it prints the "
+        "errors (81) and (83) with the other sign"
+    ),
+}
+
+
+@dataclass(frozen=True)
+class AssessedCase:
+    """An assessment as it stands in a report.
+
+    Parameters
+    ----------
+    assessment : Assessment
+    cycles : int or None
+        Fast cycles in a step of an algorithm in two speeds; None for any other algorithm.
+    samples : int
+        Samples in a step.
+    """
+
+    assessment: Assessment
+    cycles: int | None
+    samples: int
+
+    @property
+    def label(self) -> str:
+        """The kernel, with its fast cycles if it has any."""
+        return self.assessment.kernel + ("" if self.cycles is None else f", {self.cycles} cycles")
+
+    @property
+    def quantity(self) -> str:
+        """The quantity that is assessed, "drift" or "sculling"."""
+        return "drift" if self.assessment.unit == "rad/s" else "sculling"
+
+    @property
+    def is_fast_loop(self) -> bool:
+        """Whether the algorithm is a fast loop alone."""
+        return self.cycles is not None and self.assessment.kernel != _TWO_SPEED
+
+    def moved(self, transfers: set[str]) -> bool:
+        """Tell whether a spectrum with these transfers moves what this case needs."""
+        if self.assessment.unit == "rad/s":
+            return {"angle_x", "angle_y"} <= transfers
+        return {"angle_x", "acceleration_y"} <= transfers or {"angle_y", "acceleration_x"} <= transfers
+
+
+@dataclass(frozen=True)
+class CaseRates:
+    """The mean rates of a case.
+
+    Parameters
+    ----------
+    case : AssessedCase
+    rates : Rates
+        In the unit of the assessment.
+    quadrature : Rates or None
+        Estimates of the error of quadrature under random vibration; None at one frequency.
+    """
+
+    case: AssessedCase
+    rates: Rates
+    quadrature: Rates | None = None
+
+
+def vibration_data(outcomes: Sequence[CaseRates]) -> list[dict[str, Any]]:
+    """Return mean rates as plain JSON data, an object for each algorithm."""
+    groups: dict[str, list[CaseRates]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.case.label, []).append(outcome)
+    return [_algorithm_data(group) for group in groups.values()]
+
+
+def _algorithm_data(group: Sequence[CaseRates]) -> dict[str, Any]:
+    """Return the rates of one algorithm, and their closed forms at one frequency."""
+    data: dict[str, Any] = {}
+    for outcome in group:
+        unit = _UNIT_SUFFIXES[outcome.case.assessment.unit]
+        data |= {f"{part}_{unit}": value for part, value in outcome.rates._asdict().items()}
+        if outcome.quadrature is not None:
+            errors = outcome.quadrature._asdict()
+            data |= {f"{part}_quadrature_{unit}": value for part, value in errors.items()}
+    first = group[0].case
+    data |= {"kernel": first.assessment.kernel, "increments": first.samples}
+    for outcome in group:
+        if outcome.quadrature is None:
+            data[f"{outcome.case.quantity}_closed_form"] = {
+                part: outcome.case.assessment.text(part) for part in ("computed", "continuous")
+            }
+    return data
+
+
+def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
+    """Return mean rates as text: a table for drift and one for sculling; closed forms where one algorithm is assessed.
+
+    Raises
+    ------
+    InputError
+        If a rate in the unit that a person reads is beyond the range of double.
+    """
+    lines = [f"mean rates about z, to second order in the amplitudes; {title}"]
+    for unit in READABLE_UNITS:
+        group = [outcome for outcome in outcomes if outcome.case.assessment.unit == unit]
+        if group:
+            lines += ["", *_rate_table(group, unit).lines()]
+    if any(outcome.case.is_fast_loop for outcome in outcomes):
+        lines += ["", _FAST_LOOP_NOTE]
+    units = {outcome.case.assessment.unit for outcome in outcomes}
+    lines += ["", *(note for unit, note in _REPAIRS.items() if unit in units)]
+    one_algorithm = len({outcome.case.label for outcome in outcomes}) == 1
+    if one_algorithm and all(outcome.quadrature is None for outcome in outcomes):
+        for outcome in outcomes:
+            assessment = outcome.case.assessment
+            lines += ["", f"closed form of the {outcome.case.quantity} rate in {assessment.unit}"]
+            lines += [f"  continuous = {assessment.text('continuous')}"]
+            lines += [f"  computed   = {assessment.text('computed')}"]
+    return "\n".join(lines)
+
+
+def closed_forms_report(cases: Sequence[AssessedCase]) -> Report:
+    """Return the rates of kernels with unknowns as a report: closed forms, without numbers."""
+
+    def text() -> str:
+        lines = ["mean rates about z, to second order in the amplitudes, in closed form"]
+        for case in cases:
+            lines += ["", f"{case.label}, {case.quantity} rate in {case.assessment.unit}"]
+            unknowns = ", ".join(case.assessment.unknowns)
+            lines += [f"  unknowns   = {unknowns or 'none'}"]
+            lines += [
+                f"  {part:10} = {case.assessment.text(part)}" for part in ("continuous", "computed", "error")
+            ]
+        return "\n".join(lines)
+
+    def data() -> list[dict[str, Any]]:
+        return [
+            {
+                "kernel": case.assessment.kernel,
+                "increments": case.samples,
+                "unknowns": list(case.assessment.unknowns),
+                f"{case.quantity}_closed_form": {
+                    part: case.assessment.text(part) for part in ("computed", "continuous", "error")
+                },
+            }
+            for case in cases
+        ]
+
+    return Report(text, data)
+
+
+def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
+    """Return the rates of one unit, each above its error of quadrature if there is one."""
+    readable, factor = READABLE_UNITS[unit]
+    rows: list[list[Any]] = []
+    for outcome in group:
+        label, error = outcome.case.label, outcome.rates.error * factor
+        if not math.isfinite(error):
+            raise InputError(
+                f"{label}: the error in {readable} is beyond the range of double; take smaller amplitudes"
+            )
+        rows.append([label, *outcome.rates, error])
+        if outcome.quadrature is not None:
+            rows.append(["  quadrature", *(f"{value:.1e}" for value in outcome.quadrature), ""])
+    columns = [
+        Column(group[0].case.quantity, "<"),
+        *(
+            Column(f"{part}, {unit}", spec=".9e", least=least)
+            for part, least in zip(Rates._fields, (19, 18, 18), strict=True)
+        ),
+        Column(f"error, {readable}", spec=".6g", least=18),
+    ]
+    return TextTable(columns, rows)
+
+
+def vibration_report(outcomes: Sequence[CaseRates], cases: Sequence[AssessedCase], title: str) -> Report:
+    """Return mean rates as a report, whose table has a row for each quantity of each algorithm.
+
+    Parameters
+    ----------
+    outcomes : sequence of CaseRates
+    cases : sequence of AssessedCase
+        The cases themselves, whose closed forms LaTeX shows.
+    title : str
+        The vibration in words.
+    """
+
+    def data() -> Any:
+        every = vibration_data(outcomes)
+        return every if len(every) > 1 else every[0]
+
+    return Report(
+        lambda: vibration_text(outcomes, title),
+        data,
+        lambda: flat_table([_flat(outcome) for outcome in outcomes]),
+        latex=lambda: vibration_latex(cases),
+    )
+
+
+def _flat(outcome: CaseRates) -> dict[str, Any]:
+    """Return the rates of one case as one row."""
+    case = outcome.case
+    row = {"kernel": case.assessment.kernel, "increments": case.samples, "quantity": case.quantity}
+    row |= {"unit": case.assessment.unit, **outcome.rates._asdict()}
+    errors = {} if outcome.quadrature is None else outcome.quadrature._asdict()
+    return row | {f"{part}_quadrature": value for part, value in errors.items()}
+
+
+def vibration_latex(cases: Sequence[AssessedCase]) -> str:
+    """Return the closed forms as one LaTeX align environment."""
+    rows = []
+    for case in cases:
+        letter = r"\dot\phi_z" if case.quantity == "drift" else r"\dot v_z"
+        for part in ("continuous", "computed", "error"):
+            index = rf"\mathrm{{{part}}}" if len(cases) == 1 else rf"\mathrm{{{part},\ {case.label}}}"
+            rows.append((f"{letter}^{{{index}}}", expression_latex(case.assessment.expression(part))))
+    return equations(rows)

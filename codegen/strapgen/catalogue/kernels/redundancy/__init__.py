@@ -1,1 +1,0 @@
-"""Kernels of redundant single-axis sensors: parity equations, selection, triads, moment arm and boresight."""

@@ -1,1 +1,0 @@
-"""The commands of the command line, each in a module of its own."""

@@ -1,0 +1,52 @@
+"""The command ``strapgen derive`` shows the formulas or the program of a kernel."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import Algorithm, KernelOptions, option
+from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+_SHOWN = ("text", "latex", "program", "operations")
+
+
+@grouped
+def derive(
+    algorithm: Algorithm,
+    *,
+    method: KernelOptions,
+    show: Annotated[
+        str,
+        option(
+            "--show",
+            metavar="NAME",
+            help="What to show: text or latex (the formulas), program, or operations.",
+            panel="Output",
+        ),
+    ] = "text",
+    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
+) -> None:
+    """Show the formulas, the program or the operations of a kernel.
+
+    The program is lowered from the formulas. It and the operations are tables, which --format csv, markdown and latex
+    write; of the formulas, latex shows a step in vectors.
+
+    Example: strapgen derive euler --method rk4 --increments 2 --show operations
+    """
+    output.check(algorithm, *method.files)
+    checks.choice("show", show, _SHOWN)
+    if output.format in ("csv", "markdown") and show in ("text", "latex"):
+        raise InputError(f"--format {output.format} goes with --show program or --show operations")
+    choice = method.choose(algorithm, step=False)
+    from strapgen import pipeline
+    from strapgen.results.display.formulas import formulas_report, unknown_formulas_report
+    from strapgen.run import generated_sources
+
+    kernel = pipeline.derive(choice)
+    if kernel.unknowns and show in ("text", "latex"):
+        output.report(unknown_formulas_report(kernel, show))
+        return
+    output.report(formulas_report(kernel, generated_sources.program(choice), show))

@@ -1,0 +1,230 @@
+"""The command ``strapgen generate`` writes the source code of a kernel or of the standard catalogue."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen import applications
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import KernelOptions, OptionalAlgorithm, listed, option
+from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.progress import track
+from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.ir.sources import Sources
+    from strapgen.run.generation import Request
+
+
+@grouped
+def generate(
+    algorithm: OptionalAlgorithm = None,
+    *,
+    method: KernelOptions,
+    target: Annotated[
+        str | None,
+        option(
+            "--target",
+            metavar="NAME,...",
+            help="Kinds of code, with commas between; strapgen list targets shows all.  [default: numpy]",
+            panel="Algorithm",
+        ),
+    ] = None,
+    all_: Annotated[
+        bool, option("--all", help="Generate the whole standard catalogue.", panel="Algorithm")
+    ] = False,
+    fixed: FixedOptions,
+    output: SourceOptions,
+    format: Format = "text",
+) -> None:
+    """Generate source code for an algorithm, or for the whole catalogue.
+
+    For the targets c-fixed and fixed-model, state the largest body rate and the step length. The formats and the
+    error bounds then hold for all increments up to that rate.
+
+    Example: strapgen generate euler --method rk4 --increments 2 --target c --out firmware
+
+    Example: strapgen generate euler --method rk4 --increments 2 --target cpp,rust --out firmware
+
+    Example: strapgen generate euler --target c-fixed --word 32 --max-rate-deg-s 400 --step 0.01 --out firmware
+
+    Example: strapgen generate euler --target c-fixed --sample-hz 100 --lsb 0.0175dps --out firmware/gyro
+    """
+    check_format(format)
+    if all_:
+        _check_alone(algorithm, method, fixed, output)
+        _generate_all(None if target is None else _names(target), output, format)
+        return
+    if algorithm is None:
+        raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
+    tasks = [request(algorithm, method, name, fixed, output) for name in _names(target)]
+    results = [(task, task.sources()) for task in tasks]
+    for _, sources in results:
+        fixed.check_feedback(sources)
+    groups = [_files(task, sources, output) for task, sources in results]
+    files = _together(groups)
+    if output.check:
+        output.show_difference(files, format)
+        return
+    paths = dict(zip(files, output.write(files), strict=True))
+    written = [[paths[name] for name in group] for group in groups]
+    rows = zip(results, written, strict=True)
+    if format == "json":
+        from strapgen.run.generation import generated_data
+
+        data = [
+            generated_data(task.choice, sources, task.target, [*map(str, place)])
+            for (task, sources), place in rows
+        ]
+        print_json(data if len(data) > 1 else data[0])
+    else:
+        typer.echo("\n".join(_text(task, sources, place) for (task, sources), place in rows))
+
+
+def _names(target: str | None) -> list[str]:
+    """Return the targets of the option, each checked."""
+    from strapgen.targets import TARGETS
+
+    return [
+        checks.choice("target", name, TARGETS)
+        for name in listed("--target", "numpy" if target is None else target)
+    ]
+
+
+def _files(task: Request, sources: Sources, output: SourceOptions) -> dict[str, str]:
+    """Return the files of a target that the options ask for."""
+    files = sources.files if output.with_runs else sources.step_files
+    return files | _project_files(task, output) if output.project else files
+
+
+def _together(groups: list[dict[str, str]]) -> dict[str, str]:
+    """Return the files of all targets, which go into one folder."""
+    files: dict[str, str] = {}
+    for group in groups:
+        for name in files.keys() & group.keys():
+            raise InputError(f"two of the targets write {name}; generate them into two folders")
+        files |= group
+    return files
+
+
+def request(
+    algorithm: str, method: KernelOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
+) -> Request:
+    """Return what the options of the command ask for.
+
+    Raises
+    ------
+    InputError
+        If options do not go together.
+    """
+    from strapgen.run.generation import Request
+    from strapgen.targets import TARGETS, fixed_targets
+
+    choice = method.choose(algorithm, step=False)
+    settings = fixed.settings(choice.increments_per_step)
+    target = checks.choice("target", "numpy" if target is None else target, TARGETS)
+    if settings is not None and not TARGETS[target].fixed:
+        raise InputError(
+            f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
+        )
+    output.require_language(target)
+    fixed.check_increments(choice)
+    return Request(choice, target, settings, output.naming)
+
+
+def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
+    """Return the files that build and test the C, unless a file of the user is in their place."""
+    writer = applications.extension("generate.project", "--project")
+    files: dict[str, str] = writer.project_files(task.choice, task.target, task.settings, task.naming)
+    if not output.check:
+        writer.refuse_changed(output.out or Path(), files, output.force)
+    return files
+
+
+def _check_alone(
+    algorithm: str | None,
+    method: KernelOptions,
+    fixed: FixedOptions,
+    output: SourceOptions,
+) -> None:
+    """Refuse options that do not go with --all."""
+    for name, value in (
+        ("an algorithm", algorithm),
+        ("--method", method.method),
+        ("--tableau", method.tableau),
+        ("--window", method.window),
+        ("--coning", method.coning),
+        ("--increments", method.increments),
+        ("--previous", method.previous),
+        ("--ahead", method.ahead),
+        ("--rates", method.rates or None),
+        ("--constant", method.constant or None),
+        ("--layout", method.layout),
+        ("a fixed-point option", fixed.stated or None),
+        (output.for_libraries, output.for_libraries),
+        ("--project", output.project or None),
+        ("--force", output.force or None),
+    ):
+        if value is not None:
+            raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
+
+
+def _text(task: Request, sources: Sources, written: list[Path]) -> str:
+    """Return the operations and the files, in fixed point with the gyro and the error of every output."""
+    from strapgen.cli import generated_text
+
+    lines = [*generated_text.head(sources, task.target, written), *_call_rate(task)]
+    return "\n".join([*lines, *(f"  {line}" for line in generated_text.contract(sources))])
+
+
+def _call_rate(task: Request) -> list[str]:
+    """Return how often a step is called, if the sampling rate is stated and a step takes several samples."""
+    words = [] if task.settings is None else task.settings.stated.split()
+    count = task.choice.increments_per_step
+    if "--sample-hz" not in words or count < 2:
+        return []
+    hertz = checks.number("sample_hz", words[words.index("--sample-hz") + 1]) / count
+    return [f"  a step takes {count} samples of the gyro: call it at {float(hertz):g} Hz"]
+
+
+def _generate_all(targets: list[str] | None, output: SourceOptions, format: str) -> None:
+    from strapgen import catalogue
+    from strapgen.run import standard_tree
+    from strapgen.storage import resources
+    from strapgen.storage.files import check_folder
+
+    out = output.out
+    if out is None:
+        in_place = resources.checkout() is not None or output.check
+        out = resources.folder("generated") if in_place else Path("generated")
+    if output.check and not out.is_dir():
+        raise InputError(f"{out} is no folder; --check needs the one to look at")
+    if not output.check:
+        check_folder(out)  # known before the derivation of all kernels
+    total = len(catalogue.standard())
+    files = standard_tree.tree(track(standard_tree.programs(), "deriving", total), targets)
+    if output.check:
+        difference = standard_tree.difference(out, files)
+        if format == "json":
+            print_json({"in_step": not difference, "difference": difference})
+        elif difference:
+            typer.echo(difference, nl=False)
+        if difference:
+            left = standard_tree.strangers(out, files)
+            remove = f"; {left[0]} is no part of it, and yours to remove" if left else ""
+            kinds = f" --target {','.join(targets)}" if targets else ""
+            refuse_out_of_step(out, f"strapgen generate --all{kinds} rebuilds it{remove}")
+        if format == "text":
+            typer.echo(f"{out}: {len(files)} files, in step")
+        return
+    written = standard_tree.write(out, files)
+    if format == "json":
+        print_json({"files": [str(path) for path in written]})
+    else:
+        typer.echo(f"{out}: {len(written)} files of {total} kernels")

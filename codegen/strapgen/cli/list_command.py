@@ -1,0 +1,109 @@
+"""The command ``strapgen list`` shows all names."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from strapgen import applications
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.output import TEXT_OUTPUT, Output
+from strapgen.ir import checks
+
+#: The kinds of names, in the order in which they are listed.
+KINDS = (
+    *("algorithms", "methods", "vectors", "kernels"),
+    *(kind for one in reversed(applications.built_in().values()) for kind in one.lists),
+    *("targets", "backends"),
+)
+
+
+@grouped
+def list_names(
+    kind: Annotated[
+        str | None,
+        typer.Argument(metavar="KIND", help=f"Kind of names: {', '.join(KINDS)}.  [default: all]"),
+    ] = None,
+    *,
+    output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
+) -> None:
+    """List all names that the other commands take.
+
+    Example: strapgen list methods
+
+    Example: strapgen list kernels --format markdown
+    """
+    output.check()
+    if kind is not None:
+        kind = checks.choice(
+            "kind", kind if kind in KINDS else f"{kind}s" if f"{kind}s" in KINDS else kind, KINDS
+        )
+    from strapgen.cli.names_report import names_report
+
+    parts = _parts()
+    shown = parts if kind is None else {kind: parts[kind]}
+    short = dict(shown)
+    if kind is None:
+        short["methods"] = _with_one_line_for_taylor(parts["methods"])
+        short["kernels"] = _with_one_line_for_updates(parts["kernels"])
+    output.report(names_report(shown, short, kind is None))
+
+
+def _parts() -> dict[str, dict[str, str]]:
+    """Return all names with their meanings, by their kinds."""
+    from strapgen import catalogue
+    from strapgen.catalogue.user import loading
+    from strapgen.run.backends import BACKENDS
+    from strapgen.targets import titles
+
+    installed = {
+        name: f"from {point.value}"
+        for name, point in loading.installed().items()
+        if name not in (*catalogue.ALGORITHMS, *catalogue.KERNELS, *catalogue.LAYOUT_KERNELS)
+    }
+    return {
+        "algorithms": {**catalogue.ALGORITHMS, **installed},
+        "methods": dict(catalogue.METHODS),
+        "vectors": {
+            name: f"{vector.title}; methods {', '.join(vector.methods)}"
+            for name, vector in catalogue.VECTORS.items()
+        },
+        "kernels": {
+            name: recipe.title for name, recipe in {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS}.items()
+        },
+        **{
+            kind: applications.load(place)()
+            for one in reversed(applications.all_applications().values())
+            for kind, place in one.lists.items()
+        },
+        "targets": titles(),
+        "backends": {name: entry.title for name, entry in BACKENDS.items()},
+    }
+
+
+def _with_one_line_for_taylor(methods: dict[str, str]) -> dict[str, str]:
+    """Return the methods with the Taylor series of all orders on one line."""
+    series = [name for name in methods if name.startswith("taylor")]
+    others = {name: title for name, title in methods.items() if name not in series}
+    return others | {f"{series[0]} to {series[-1]}": "Taylor series of the transition, of any order to 20"}
+
+
+def _with_one_line_for_updates(kernels: dict[str, str]) -> dict[str, str]:
+    """Return the kernels with the updates of an algorithm by a rotation vector, of all orders, on one line."""
+    from strapgen import catalogue
+
+    first, *_, last = catalogue.UPDATE_ORDERS
+    lines = {}
+    updates = {
+        f"{algorithm}-update-{order}": (order, title)
+        for algorithm, title in catalogue.ALGORITHMS.items()
+        for order in catalogue.UPDATE_ORDERS
+    }
+    for name, title in kernels.items():
+        order, algorithm = updates.get(name, (None, ""))
+        if order is None:
+            lines[name] = title
+        elif order == first:
+            lines[f"{name} to {last}"] = f"{algorithm}: update by a rotation vector, order {first} to {last}"
+    return lines

@@ -1,1 +1,0 @@
-"""What commands do with a described system in place of an algorithm."""

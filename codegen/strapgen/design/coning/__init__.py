@@ -1,0 +1,1 @@
+"""Coning coefficients for a band of frequencies."""

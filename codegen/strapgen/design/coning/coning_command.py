@@ -1,0 +1,256 @@
+"""The command ``strapgen coning`` derives coning coefficients and their residual drift, or designs them for a band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from strapgen.analysis.vibration.band_options import BandOptions, command_line, not_negative
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option, whole
+from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
+from strapgen.cli.progress import waiting
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.design.coning.coning import ConingBrief
+
+_Text = str | None
+
+#: Samples, those before the slow cycle included, for which terms of third and fourth order are listed.
+_MOST_SAMPLES = 6
+#: The format of a file that --coning reads.
+_FILE_FORMAT = "toml"
+
+
+@dataclass(frozen=True)
+class ConingDesign(BandOptions):
+    """Options of the band or the spectrum for which coefficients are designed."""
+
+    panel: ClassVar[str] = "Design"
+
+    objective: Annotated[
+        _Text,
+        option(
+            "--objective",
+            metavar="NAME",
+            help="Design for a band (band: least largest drift) or a spectrum (worst: least drift at the worst phases, "
+            "random: least mean square for random ones).  [default: annul powers of the frequency]",
+        ),
+    ] = None
+    spectrum: Annotated[
+        Path | None,
+        option("--spectrum", metavar="FILE", help="CSV file of the vibration, as for strapgen vibration."),
+    ] = None
+    powers: Annotated[
+        _Text,
+        option(
+            "--powers",
+            metavar="N",
+            help="Powers of the frequency, from the third on, that the drift of the design has not.  [default: 0]",
+        ),
+    ] = None
+    products: Annotated[
+        _Text,
+        option(
+            "--products",
+            metavar="N",
+            help="Highest total degree of products of two powers of time in the rate for which the design is exact.  "
+            "[default: 0]",
+        ),
+    ] = None
+    noise_rad: Annotated[
+        _Text,
+        option(
+            "--noise-rad",
+            metavar="RAD",
+            help="Standard deviation of the noise of an increment, with --objective random.",
+        ),
+    ] = None
+    pulse_rad: Annotated[
+        _Text, option("--pulse-rad", metavar="RAD", help="Pulse of the gyro, with --objective random.")
+    ] = None
+    name: Annotated[
+        _Text,
+        option(
+            "--name",
+            metavar="NAME",
+            help="Title of the design, from which its name follows.  [default: from samples and band]",
+        ),
+    ] = None
+
+    def check(self) -> None:
+        """Refuse options that do not go with the objective, or with none."""
+        stated = {part.name for part in fields(self) if getattr(self, part.name) is not None}
+        if self.objective is None:
+            for name in sorted(stated):
+                raise InputError(f"--{name.replace('_', '-')} goes with --objective band, worst or random")
+            return
+        from strapgen.catalogue.methods.shaped_coning import OBJECTIVES
+
+        checks.choice("objective", self.objective, OBJECTIVES)
+        allowed = {
+            "objective",
+            "powers",
+            "products",
+            "name",
+            "sample_hz",
+            "gyro_bandwidth_hz",
+            "gyro_damping",
+        }
+        allowed |= {"band", "band_hz"} if self.objective == "band" else {"spectrum"}
+        allowed |= {"noise_rad", "pulse_rad"} if self.objective == "random" else set()
+        for name in sorted(stated - allowed):
+            raise InputError(f"--{name.replace('_', '-')} does not go with --objective {self.objective}")
+        if self.objective != "band" and self.spectrum is None:
+            raise InputError(f"--objective {self.objective} needs a --spectrum")
+        needs = (self.band_hz, self.gyro_bandwidth_hz, self.spectrum)
+        if self.sample_hz is not None and all(value is None for value in needs):
+            raise InputError("--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum")
+
+    def brief(self, samples: int, previous: int) -> ConingBrief:
+        """Return what the options say."""
+        from strapgen.analysis.vibration.spectrum import read_spectrum
+        from strapgen.design.coning.coning import ConingBrief
+        from strapgen.design.coning.lines import of_spectrum
+
+        lines = None
+        if self.spectrum is not None:
+            lines = of_spectrum(read_spectrum(self.spectrum), self.sampling("--spectrum"))
+        unknowns = max(0, samples + previous - 1)
+        powers, products = (
+            checks.count(f"--{what}", whole(f"--{what}", value or "0"), smallest=0, largest=unknowns)
+            for what, value in (("powers", self.powers), ("products", self.products))
+        )
+        return ConingBrief(
+            samples,
+            previous,
+            self.objective or "",
+            None if lines is not None else self.radians(),
+            lines,
+            powers,
+            self.gyro(),
+            not_negative("--noise-rad", self.noise_rad or "0"),
+            not_negative("--pulse-rad", self.pulse_rad or "0"),
+            self.name or "",
+            products,
+        )
+
+
+@dataclass(frozen=True)
+class ConingOutput(Output):
+    """Where the coefficients go, and in which format."""
+
+    format: Annotated[_Text, format_option((*Output.formats, _FILE_FORMAT))] = "text"
+    formats: ClassVar[tuple[str, ...]] = (*Output.formats, _FILE_FORMAT)
+
+
+@grouped
+def coning(
+    samples: Annotated[
+        str,
+        option(
+            *("--samples", "--increments"),
+            metavar="N",
+            help="Number of gyro samples in a slow cycle, 1 to 8.",
+            panel="Algorithm",
+        ),
+    ],
+    previous: Annotated[
+        str,
+        option(
+            "--previous",
+            metavar="N",
+            help="Number of samples from before the slow cycle that it uses as well, 0 to 32.",
+            panel="Algorithm",
+        ),
+    ] = "0",
+    form: Annotated[
+        str,
+        option(
+            "--form",
+            metavar="NAME",
+            help="Form of the correction: compressed suits coning, uncompressed polynomial rates, combined both.",
+            panel="Algorithm",
+        ),
+    ] = "compressed",
+    terms: Annotated[
+        bool,
+        option(
+            "--terms",
+            help="Also list the third- and fourth-order terms of the rotation vector, for up to six samples in all.",
+            panel="Output",
+        ),
+    ] = False,
+    *,
+    design: ConingDesign,
+    output: Annotated[ConingOutput, Shown(only=TEXT_OUTPUT)],
+) -> None:
+    """Derive coning coefficients and the drift that remains.
+
+    A coefficient multiplies the cross product older sample x newer sample. The pairs are in the order of the newer
+    sample, then of the older one, so that the newest pair is last. The residual is the mean drift on coning in rad/s,
+    computed minus true, to second order in alpha. It is an expression that SymPy can read, in the symbols alpha
+    (half-angle of the cone in rad), omega (its frequency in rad/s) and T (time between samples in s).
+
+    With --objective the newest sample is crossed with a weighted sum of older ones, whose weights are the best ones
+    for a band or a spectrum of vibration. Such coefficients answer coning alone. --format toml writes the file that
+    --coning takes.
+
+    Example: strapgen coning --samples 4 --form combined
+
+    Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --out out/shaped.toml --format toml
+    """
+    output.check(design.spectrum)
+    from strapgen import catalogue
+    from strapgen.catalogue.methods import coning_coefficients
+    from strapgen.design.coning.coning_report import coning_data, coning_report
+
+    count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
+    before = checks.count(
+        "previous", whole("previous", previous), smallest=0, largest=coning_coefficients.MOST_KEPT
+    )
+    checks.choice("form", form, coning_coefficients.FORMS)
+    design.check()
+    if design.objective is not None:
+        if terms or form != "compressed":
+            raise InputError(
+                "--objective designs the compressed form, without terms of third and fourth order"
+            )
+        _deliver_design(design, count, before, output)
+        return
+    if output.format == _FILE_FORMAT:
+        raise InputError(f"--format {_FILE_FORMAT} writes a design; it goes with --objective")
+    if terms and count + before > _MOST_SAMPLES:
+        raise InputError(
+            f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + before} are given"
+        )
+    coefficients = coning_coefficients.design(count, before, form)
+    output.report(coning_report(coefficients, coning_data(coefficients, terms)))
+
+
+def _deliver_design(options: ConingDesign, samples: int, previous: int, output: ConingOutput) -> None:
+    """Design coefficients, and write them as a report or as a file."""
+    brief = options.brief(samples, previous)
+    from strapgen.catalogue.methods import shaped_coning
+    from strapgen.design.coning import coning, coning_file
+    from strapgen.design.coning.coning_report import ShapedDrift, figure_lines, shaped_report
+
+    with waiting("designing"):
+        shape = coning.design(brief)
+        shaped_coning.verify(shape)
+        drift = ShapedDrift(shape, brief.lines)
+        if output.format != _FILE_FORMAT:
+            output.report(shaped_report(drift))
+            return
+        figures = figure_lines(drift)
+    out = None if output.file is None else output.file.name
+    command = command_line(
+        ("strapgen", "coning", "--samples", str(samples), "--previous", str(previous)),
+        (options,),
+        format=_FILE_FORMAT,
+        out=out,
+    )
+    output.deliver(coning_file.written(shape, command, figures))

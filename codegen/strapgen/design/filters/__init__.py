@@ -1,0 +1,1 @@
+"""Coefficients of filters by constrained least squares."""

@@ -1,0 +1,147 @@
+"""Filters of least mean square error over a band, with the noise of the increments, under their conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from operator import mul
+from typing import Any
+
+from strapgen.catalogue.methods import window_conditions
+from strapgen.design.filters.band_grid import BITS, ONE, REAL, BandGrid, distance, mean_grid, real
+from strapgen.design.filters.unknowns import Shape
+from strapgen.ir.exceptions import InputError
+
+
+def design(
+    shape: Shape,
+    degrees: Sequence[int],
+    band: Fraction,
+    noise: Fraction,
+    spectrum: Sequence[int] | None = None,
+) -> list[list[Any]]:
+    """Return the filters of the least mean of S |sum_j F_j A_j - C_m|^2 over a band plus sigma^2 sum_j F_j^2.
+
+    Parameters
+    ----------
+    shape : Shape
+    degrees : sequence of int
+        m of each filter.
+    band : Fraction
+        Highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`.
+    noise : Fraction
+        sigma.
+    spectrum : sequence of int, optional
+        Integers of S at the points, of mean 1; by default S is 1.
+
+    Returns
+    -------
+    list of list of mpf, (len(degrees), p + 1 + L)
+
+    Raises
+    ------
+    InputError
+        If no filter is the best one.
+
+    Examples
+    --------
+    >>> taps, = design(Shape(1, 1, 3), [1], Fraction(1), Fraction(0))
+    >>> [round(float(tap), 12) for tap in taps]
+    [-0.25, 0.0, 0.25]
+    """
+    grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
+    weights = [ONE] * len(grid.points) if spectrum is None else list(spectrum)
+    weights = [weight // len(weights) for weight in weights]
+    return least_squares(grid, shape, degrees, weights, noise)
+
+
+def least_squares(
+    grid: BandGrid,
+    shape: Shape,
+    degrees: Sequence[int],
+    weights: Sequence[int],
+    noise: Fraction = Fraction(0),
+) -> list[list[Any]]:
+    """Return the filters of least weighted sum of squares of errors on a grid, under their conditions.
+
+    Parameters
+    ----------
+    grid : BandGrid
+    shape : Shape
+    degrees : sequence of int
+    weights : sequence of int
+        Integer of the weight of each frequency.
+    noise : Fraction, optional
+        Its square times the squares of the taps is added to the sum.
+    """
+    count, powers = shape.samples, shape.conditions
+    scaled = [(w * square) >> BITS for w, square in zip(weights, grid.squares(), strict=True)]
+    lags = [real(sum(map(mul, scaled, column)) >> BITS) for column in zip(*grid.lags, strict=True)]
+    lags[0] += REAL.mpf(noise.numerator) ** 2 / noise.denominator**2
+    rows = [[REAL.mpf(value.numerator) / value.denominator for value in row] for row in shape.rows]
+    matrix = [
+        [*(lags[abs(i - j)] for j in range(count)), *(row[i] for row in rows)] for i in range(count)
+    ] + [[*row, *[REAL.mpf(0)] * powers] for row in rows]
+    rights = [
+        _products(grid, shape, m, weights)
+        + [REAL.mpf(r.numerator) / r.denominator for r in window_conditions.coefficients(m, powers)]
+        for m in degrees
+    ]
+    return [solution[:count] for solution in solve(matrix, rights)]
+
+
+def _products(grid: BandGrid, shape: Shape, m: int, weights: Sequence[int]) -> list[Any]:
+    """Return the products of the functions of the samples with the Legendre coefficient."""
+    right = [(w * value) >> BITS for w, value in zip(weights, grid.bessel(m), strict=True)]
+    re = [(x * value) >> BITS for (x, _), value in zip(grid.gains, right, strict=True)]
+    im = [(y * value) >> BITS for (_, y), value in zip(grid.gains, right, strict=True)]
+    result = []
+    for place in range(shape.samples):
+        number, after = distance(place, shape.twice_middle)
+        cosines = [row[number] for row in grid.cosines]
+        sines = [row[number] if after else -row[number] for row in grid.sines]
+        if m % 2:
+            total = sum(map(mul, re, sines)) + sum(map(mul, im, cosines))
+        else:
+            total = sum(map(mul, re, cosines)) - sum(map(mul, im, sines))
+        result.append(real(total >> BITS))
+    return result
+
+
+def solve(matrix: Sequence[Sequence[Any]], rights: Sequence[Sequence[Any]]) -> list[list[Any]]:
+    """Return the solutions of linear equations for several right sides, in the digits of `REAL`.
+
+    Raises
+    ------
+    InputError
+        If there is none, or no single one.
+
+    Examples
+    --------
+    >>> [[float(x) for x in row] for row in solve([[REAL.mpf(2), REAL.mpf(0)], [REAL.mpf(1), REAL.mpf(1)]], [[4, 3]])]
+    [[2.0, 1.0]]
+    """
+    table = [[*row, *(right[i] for right in rights)] for i, row in enumerate(matrix)]
+    count = len(table)
+    for column in range(count):
+        pivot = max(range(column, count), key=lambda line: abs(table[line][column]))
+        table[column], table[pivot] = table[pivot], table[column]
+        head = table[column]
+        if abs(head[column]) < REAL.ldexp(1, -BITS + 40):
+            raise InputError(
+                "the band is too narrow, or the samples are too many, for a filter to be the best one"
+            )
+        for line in range(column + 1, count):
+            row = table[line]
+            factor = row[column] / head[column]
+            if factor:
+                for place in range(column + 1, len(row)):
+                    row[place] -= factor * head[place]
+    solutions = []
+    for number in range(count, count + len(rights)):
+        solution = [REAL.mpf(0)] * count
+        for line in reversed(range(count)):
+            rest = sum((table[line][k] * solution[k] for k in range(line + 1, count)), REAL.mpf(0))
+            solution[line] = (table[line][number] - rest) / table[line][line]
+        solutions.append(solution)
+    return solutions

@@ -1,0 +1,122 @@
+"""What filters do: their errors over the band, their gain on noise, and what is amplified outside of the band."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.catalogue.methods.window import Window
+from strapgen.design.filters.band_grid import ONE, REAL, BandGrid, integer, magnitude, search_grid
+from strapgen.design.filters.unknowns import Shape, Unknowns
+
+#: Frequencies up to half the sampling rate at which the gain of the filter of c_0 is searched.
+_GAIN_POINTS = 2000
+
+
+def level(window: Window, m: int) -> float:
+    """Return the largest error of a filter over its band, for each unit of rate times the sampling interval.
+
+    Parameters
+    ----------
+    window : Window
+    m : int
+        Degree of the Legendre coefficient.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.windows import WINDOWS
+    >>> f"{level(WINDOWS['window-3-3'], 1):.6e}"
+    '2.160751e-03'
+    """
+    grid = search_grid(window.band, window.samples - 1, window.gyro, increments=window.increments)
+    errors = [magnitude(*e) for e in grid.errors(m, _integers(window, m), window.previous)]
+    place = max(range(len(errors)), key=lambda k: errors[k])
+    largest = errors[place]
+    if not largest or place in (0, len(errors) - 1):
+        return largest / ONE
+    # A parabola through the point and its neighbours has the rest of the height.
+    (x0, x1), (y0, y1) = (
+        [float(grid.points[k] - grid.points[place]) for k in (place - 1, place + 1)],
+        [errors[k] / largest - 1.0 for k in (place - 1, place + 1)],
+    )
+    curvature = (y1 / x1 - y0 / x0) / (x1 - x0)
+    slope = y0 / x0 - curvature * x0
+    return largest / ONE * (1.0 - (slope * slope / (4 * curvature) if curvature < 0 else 0.0))
+
+
+def noise_gain(window: Window, m: int) -> float:
+    """Return the root of the sum of squares of the taps: standard deviation of c_m by that of white increment noise.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.windows import WINDOWS
+    >>> round(noise_gain(WINDOWS["window-7-7"], 1), 3)
+    0.731
+    """
+    return math.sqrt(sum(tap * tap for tap in window.filters[m]))
+
+
+def largest_gain(window: Window) -> float:
+    """Return the largest response of the filter of c_0 to a rate, up to half the sampling rate.
+
+    The response is |sum_j F_0j A_j(b)|/N, with the gyro: 1 is a rate that is passed on unchanged.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.windows import WINDOWS
+    >>> largest_gain(WINDOWS["window-3-3"])
+    1.0
+    """
+    b = np.linspace(0.0, np.pi, _GAIN_POINTS + 1)
+    places = np.arange(window.samples) - window.previous
+    response = np.exp(1j * np.outer(b, places)) @ np.array([float(tap) for tap in window.filters[0]])
+    response = response * np.sinc(b / (2 * np.pi))
+    if window.gyro is not None:
+        x = b * float(window.gyro.sample_hz / window.gyro.bandwidth_hz) / (2 * np.pi)
+        response = response / (1 - x * x + 2j * float(window.gyro.damping) * x)
+    return float(np.abs(response).max()) / window.increments
+
+
+def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
+    """Return the error of a filter in magnitude at frequencies.
+
+    Parameters
+    ----------
+    window : Window
+    m : int
+    points : sequence of float, (n,)
+        Angular frequencies in rad a sample, up to pi.
+
+    Returns
+    -------
+    array, (n,)
+        |sum_j F_j A_j - C_m|, for each unit of rate times the sampling interval.
+    """
+    grid = BandGrid([REAL.mpf(b) for b in points], window.samples - 1, window.gyro, window.increments)
+    return np.array([magnitude(*e) / ONE for e in grid.errors(m, _integers(window, m), window.previous)])
+
+
+def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
+    """Return the filters of the polynomial through all samples of a window, which other methods take.
+
+    Examples
+    --------
+    >>> from strapgen.catalogue.methods.windows import WINDOWS
+    >>> [str(tap) for tap in polynomial_fit(WINDOWS["window-3-3"])[1][4:]]
+    ['7843/20160', '-211/2520', '191/20160']
+    """
+    shape = Shape(window.previous, window.ahead, window.samples, window.gyro, window.increments)
+    filters = []
+    for m in range(len(window.filters)):
+        unknowns = Unknowns(shape, m)
+        filters.append(unknowns.taps(unknowns.complete([])))
+    return tuple(filters)
+
+
+def _integers(window: Window, m: int) -> list[int]:
+    return [integer(tap) for tap in window.filters[m]]

@@ -1,0 +1,397 @@
+"""Compares attitude algorithms by their drift on many motions and by what they cost, at one sampling rate.
+
+Every algorithm takes the same samples. One that takes several in a step moves on by as many; its cost is counted from
+its program, for each sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapgen import catalogue
+from strapgen.catalogue import Choice
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.version import VERSION
+from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.motions.motions import Motion
+from strapgen.lab.motions.users_motions import any_motion
+from strapgen.lab.simulate.drift import measured_drift
+from strapgen.lab.study.clusters import Bundle, Cluster, moved
+from strapgen.lab.study.resumable import resume, side_by_side
+from strapgen.run import generated_sources
+from strapgen.storage import cache as disk_cache
+
+#: Motions by their labels: a name, or a user's file, and its settings.
+Motions = Mapping[str, tuple[str, Mapping[str, str]]]
+#: Half-angles in deg and frequencies in Hz of the cones.
+CONES = ("0.1", "1", "5", "15"), ("2", "5", "10", "20")
+#: The motions that are compared by default. The spins are those of a body on a cone, in deg/s.
+MOTIONS: Motions = {
+    **{
+        f"cone {angle}/{frequency}": ("cone", {"half_angle_deg": angle, "frequency_hz": frequency})
+        for angle in CONES[0]
+        for frequency in CONES[1]
+    },
+    **{
+        f"spin {spin} on {angle}/{frequency}": (
+            "cone",
+            {"half_angle_deg": angle, "frequency_hz": frequency, "spin_deg_s": spin},
+        )
+        for spin, angle, frequency in (("100", "1", "10"), ("300", "5", "5"))
+    },
+    **{f"random {rate}": ("random", {"rate_deg_s": rate}) for rate in ("60", "200")},
+    **{f"slew {ms} ms": ("slew", {"onset_s": f"0.0{ms}"}) for ms in ("50", "10")},
+    "ramps 50 ms": ("ramps", {"onset_s": "0.05"}),
+}
+#: The state that all algorithms integrate.
+STATE = "euler"
+#: What stands for the candidates of all methods.
+EVERY = "all"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An algorithm that is compared.
+
+    Parameters
+    ----------
+    method : str
+        A method, or the Python file of a user's algorithm.
+    increments, previous, ahead : int
+        Samples of a step, and samples from before it and from after it.
+    """
+
+    method: str
+    increments: int
+    previous: int = 0
+    ahead: int = 0
+
+    @property
+    def name(self) -> str:
+        """The method and its samples, as "coning-combined:3+3" or "window-7-7:1+7+7"."""
+        beside = (
+            f"+{self.previous}+{self.ahead}" if self.ahead else f"+{self.previous}" if self.previous else ""
+        )
+        return f"{self.method}:{self.increments}{beside}"
+
+    @property
+    def choice(self) -> Choice:
+        """The choice of the step; raises `InputError` if there is none."""
+        if self.method.endswith(".py"):
+            return catalogue.choose_step(
+                self.method, None, self.increments, previous=self.previous, ahead=self.ahead
+            )
+        return catalogue.choose_step(
+            STATE, self.method, self.increments, previous=self.previous, ahead=self.ahead
+        )
+
+
+#: The algorithms by the names of their methods, each with its samples.
+CANDIDATES = tuple(
+    Candidate(method, *samples)
+    for method, several in {
+        "rk4": ((2,), (4,), (1, 3)),
+        "taylor4": ((2,),),
+        "taylor6": ((4,),),
+        "munthe-kaas4": ((2,),),
+        "magnus4": ((2,), (3,), (1, 3)),
+        "magnus6": ((3,), (4,), (3, 3)),
+        "coning-uncompressed": ((3,), (4,)),
+        "coning-compressed": ((1, 1), (2,), (3,), (4,), (1, 3)),
+        "coning-combined": ((2, 1), (3,), (3, 3), (5, 3)),
+        "crouch-grossman3": ((2,), (3,)),
+        "coning-least-squares": ((4,), (3, 3), (1, 8)),
+        "coning-shaped-8": ((1, 8),),
+        "fit-exact": ((1, 1), (2,), (3,), (4,), (3, 3)),
+        "window-3-3": ((1, 3, 3),),
+        "window-5-5": ((1, 5, 5),),
+        "window-7-7": ((1, 7, 7),),
+        "window-9-9": ((1, 9, 9),),
+    }.items()
+    for samples in several
+)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What an algorithm costs, and how it drifts.
+
+    Parameters
+    ----------
+    name, title, source : str
+        Of the candidate, of its kernel, and where the algorithm comes from.
+    increments : int
+        Samples of a step.
+    multiply, add, other : int
+        Multiplications, additions and subtractions, and all other operations of a step: divisions, roots, sines and
+        cosines, choices.
+    drifts : mapping of str to float or None
+        The drift on each motion in deg/h; None where the attitude leaves the range of its numbers.
+    """
+
+    name: str
+    title: str
+    source: str
+    increments: int
+    multiply: int
+    add: int
+    other: int
+    drifts: Mapping[str, float | None]
+
+    def per_second(self, sample_hz: float) -> float:
+        """Return the multiplications a second at a sampling rate in Hz."""
+        return self.multiply / self.increments * sample_hz
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a process needs to run a candidate on all motions.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    sample_hz, duration : str
+        Sampling rate in Hz, and length of the runs in s.
+    motions : mapping of str to (str, mapping of str to str), optional
+        By their labels.
+    """
+
+    candidate: Candidate
+    sample_hz: str
+    duration: str
+    motions: Motions = field(default_factory=lambda: MOTIONS)
+
+    def moved(self, begin: Path, end: Path) -> Trial:
+        """Return the trial with the files of the user in another folder, see `clusters.Movable`."""
+        one, motions = self.candidate, dict(self.motions)
+        if one.method.endswith(".py"):
+            one = replace(one, method=moved(one.method, begin, end))
+        for label, (name, settings) in motions.items():
+            motions[label] = (moved(name, begin, end) if is_file(name) else name, settings)
+        return replace(self, candidate=one, motions=motions)
+
+
+def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
+    """Return the algorithms that are asked for, checked.
+
+    Parameters
+    ----------
+    names : iterable of str, optional
+        Methods, each of which stands for its candidates in `CANDIDATES`, and methods or Python files with their
+        samples, as in "coning-combined:8+3" or "window-7-7:1+7+7"; "all" stands for all methods of the catalogue. By
+        default all of `CANDIDATES`.
+
+    Returns
+    -------
+    list of Candidate
+
+    Raises
+    ------
+    InputError
+        If a name is not known, or its samples are not allowed.
+
+    Examples
+    --------
+    >>> [candidate.name for candidate in candidates(["magnus6", "rk2:1+1"])]
+    ['magnus6:3', 'magnus6:4', 'magnus6:3+3', 'rk2:1+1']
+    """
+    if names is None:
+        return list(CANDIDATES)
+    chosen: dict[Candidate, None] = {}
+    for name in names:
+        method, colon, samples = name.rpartition(":")
+        if name == EVERY:
+            every = (one for method in catalogue.METHODS for one in _of_method(method))
+            chosen |= dict.fromkeys([*CANDIDATES, *every])
+            continue
+        if not colon:
+            chosen |= dict.fromkeys(_of_method(name))
+            continue
+        counts = [checks.whole(f"number of samples in {name}", part) for part in samples.split("+")]
+        if len(counts) > 3:
+            raise InputError(f"{name} has {len(counts)} numbers of samples; METHOD:N+P+L has at most three")
+        candidate = Candidate(method, *counts)
+        _ = candidate.choice  # refuses what is not known
+        chosen[candidate] = None
+    return list(chosen)
+
+
+def _of_method(method: str) -> list[Candidate]:
+    """Return the candidates of a method; one of its own samples if there are none."""
+    several = [candidate for candidate in CANDIDATES if candidate.method == method]
+    if several:
+        return several
+    if method.endswith(".py"):
+        choice = catalogue.choose_step(method)
+    else:
+        checks.choice("method", method, catalogue.METHODS)
+        choice = catalogue.choose_step(STATE, method, None)
+    assert choice.increments is not None, "a step of increments is chosen"
+    return [Candidate(method, choice.increments, choice.previous, choice.ahead)]
+
+
+def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS) -> dict[str, Any]:
+    """Return what the results of a study belong to: the code, the sampling, and the motions."""
+    return {
+        "study": "frontier",
+        "version": VERSION,
+        "code": disk_cache.generator_digest(),
+        "sample_hz": str(Fraction(sample_hz)),
+        "duration_s": str(Fraction(duration)),
+        "motions": {label: [name, dict(settings)] for label, (name, settings) in motions.items()},
+    }
+
+
+def frontier(
+    several: Sequence[Candidate],
+    sample_hz: str = "100",
+    duration: str = "60",
+    results: str | Path | None = None,
+    jobs: int | None = None,
+    cluster: Cluster | None = None,
+    motions: Motions = MOTIONS,
+) -> Iterator[Standing]:
+    """Run algorithms on motions, and yield what each costs and how it drifts when its runs end.
+
+    Parameters
+    ----------
+    several : sequence of Candidate
+    sample_hz, duration : str
+        Sampling rate in Hz, and length of the runs in s.
+    results : path, optional
+        File that keeps what is done: the study goes on from there.
+    jobs : int, optional
+        Number of processes; by default one for each processor.
+    cluster : Cluster, optional
+        Where they run, in place of processes of this one.
+    motions : mapping of str to (str, mapping of str to str), optional
+        Names of motions, or files of users, with their settings, by labels; by default all of `MOTIONS`.
+
+    Yields
+    ------
+    Standing
+        In the order in which they come; `in_order` sorts them.
+
+    Raises
+    ------
+    InputError
+        If a number is not allowed, or the file holds another study.
+    """
+    rate, length = require_steps(several, sample_hz, duration)
+    for name, settings in motions.values():
+        any_motion(name, str(length), settings)  # refuses what is not known
+    cases = {one.name: Trial(one, str(rate), str(length), motions) for one in several}
+    users = [one.method for one in several if one.method.endswith(".py")]
+    users += [name for name, _ in motions.values() if is_file(name)]
+    files = None if cluster is None else Bundle.of(users)
+    if results is None:
+        finished = side_by_side(run_trial, cases, jobs, cluster, files)
+    else:
+        about = identity(str(rate), str(length), motions)
+        finished = resume(run_trial, cases, results, about, jobs, cluster, files)
+    for _, data in finished:
+        yield Standing(**data)
+
+
+def require_steps(several: Sequence[Candidate], sample_hz: str, duration: str) -> tuple[Fraction, Fraction]:
+    """Return the sampling rate and the duration as numbers, in which every algorithm has a whole step.
+
+    Parameters
+    ----------
+    several : sequence of Candidate
+    sample_hz, duration : str
+        As for `frontier`.
+
+    Raises
+    ------
+    InputError
+        If one is not allowed, or a step is longer than the duration.
+    """
+    rate = checks.number("sample_hz", sample_hz, positive=True)
+    length = checks.number("duration", duration, positive=True)
+    for candidate in several:
+        if length * rate < candidate.increments:
+            raise InputError(
+                f"duration {float(length):g} s is shorter than a step of {candidate.name} at {float(rate):g} Hz"
+            )
+    checks.multiple("duration", length, "sampling interval", 1 / rate)
+    return rate, length
+
+
+def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> list[Standing]:
+    """Return standings in the order of their candidates."""
+    by_name = {standing.name: standing for standing in standings}
+    return [by_name[candidate.name] for candidate in several]
+
+
+def run_trial(trial: Trial) -> dict[str, Any]:
+    """Run a candidate on the motions of its trial; return its standing as plain JSON data."""
+    choice = trial.candidate.choice
+    program = generated_sources.program(choice)
+    operations = program.operations
+    return asdict(
+        Standing(
+            trial.candidate.name,
+            program.title,
+            program.source,
+            trial.candidate.increments,
+            operations["multiply"],
+            operations["add"],
+            sum(number for kind, number in operations.items() if kind not in ("multiply", "add", "negate")),
+            {label: _drift(choice, label, trial) for label in trial.motions},
+        )
+    )
+
+
+def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
+    """Return the drift on a motion over as many whole steps as the duration holds, in deg/h."""
+    rate, duration = Fraction(trial.sample_hz), Fraction(trial.duration)
+    step = trial.candidate.increments / rate
+    name, settings = trial.motions[label]
+    with np.errstate(all="ignore"):
+        try:
+            profile = _motion(name, tuple(settings.items()), trial.duration)
+            value = measured_drift(choice, profile, step, duration // step)
+        except InputError:  # the attitude is not finite
+            return None
+    return value if np.isfinite(value) else None
+
+
+@cache
+def _motion(name: str, settings: tuple[tuple[str, str], ...], duration: str) -> Motion:
+    """Return a motion, which has checked the settings of a user's file once for all candidates of a process."""
+    return any_motion(name, duration, dict(settings))
+
+
+def pareto(points: Mapping[str, tuple[float, float]], gain: float = 0.0) -> list[str]:
+    """Return the names of the points that gain in the second number on all that have a smaller first one.
+
+    Parameters
+    ----------
+    points : mapping of str to (float, float)
+    gain : float, optional
+        Least gain, as a part of the smallest number before.
+
+    Returns
+    -------
+    list of str
+        By the first number.
+
+    Examples
+    --------
+    >>> pareto({"cheap": (1, 9), "worse": (2, 9), "little": (3, 8.9), "good": (4, 1)}, gain=0.1)
+    ['cheap', 'good']
+    """
+    front: list[str] = []
+    for name in sorted(points, key=lambda name: points[name]):
+        if not front or points[name][1] < (1 - gain) * points[front[-1]][1]:
+            front.append(name)
+    return front

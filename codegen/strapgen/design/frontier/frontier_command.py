@@ -1,0 +1,131 @@
+"""The command ``strapgen frontier`` compares the drift of algorithms on many motions with what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import listed, option
+from strapgen.cli.output import Output
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.simulate.sample_source import (
+    MOTION_FILE,
+    RUN_MOTION_NAMES,
+    MotionSettings,
+    check_motion,
+    pairs,
+)
+from strapgen.lab.study.worker_options import WorkerOptions
+
+if TYPE_CHECKING:
+    from strapgen.design.frontier.frontier import Motions
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """Options of the runs of a study."""
+
+    panel: ClassVar[str] = "Run"
+
+    sample_hz: Annotated[
+        str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
+    ] = "100"
+    duration: Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.")] = "60"
+    results: Annotated[
+        Path | None,
+        option(
+            "--results",
+            metavar="FILE",
+            help="File that keeps each result when it is there; a study that was stopped goes on from it.",
+        ),
+    ] = None
+
+    def check(self, output: Output) -> None:
+        """Check that the output is not written over the results."""
+        for name, path in (("--out", output.file), ("--plot", output.plot)):
+            if path is not None and self.results is not None and path.resolve() == self.results.resolve():
+                raise InputError(f"{name} and --results are both {path}; two files are needed")
+
+
+@grouped
+def frontier(
+    *,
+    methods: Annotated[
+        str | None,
+        option(
+            *("--method", "--methods"),
+            metavar="NAME,...",
+            help="Methods, each with all of its samples or one choice of them, as in magnus6:3 or "
+            "coning-combined:8+3; all: every method.  [default: those of the catalogue and of the literature]",
+            panel="Algorithm",
+        ),
+    ] = None,
+    motion: Annotated[
+        str | None,
+        option(
+            "--motion",
+            metavar="NAME",
+            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: cones, random rates and slews]",
+            panel="Input",
+        ),
+    ] = None,
+    settings: MotionSettings = None,
+    run: StudyRun,
+    workers: WorkerOptions,
+    output: Output,
+) -> None:
+    """Compare the drift of algorithms on many motions with their cost.
+
+    All algorithms get the same samples, of cones, cones on a spinning body, random rates, and slews with soft and with
+    sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
+    and additions for each sample. The plot shows which algorithms halve the drift of all that cost less.
+
+    With --motion they run on that motion alone.
+
+    A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
+    polynomial through its samples exactly, as iterations on it do in the limit.
+
+    Example: strapgen frontier --method coning-compressed:1+1,coning-combined:3+3 --duration 6
+
+    Example: strapgen frontier --method coning-least-squares,window-7-7 --duration 6 --results out/frontier.jsonl --plot
+    out/frontier.png
+    """
+    output.check(run.results, motion if motion and is_file(motion) else None)
+    run.check(output)
+    motions = _motions(motion, settings)
+    jobs, cluster = workers.count(), workers.workers()
+    from strapgen.cli.progress import track
+    from strapgen.design.frontier import frontier as study
+
+    several = study.candidates(None if methods is None else listed("--method", methods))
+    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs, cluster, motions)
+    standings = study.in_order(track(runs, "running", len(several)), several)
+    from strapgen.design.frontier.frontier_plot import frontier_image
+    from strapgen.design.frontier.frontier_report import frontier_report
+
+    hertz, seconds = (
+        float(checks.number("sample_hz", run.sample_hz)),
+        float(checks.number("duration", run.duration)),
+    )
+    title = (
+        f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what halves the drift of all that costs less"
+    )
+    output.report(
+        frontier_report(standings, hertz, seconds, motions),
+        lambda path: frontier_image(standings, hertz, title, path),
+    )
+
+
+def _motions(name: str | None, settings: list[str] | None) -> Motions:
+    """Return the motion of the options by its name; those of the study without one."""
+    from strapgen.design.frontier import frontier as study
+    from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+
+    check_motion(name, RUN_MOTIONS)
+    if name is None and settings:
+        raise InputError("--set goes with --motion")
+    return study.MOTIONS if name is None else {name: (name, pairs(settings or []))}

@@ -1,0 +1,140 @@
+"""Answers a brief: all algorithms, judged, the cheapest that meet it first."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from strapgen import catalogue
+from strapgen.design.brief import DesignBrief, files_of
+from strapgen.design.selection import causes
+from strapgen.design.selection.candidates import Contender
+from strapgen.design.selection.judgement import Judgement, Question, judged
+from strapgen.ir.version import VERSION
+from strapgen.lab.study.clusters import Bundle, Cluster
+from strapgen.lab.study.resumable import resume, side_by_side
+from strapgen.storage import cache as disk_cache
+
+
+def judgements(
+    path: str | Path,
+    several: Iterable[Contender],
+    results: str | Path | None = None,
+    jobs: int | None = None,
+    cluster: Cluster | None = None,
+) -> Iterator[list[Judgement]]:
+    """Judge algorithms by a brief, and yield the judgements of each with all states when they are there.
+
+    Parameters
+    ----------
+    path : path
+        The file of the brief.
+    several : iterable of Contender
+    results : path, optional
+        File that keeps what is done: the study goes on from there.
+    jobs : int, optional
+        Number of processes; by default one for each processor.
+    cluster : Cluster, optional
+        Where they run, in place of processes of this one.
+
+    Yields
+    ------
+    list of Judgement
+
+    Raises
+    ------
+    InputError
+        If the brief is not allowed, or the file holds another study.
+    """
+    cases = {one.name: Question(str(path), one) for one in several}
+    files = None if cluster is None else Bundle.of(files_of(path))
+    if results is None:
+        finished = side_by_side(judged, cases, jobs, cluster, files)
+    else:
+        finished = resume(judged, cases, results, _identity(path), jobs, cluster, files)
+    for _, rows in finished:
+        yield [Judgement(**row) for row in rows]
+
+
+def _identity(path: str | Path) -> dict[str, Any]:
+    """Return what results belong to: the code and the brief."""
+    return {
+        "study": "design",
+        "version": VERSION,
+        "code": disk_cache.generator_digest(),
+        "brief": hashlib.sha256(Path(path).read_bytes()).hexdigest(),
+    }
+
+
+def in_order(several: Iterable[Judgement]) -> list[Judgement]:
+    """Return judgements in order: those that meet the brief first, and the cheapest of each kind first."""
+    return sorted(several, key=lambda one: (not one.meets, one.operations_per_s, one.name))
+
+
+def verdicts(brief: DesignBrief, ordered: list[Judgement]) -> list[str]:
+    """Return what a brief leads to, in sentences.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    ordered : list of Judgement
+        As `in_order` returns them.
+    """
+    sentences = []
+    accepted = [one for one in ordered if one.meets]
+    share = brief.budget.software_share * brief.budget.drift_deg_h
+    if accepted:
+        best = accepted[0]
+        sentences.append(
+            f"{best.name} is the cheapest of {len(accepted)} that meet the brief: {best.software_deg_h:.2g} deg/h of "
+            f"the {share:.2g} deg/h that the software may add, {best.operations_per_s:.0f} operations a second"
+        )
+        if best.run_deg_h is not None:
+            coning = (
+                f" and {best.run_deg_h['coning']:.2g} under the vibration"
+                if "coning" in best.run_deg_h
+                else ""
+            )
+            sentences.append(
+                f"its run in time confirms it: {best.run_deg_h['truncation']:.2g} deg/h in the turn{coning}"
+            )
+        if best.fragile:
+            sentences.append(
+                f"the choice is fragile: {best.fragile}; other frequencies or a changed gyro undo it"
+            )
+    else:
+        counts: dict[str, int] = {}
+        for one in ordered:
+            counts[one.binding or ""] = counts.get(one.binding or "", 0) + 1
+        causes_of_refusal = ", ".join(f"{name} of {count}" for name, count in counts.items())
+        sentences.append(f"no algorithm meets the brief; what binds: {causes_of_refusal}")
+    undone = [one for one in ordered if one.run_deg_h is not None and not one.meets]
+    if undone:
+        sentences.append(
+            f"{len(undone)} cheaper by prediction {'does' if len(undone) == 1 else 'do'} not meet it in a run, the "
+            f"first {undone[0].name}: {undone[0].reason.removeprefix('in a run ')}"
+        )
+    effect = _coning_effect(brief)
+    if effect is not None and brief.environment is not None:
+        needed = "is needed" if effect > share else "is not needed here"
+        side = "above" if effect > share else "below"
+        sentences.append(
+            f"the coning loop {needed}: without it the vibration leaves {effect:.2g} deg/h at the sampling rate, "
+            f"{side} the software's {share:.2g} deg/h"
+        )
+    noise = causes.noise(brief)
+    if noise > brief.budget.drift_deg_h:
+        sentences.append(
+            f"no algorithm helps: the gyro's noise alone leaves {noise:.2g} deg/h after "
+            f"{float(brief.budget.over_s):g} s, and the budget is {brief.budget.drift_deg_h:g} deg/h"
+        )
+    return sentences
+
+
+def _coning_effect(brief: DesignBrief) -> float | None:
+    """Return the drift in deg/h without any coning compensation: one sample of a step is its rotation vector."""
+    if brief.environment is None:
+        return None
+    return causes.coning(catalogue.choose_step("euler", "coning-compressed", 1), brief)

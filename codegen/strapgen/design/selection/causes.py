@@ -1,0 +1,255 @@
+"""Predicts the drift of an algorithm by its causes: truncation, coning, rounding, quantization and noise.
+
+Truncation is the drift at the largest rate, turning steadily; coning that under the vibration; rounding the certified
+bound of the fixed-point code; quantization and noise are root mean squares of what the gyro's pulses and its random
+walk leave after the time of the budget. All are lengths of vectors in deg/h.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+
+from strapgen.analysis.vibration import assessment
+from strapgen.analysis.vibration.gyro import through_gyro
+from strapgen.analysis.vibration.mean_rates import Assessment
+from strapgen.catalogue import Choice
+from strapgen.design.brief import DesignBrief, GyroBrief
+from strapgen.design.environment import LineEnvironment
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_settings import Settings
+from strapgen.lab.step_series.quantization_noise import QuantizationNoise, quantization_noise
+from strapgen.run import exact, generated_sources
+
+#: Deg/h in a rad/s, and rad in an arc second.
+DEG_H = math.degrees(1) * 3600
+_ARCSEC = math.radians(1) / 3600
+#: A rational that a pulse in arc seconds becomes rad with: pi/648000 to 25 places.
+_PI = Fraction(31415926535897932384626433, 10**25)
+#: Error feedback that is tried, the cheapest first.
+CARRIES = ("none", "full")
+#: Bits of a word that are not behind the point of a state.
+_STATE_PLACES = 2
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """The certified drift of fixed-point code.
+
+    Parameters
+    ----------
+    deg_h : float or None
+        The bound over the time of the budget; None where none is known.
+    carry : str
+        The error feedback of the code, see `Settings`.
+    reason : str
+        Why there is no bound, in words; empty if there is one.
+    """
+
+    deg_h: float | None
+    carry: str
+    reason: str = ""
+
+
+def truncation(choice: Choice, brief: DesignBrief) -> float:
+    """Return the drift in deg/h of a steady turn at the largest rate, from one step in 40 digits.
+
+    Parameters
+    ----------
+    choice : Choice
+        An attitude step.
+    brief : DesignBrief
+    """
+    backend = exact.ExactBackend.of_choice(choice)
+    step = float(step_length(choice, brief.gyro))
+    with mpmath.workdps(exact.DIGITS):
+        angle = mpmath.radians(exact.number(brief.max_rate_deg_s)) * exact.number(
+            step_length(choice, brief.gyro)
+        )
+        sample = [mpmath.mpf(0), mpmath.mpf(0), angle / choice.increments]
+        row = sample * backend.samples
+        *_, state = backend.states_in_digits([row])
+        c = backend.attitude_in_digits()(state)
+        lost = angle - mpmath.atan2(c[3] - c[1], c[0] + c[4])
+        turns = 2 * mpmath.pi
+        lost -= turns * mpmath.nint(lost / turns)
+    return abs(float(lost)) / step * DEG_H
+
+
+def coning(choice: Choice, brief: DesignBrief) -> float:
+    """Return the drift in deg/h that an algorithm computes under the vibration, less the true one.
+
+    Raises
+    ------
+    InputError
+        If it has no mean rate there.
+    """
+    return _mean_error(choice, brief, "drift") * DEG_H
+
+
+def sculling(choice: Choice, brief: DesignBrief) -> float | None:
+    """Return the error in m/s^2 of the sculling term that is dual to a step's coning term.
+
+    Returns
+    -------
+    float or None
+        None where the vibration has no accelerations, or the step has no such term.
+    """
+    if brief.environment is None or not brief.environment.accelerates:
+        return None
+    try:
+        return _mean_error(choice, brief, "sculling")
+    except InputError:
+        return None
+
+
+def _mean_error(choice: Choice, brief: DesignBrief, quantity: str) -> float:
+    """Return the length of the error of a mean rate."""
+    if brief.environment is None:
+        return 0.0
+    return mean_error(assessment.of(choice, quantity), brief, step_length(choice, brief.gyro))
+
+
+def mean_error(assessed: Assessment, brief: DesignBrief, step: Fraction, cycles: int | None = None) -> float:
+    """Return the length of the error of a mean rate under the vibration, seen through the gyro.
+
+    Parameters
+    ----------
+    assessed : Assessment
+    brief : DesignBrief
+    step : Fraction
+        Step in s; for a recursion its slow cycle.
+    cycles : int, optional
+        Fast cycles in the slow cycle of a recursion.
+    """
+    if brief.environment is None:
+        return 0.0
+    return brief.environment.error(_seen(assessed, brief), step, cycles)
+
+
+def line_errors(
+    assessed: Assessment, brief: DesignBrief, step: Fraction, cycles: int | None = None
+) -> list[float]:
+    """Return the errors in deg/h whose sum is the drift under lines: of the algorithm, then of the gyro, by line.
+
+    There are none under a spectrum or a recording. Parameters are those of `mean_error`.
+    """
+    if not isinstance(brief.environment, LineEnvironment):
+        return []
+    plain, seen = (brief.environment.errors(one, step, cycles) for one in (assessed, _seen(assessed, brief)))
+    return [
+        DEG_H * error for error in (*plain, *(both - alone for both, alone in zip(seen, plain, strict=True)))
+    ]
+
+
+def _seen(assessed: Assessment, brief: DesignBrief) -> Assessment:
+    """Return an assessment through the gyro of a brief."""
+    if brief.gyro.bandwidth_hz is None or brief.gyro.damping is None:
+        return assessed
+    return through_gyro(assessed, brief.gyro.bandwidth_hz, brief.gyro.damping)
+
+
+def quantization(choice: Choice, brief: DesignBrief) -> float:
+    """Return the root mean square of the drift in deg/h that the gyro's pulses leave in a turn at the largest rate."""
+    if not brief.gyro.pulse_arcsec:
+        return 0.0
+    return pulse_drift(quantization_noise(choice), brief, step_length(choice, brief.gyro))
+
+
+def over(brief: DesignBrief, seconds: Fraction | None) -> DesignBrief:
+    """Return a brief with another time of the budget in s; the brief itself for None."""
+    return brief if seconds is None else replace(brief, budget=replace(brief.budget, over_s=seconds))
+
+
+def pulse_drift(noise: QuantizationNoise, brief: DesignBrief, step: Fraction) -> float:
+    """Return the drift in deg/h of the noise of pulses over the time of the budget.
+
+    Parameters
+    ----------
+    noise : QuantizationNoise
+    brief : DesignBrief
+    step : Fraction
+        Step in s.
+    """
+    pulse = float(brief.gyro.pulse_arcsec) * _ARCSEC
+    turn = math.radians(float(brief.max_rate_deg_s)) * float(step)
+    steps = round(float(brief.budget.over_s) / float(step))
+    return math.degrees(math.sqrt(noise.mean_square(pulse, steps * turn**2, steps))) / _hours(brief)
+
+
+def noise(brief: DesignBrief) -> float:
+    """Return the root mean square of the drift in deg/h that the gyro's random walk leaves, the same for all."""
+    return math.sqrt(3) * brief.gyro.noise_deg_sqrt_h / math.sqrt(_hours(brief))
+
+
+def rounding(choice: Choice, brief: DesignBrief, allowed: float) -> Rounding:
+    """Return the certified drift of the fixed-point code with as little error feedback as meets a limit.
+
+    Parameters
+    ----------
+    choice : Choice
+    brief : DesignBrief
+    allowed : float
+        The limit in deg/h; where no feedback meets it, the smallest bound is returned.
+    """
+    several = []
+    for carry in CARRIES:
+        if carry == CARRIES[0] and _least_without_feedback(choice, brief) > allowed:
+            continue
+        try:
+            several.append(_certified(choice, brief, carry))
+        except InputError as error:
+            several.append(Rounding(None, carry, str(error)))
+        bound = several[-1].deg_h
+        if bound is not None and bound <= allowed:
+            break
+    return min(several, key=lambda one: math.inf if one.deg_h is None else one.deg_h)
+
+
+def _least_without_feedback(choice: Choice, brief: DesignBrief) -> float:
+    """Return a drift in deg/h that every bound without error feedback exceeds: a place of the state's a step."""
+    steps = float(brief.budget.over_s / step_length(choice, brief.gyro))
+    return math.degrees(steps * 2.0 ** (_STATE_PLACES - brief.processor.word)) / _hours(brief)
+
+
+def _certified(choice: Choice, brief: DesignBrief, carry: str) -> Rounding:
+    """Return the certified drift with some error feedback."""
+    fixed = generated_sources.fixed_program(choice, settings(choice, brief, carry))
+    angles = fixed.interface.angle_accumulation
+    if angles is None:
+        return Rounding(None, carry, "no bound of a run is known")
+    steps = math.ceil(brief.budget.over_s / step_length(choice, brief.gyro))
+    bound = angles.bound(steps, 0, Fraction(0), not brief.gyro.pulse_arcsec, False)
+    if not math.isfinite(bound):
+        return Rounding(None, carry, "the words are too short for a bound")
+    return Rounding(math.degrees(bound) / _hours(brief), carry)
+
+
+def settings(choice: Choice, brief: DesignBrief, carry: str) -> Settings:
+    """Return the settings of the fixed-point code: increments are the gyro's counts where it has pulses."""
+    stated: dict[str, Any] = {
+        "word": brief.processor.word,
+        "max_rate_deg_s": brief.max_rate_deg_s,
+        "step": step_length(choice, brief.gyro),
+        "increments": choice.increments,
+        "carry": carry,
+    }
+    if brief.gyro.pulse_arcsec:
+        pulse = brief.gyro.pulse_arcsec * _PI / 648000
+        stated |= {"lsb": f"{pulse.numerator}/{pulse.denominator}rad"}
+        stated |= {"input_bits": brief.processor.word}
+    return Settings.of(**stated)
+
+
+def step_length(choice: Choice, gyro: GyroBrief) -> Fraction:
+    """Return the length of a step in s."""
+    assert choice.increments is not None, "a step of increments is chosen"
+    return choice.increments / gyro.sample_hz
+
+
+def _hours(brief: DesignBrief) -> float:
+    return float(brief.budget.over_s) / 3600

@@ -1,0 +1,35 @@
+"""Returns the algorithm behind a name: an attitude step, or the loops of two speeds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from strapgen import applications
+from strapgen.design.brief import DesignBrief
+from strapgen.design.selection.algorithm import Algorithm, AttitudeStep
+from strapgen.design.selection.candidates import TWO_SPEED, Contender
+
+
+def algorithm_of(contender: Contender, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:
+    """Return an algorithm for a brief.
+
+    Parameters
+    ----------
+    contender : Contender
+    state : str
+        A name of `candidates.STATES`.
+    brief : DesignBrief
+    path : path
+        The file of the brief, for which coefficients are designed.
+
+    Raises
+    ------
+    InputError
+        If the state has no such step.
+    """
+    if contender.method == TWO_SPEED:
+        loops: Algorithm = applications.extension("design.two-speed", f"method {TWO_SPEED}")(
+            state, contender.increments, brief
+        )
+        return loops
+    return AttitudeStep(contender.choice(state, str(path)), brief)

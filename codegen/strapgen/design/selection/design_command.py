@@ -1,0 +1,133 @@
+"""The command ``strapgen design`` selects an algorithm for an environment, a gyro, a budget and a processor."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import listed, option, whole
+from strapgen.cli.output import Output
+from strapgen.cli.progress import track, waiting
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.study.worker_options import WorkerOptions
+
+if TYPE_CHECKING:
+    from strapgen.design.brief import DesignBrief
+    from strapgen.design.selection.judgement import Judgement
+    from strapgen.design.selection.simulated import Simulated
+
+
+@grouped
+def design(
+    file: Annotated[
+        Path, typer.Argument(metavar="BRIEF", help="TOML file with the brief.", show_default=False)
+    ],
+    *,
+    methods: Annotated[
+        str | None,
+        option(
+            *("--method", "--methods"),
+            metavar="NAME,...",
+            help="Look at these methods alone, with all their samples or some, as in magnus4 or coning-combined:3+3.  "
+            "[default: all of the catalogue, and coefficients designed for the vibration]",
+            panel="Algorithm",
+        ),
+    ] = None,
+    simulate: Annotated[
+        str | None,
+        option(
+            "--simulate",
+            metavar="N",
+            help="Run the cheapest N algorithms in time, and show their drift beside the predicted one.",
+            panel="Run",
+        ),
+    ] = None,
+    generate: Annotated[
+        Path | None,
+        option(
+            "--generate",
+            metavar="FOLDER",
+            help="Write the fixed-point C of the cheapest algorithm, its project and test, and a report.",
+            panel="Run",
+        ),
+    ] = None,
+    results: Annotated[
+        Path | None,
+        option(
+            "--results",
+            metavar="FILE",
+            help="File that keeps each result when it is there; a run that was stopped goes on from it.",
+            panel="Run",
+        ),
+    ] = None,
+    workers: WorkerOptions,
+    output: Output,
+) -> None:
+    """Select the cheapest algorithm that meets a brief.
+
+    The brief states the largest rate, the vibration, the gyro, the budget and the processor. You see every algorithm
+    of the catalogue, and coefficients designed for the vibration, with the drift that each cause predicts, what it
+    costs, and what binds those that do not meet the brief. The bound of rounding is certified.
+
+    Example: strapgen design examples/briefs/ahrs.toml --plot out/ahrs.png
+
+    Example: strapgen design examples/briefs/ahrs.toml --simulate 5 --generate out/ahrs
+    """
+    output.check(file, results)
+    for name, path in (("--out", output.file), ("--plot", output.plot)):
+        if path is not None and results is not None and path.resolve() == results.resolve():
+            raise InputError(f"{name} and --results are both {path}; two files are needed")
+    shown = whole("simulate", simulate)
+    if shown is not None:
+        checks.count("simulate", shown)
+    count, cluster = workers.count(), workers.workers()
+    from strapgen.design.brief import read_brief
+    from strapgen.design.selection.answer import in_order, judgements
+    from strapgen.design.selection.candidates import contenders
+    from strapgen.design.selection.selection_plot import selection_image
+    from strapgen.design.selection.selection_report import selection_report
+    from strapgen.design.selection.simulated import confirmed
+
+    brief = read_brief(file)
+    several = contenders(brief, None if methods is None else listed("--method", methods))
+    rows = track(judgements(file, several, results, count, cluster), "judging", len(several))
+    with waiting("running the answer"):
+        ordered = confirmed(brief, file, in_order(one for row in rows for one in row))
+    runs = None if shown is None else _simulated(brief, file, ordered[:shown], count)
+    report = selection_report(brief, ordered, runs)
+    if generate is not None:
+        _write(brief, file, ordered, generate, report.written("text"))
+    title = f"{file.stem}: what the software adds to the drift, and what it costs; hollow: rounding is not looked at"
+    output.report(report, lambda path: selection_image(brief, ordered, title, path))
+
+
+def _simulated(
+    brief: DesignBrief, file: Path, ordered: list[Judgement], jobs: int | None
+) -> dict[str, Simulated]:
+    """Return time simulations of the algorithms that meet the brief, and of those that do not because of their runs."""
+    from strapgen.design.selection.simulated import algorithm_named, run
+
+    accepted = [one for one in ordered if one.meets or one.run_deg_h is not None]
+    steps = ((one.name, run(brief, one, algorithm_named(one, brief, file), jobs)) for one in accepted)
+    return dict(track(steps, "running", len(accepted)))
+
+
+def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Path, report: str) -> None:
+    """Write the firmware of the cheapest algorithm that meets the brief."""
+    from strapgen.cli.source_options import SourceOptions
+    from strapgen.design.selection.firmware import firmware_files
+    from strapgen.design.selection.simulated import algorithm_named
+
+    if not ordered or not ordered[0].meets:
+        raise InputError(f"{file}: no algorithm meets the brief, so --generate has nothing to write")
+    best = ordered[0]
+    files = firmware_files(
+        brief, best, algorithm_named(best, brief, file), report, f"strapgen design {shlex.quote(str(file))}"
+    )
+    for path in SourceOptions(out=folder).write(files):
+        typer.echo(f"wrote {path}", err=True)

@@ -1,0 +1,308 @@
+"""Judges an algorithm by a brief: what it loses by every cause, what it costs, and what binds it."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from strapgen.design.brief import DesignBrief, read_brief
+from strapgen.design.selection import causes
+from strapgen.design.selection.algorithm import Algorithm
+from strapgen.design.selection.candidates import STATES, Contender
+from strapgen.design.selection.causes import Rounding
+from strapgen.design.selection.choosing import algorithm_of
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab.study.clusters import moved
+
+#: The causes of a drift, in the order of a report; the first three are the software's.
+CAUSES = ("truncation", "coning", "rounding", "quantization", "noise")
+SOFTWARE = CAUSES[:3]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What an algorithm loses and costs, and whether it meets a brief.
+
+    Parameters
+    ----------
+    name : str
+        State, method and samples, as "euler coning-compressed:2".
+    state, method : str
+    increments, previous, ahead : int
+        See `Contender`.
+    meets : bool
+    binding : str or None
+        The cause or the limit that is exceeded most, of those that were looked at; None if none is.
+    reason : str
+        The same in words; empty if none is.
+    drift_deg_h : dict of str to float or None
+        Drift by cause; None where it is not known, or not looked at because a cheaper look had refused the algorithm.
+    operations_per_s : float
+        Additions, multiplications, divisions, roots, functions and choices.
+    carry : str
+        Error feedback of the fixed-point code.
+    velocity_m_s, position_m : float or None
+        What sculling leaves after the time of the budget; None without accelerations.
+    instructions_per_s, bytes : float or None
+        Counted on the processor of the brief, where it has a limit.
+    fragile : str
+        Why it meets the brief by errors that cancel, and so for these very lines alone; empty if it does not.
+    run_deg_h : dict of str to float or None
+        Drift by cause in a run in time; None where it was not run.
+    """
+
+    name: str
+    state: str
+    method: str
+    increments: int
+    previous: int
+    ahead: int
+    meets: bool
+    binding: str | None
+    reason: str
+    drift_deg_h: dict[str, float | None]
+    operations_per_s: float
+    carry: str = "none"
+    velocity_m_s: float | None = None
+    position_m: float | None = None
+    instructions_per_s: float | None = None
+    bytes: float | None = None
+    fragile: str = ""
+    run_deg_h: dict[str, float] | None = None
+
+    @property
+    def software_deg_h(self) -> float:
+        """Drift of truncation, coning and rounding together; infinite where one is not known."""
+        parts = [self.drift_deg_h[cause] for cause in SOFTWARE]
+        return math.fsum(math.inf if part is None else part for part in parts)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a process needs to judge an algorithm with every state.
+
+    Parameters
+    ----------
+    path : str
+        The file of the brief.
+    contender : Contender
+    """
+
+    path: str
+    contender: Contender
+
+    def moved(self, begin: Path, end: Path) -> Question:
+        """Return the question with its brief in another folder, see `clusters.Movable`."""
+        return replace(self, path=moved(self.path, begin, end))
+
+
+@dataclass
+class _Look:
+    """What is known of an algorithm so far."""
+
+    brief: DesignBrief
+    drift: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(CAUSES))
+    figures: dict[str, float | None] = field(default_factory=dict)
+    unknown: dict[str, str] = field(default_factory=dict)
+    rounding: Rounding = field(default_factory=lambda: Rounding(None, causes.CARRIES[0]))
+
+    @property
+    def software_limit(self) -> float:
+        return self.brief.budget.drift_deg_h * self.brief.budget.software_share
+
+    def excesses(self) -> dict[str, tuple[float, str]]:
+        """Return by how much what is known exceeds its limit, as a ratio and in words, of what exceeds it."""
+        limits = {}
+        for cause in SOFTWARE:
+            value = self.drift[cause]
+            if value is not None:
+                limits[cause] = value, self.software_limit, "deg/h of the software's"
+        known = {cause: self.drift[cause] or 0.0 for cause in SOFTWARE}
+        total = math.fsum(known.values())
+        if total > self.software_limit:
+            most = max(known, key=lambda cause: known[cause])
+            limits[most] = total, self.software_limit, "deg/h of the software's"
+        budget = self.brief.budget.drift_deg_h
+        random = {cause: self.drift[cause] or 0.0 for cause in CAUSES[3:]}
+        whole = total + math.hypot(*random.values())
+        if total <= self.software_limit and whole > budget:
+            most = max(random, key=lambda cause: random[cause])
+            limits[most] = whole, budget, "deg/h of the budget's"
+        for name, limit, unit in self._other_limits():
+            value = self.figures.get(name)
+            if value is not None and limit is not None:
+                limits[name] = value, limit, unit
+        excess = {
+            name: (value / limit, f"{name} {value:.3g} exceeds {limit:.3g} {unit}")
+            for name, (value, limit, unit) in limits.items()
+            if value > limit
+        }
+        return excess | {name: (math.inf, reason) for name, reason in self.unknown.items()}
+
+    def _other_limits(self) -> list[tuple[str, float | None, str]]:
+        budget, processor = self.brief.budget, self.brief.processor
+        share = budget.software_share
+        return [
+            ("velocity", None if budget.velocity_m_s is None else budget.velocity_m_s * share, "m/s"),
+            ("position", None if budget.position_m is None else budget.position_m * share, "m"),
+            ("operations_per_s", processor.operations_per_s, "operations a second"),
+            ("instructions_per_s", processor.instructions_per_s, f"instructions a second, {processor.cpu}"),
+            ("bytes", processor.bytes, f"bytes, {processor.cpu}"),
+        ]
+
+
+def judged(trial: Question) -> list[dict[str, Any]]:
+    """Return the judgements of an algorithm with every state it can have, as plain JSON data."""
+    brief = _brief(trial.path)
+    second_order = SecondOrder()
+    judgements = []
+    for state in STATES:
+        try:
+            algorithm = algorithm_of(trial.contender, state, brief, trial.path)
+        except InputError:  # the state has no such step
+            continue
+        judgements.append(vars(judge(brief, trial.contender, state, algorithm, second_order)))
+    return judgements
+
+
+@lru_cache(maxsize=4)
+def _brief(path: str) -> DesignBrief:
+    return read_brief(path)
+
+
+class SecondOrder:
+    """What follows from a step to the second power of its increments, and is therefore the same with every state."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, Any] = {}
+
+    def __call__(self, cause: Callable[[], Any]) -> Any:
+        """Return what a function of an `Algorithm` returns; raises what it raises."""
+        name = cause.__name__
+        if name not in self._known:
+            try:
+                self._known[name] = cause()
+            except InputError as error:
+                self._known[name] = error
+        if isinstance(self._known[name], InputError):
+            raise self._known[name]
+        return self._known[name]
+
+
+def judge(
+    brief: DesignBrief, contender: Contender, state: str, algorithm: Algorithm, second_order: SecondOrder
+) -> Judgement:
+    """Return the judgement of an algorithm.
+
+    What takes long is looked at last, and not at all where a limit is exceeded before.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    contender : Contender
+    state : str
+    algorithm : Algorithm
+        The algorithm of both.
+    second_order : SecondOrder
+        What is known from the same algorithm with another state.
+    """
+    look = _Look(brief)
+    operations = look.figures["operations_per_s"] = algorithm.operations_per_s()
+    look.drift["noise"] = causes.noise(brief)
+    look.drift["truncation"] = algorithm.truncation()
+    try:
+        if not look.excesses():
+            look.drift["coning"] = second_order(algorithm.coning)
+        if not look.excesses() and brief.budget.limits_velocity:
+            _look_at_velocity(look, second_order(algorithm.sculling))
+    except InputError as error:
+        look.unknown["coning"] = str(error)
+    if not look.excesses():
+        look.drift["quantization"] = second_order(algorithm.quantization)
+    if not look.excesses():
+        left = look.software_limit - math.fsum(look.drift[cause] or 0.0 for cause in SOFTWARE[:2])
+        look.rounding = algorithm.rounding(left)
+        look.drift["rounding"] = look.rounding.deg_h
+        if look.rounding.deg_h is None:
+            look.unknown["rounding"] = look.rounding.reason
+    if not look.excesses() and brief.processor.is_measured:
+        _measure(look, algorithm)
+    excesses = look.excesses()
+    binding = max(excesses, key=lambda name: excesses[name][0]) if excesses else None
+    figures: Mapping[str, float | None] = look.figures
+    return Judgement(
+        f"{state} {contender.name}",
+        state,
+        contender.method,
+        contender.increments,
+        contender.previous,
+        contender.ahead,
+        binding is None,
+        binding,
+        "" if binding is None else excesses[binding][1],
+        look.drift,
+        operations,
+        look.rounding.carry,
+        figures.get("velocity"),
+        figures.get("position"),
+        figures.get("instructions_per_s"),
+        figures.get("bytes"),
+        _cancellation(look, second_order(algorithm.line_errors)) if binding is None else "",
+    )
+
+
+def after_run(brief: DesignBrief, one: Judgement, run_deg_h: dict[str, float]) -> Judgement:
+    """Return a judgement with the drifts of a run in time in place of the predicted ones: its verdict is the run's.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    one : Judgement
+        Of an algorithm that meets the brief by prediction.
+    run_deg_h : dict of str to float
+        Drift in the run by cause.
+    """
+    look = _Look(brief, {**one.drift_deg_h, **run_deg_h})
+    excesses = look.excesses()
+    if not excesses:
+        return replace(one, run_deg_h=run_deg_h)
+    binding = max(excesses, key=lambda name: excesses[name][0])
+    reason = f"in a run {excesses[binding][1]}; {one.drift_deg_h[binding] or 0.0:.2g} is predicted"
+    return replace(one, meets=False, binding=binding, reason=reason, run_deg_h=run_deg_h)
+
+
+def _cancellation(look: _Look, errors: list[float]) -> str:
+    """Return how errors of lines cancel in words; empty where they need not."""
+    largest = math.fsum(map(abs, errors))
+    if largest <= look.software_limit:
+        return ""
+    return (
+        f"errors of up to {max(map(abs, errors)):.2g} deg/h, of the algorithm and of the gyro at "
+        f"{len(errors) // 2} line{'s' if len(errors) > 2 else ''}, cancel to {look.drift['coning'] or 0.0:.2g} deg/h"
+    )
+
+
+def _look_at_velocity(look: _Look, error: float | None) -> None:
+    """Add what sculling leaves after the time of the budget: a steady error of the acceleration in m/s^2."""
+    if error is not None:
+        over = float(look.brief.budget.over_s)
+        look.figures |= {"velocity": error * over, "position": error * over**2 / 2}
+
+
+def _measure(look: _Look, algorithm: Algorithm) -> None:
+    """Add what the fixed-point code costs on the processor of the brief."""
+    cpu = look.brief.processor.cpu
+    if shutil.which(PROCESSORS[cpu].compiler) is None:
+        raise InputError(
+            f"instructions and bytes on {cpu} are counted with {PROCESSORS[cpu].compiler}; it is not installed"
+        )
+    one = algorithm.cost(look.rounding.carry)
+    look.figures["bytes"] = one.bytes
+    if one.instructions_per_s is not None:
+        look.figures["instructions_per_s"] = one.instructions_per_s

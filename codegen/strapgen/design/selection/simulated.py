@@ -1,0 +1,293 @@
+"""Runs algorithms that meet a brief in time, to set the drift of a simulation beside the predicted one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from strapgen.design.brief import DesignBrief, GyroBrief
+from strapgen.design.environment import Line
+from strapgen.design.selection import causes
+from strapgen.design.selection.algorithm import Algorithm
+from strapgen.design.selection.answer import in_order
+from strapgen.design.selection.candidates import Contender
+from strapgen.design.selection.choosing import algorithm_of
+from strapgen.design.selection.judgement import Judgement, after_run
+from strapgen.lab.monte_carlo.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
+from strapgen.lab.motions.motions import Motion, motion
+from strapgen.lab.motions.rate_profiles import CosineSum
+from strapgen.lab.motions.reference_attitudes import KNOT, ReferenceAttitude
+from strapgen.lab.simulate.runs import Run
+
+#: Fewest steps of a run, and its longest time in s.
+_FEWEST, _LONGEST = 200, 10
+#: Fewest records of a run whose slope is told from what swings.
+_FEWEST_RECORDS = 100
+#: Substeps of the reference attitude in a period of the highest frequency.
+_SUBSTEPS = 24
+_AXES = 3
+#: Random runs, the steps of each, and where their random numbers begin.
+RANDOM_RUNS, _RANDOM_STEPS, _SEED = 2000, 200, 0
+
+
+class RandomDrift(NamedTuple):
+    """The root mean square of a drift in deg/h, of random runs.
+
+    Parameters
+    ----------
+    mean : float
+    low, high : float
+        Its 95 % interval.
+    """
+
+    mean: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Drifts in time simulations.
+
+    Parameters
+    ----------
+    truncation : float
+        Drift in deg/h of a steady turn at the largest rate.
+    coning : float or None
+        Drift in deg/h under the vibration, less the true one; None without vibration.
+    rounding : float
+        Drift in deg/h between fixed point and double in the steady turn; words of 64 bits run beside 40 digits.
+    quantization, noise : RandomDrift or None
+        Drift after the time of the budget that pulses and noise leave in the steady turn: that of shorter random runs,
+        times the factor by which it grows in the closed form. None without pulses or noise.
+    """
+
+    truncation: float
+    coning: float | None
+    rounding: float
+    quantization: RandomDrift | None
+    noise: RandomDrift | None
+
+
+@dataclass(frozen=True)
+class Vibration(Motion):
+    """A vibration of lines about x and y, as a gyro measures it.
+
+    Parameters
+    ----------
+    name, parameters
+        As for `Motion`.
+    rates, measured : CosineSum
+        The body rate, and what the gyro passes on of it.
+    """
+
+    name: str = "vibration of a brief"
+    parameters: dict[str, float] = field(default_factory=dict)
+    rates: Any = None
+    measured: Any = None
+    #: Attitudes that were integrated, by shape and times: several algorithms are recorded at the same ones.
+    known: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def samples(self, interval: Fraction, first: int, stop: int) -> Any:
+        """Return the increments that the gyro measures, see `Motion.samples`."""
+        edges = np.arange(first, stop + 1) * float(interval)
+        return np.diff(self.measured.angle(edges), axis=0)
+
+    def attitude(self, time: Any) -> Any:
+        """Return the true attitude, see `Motion.attitude`."""
+        times = np.asarray(time, float)
+        key = times.shape, times.tobytes()
+        if key not in self.known:
+            highest = float(self.rates.frequencies.max()) / (2 * math.pi)
+            substeps = max(16, math.ceil(_SUBSTEPS * highest * KNOT))
+            self.known[key] = ReferenceAttitude(self.rates.rate, substeps)(times)
+        return self.known[key].copy()
+
+    def rate(self, time: Any) -> Any:
+        """Return the body rate, see `Motion.rate`."""
+        return self.rates.rate(time)
+
+
+def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
+    """Return the motion of lines, seen by the gyro of a brief.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+    brief : DesignBrief
+    """
+    return _vibration(tuple(lines), brief.gyro)
+
+
+@lru_cache(maxsize=2)
+def _vibration(lines: tuple[Line, ...], gyro: GyroBrief) -> Vibration:
+    """Return the motion of lines, seen by a gyro, once for all algorithms of a brief."""
+    omega = 2 * np.pi * np.array([line.frequency_hz for line in lines])
+    still = np.zeros_like(omega)
+    sizes = np.array([[line.theta_x, line.theta_y] for line in lines]).T
+    # Lines begin at phases that have nothing to do with each other, so that they never all add up.
+    begin = 2 * np.pi * (math.sqrt(2) * np.arange(1, len(lines) + 1) % 1)
+    phases = begin + np.array([still, [line.phase for line in lines], still])
+    # The angle X sin(wt) has the rate X w cos(wt).
+    rates = CosineSum(np.array([*sizes, still]) * omega, np.tile(omega, (_AXES, 1)), phases)
+    measured = rates
+    if gyro.bandwidth_hz is not None and gyro.damping is not None:
+        ratio = omega / (2 * np.pi * float(gyro.bandwidth_hz))
+        gain = 1 / (1 - ratio**2 + 2j * float(gyro.damping) * ratio)
+        measured = replace(rates, amplitudes=rates.amplitudes * np.abs(gain), phases=phases + np.angle(gain))
+    return Vibration(rates=rates, measured=measured)
+
+
+def algorithm_named(judgement: Judgement, brief: DesignBrief, path: str | Path) -> Algorithm:
+    """Return the algorithm of a judgement.
+
+    Parameters
+    ----------
+    judgement : Judgement
+    brief : DesignBrief
+    path : path
+        The file of the brief, for which coefficients are designed again.
+    """
+    contender = Contender(judgement.method, judgement.increments, judgement.previous, judgement.ahead)
+    return algorithm_of(contender, judgement.state, brief, path)
+
+
+def run(brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: int | None = 1) -> Simulated:
+    """Run an algorithm that meets a brief in time.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    judgement : Judgement
+    algorithm : Algorithm
+        The algorithm of the judgement.
+    jobs : int, optional
+        Number of processes of the random runs; None for one for each processor.
+    """
+    drifts = software_drifts(brief, algorithm)
+    return Simulated(
+        drifts["truncation"],
+        drifts.get("coning"),
+        algorithm.rounded_apart(_largest_turn(brief), _steps(brief, algorithm), judgement.carry),
+        _of_pulses(brief, judgement, algorithm, jobs),
+        _of_noise(brief, algorithm, jobs),
+    )
+
+
+def software_drifts(brief: DesignBrief, algorithm: Algorithm) -> dict[str, float]:
+    """Return the drifts in deg/h of a run in double, by cause: in the steady turn, and under the vibration.
+
+    Lines begin at phases that have nothing to do with each other.
+    """
+    steps, step = _steps(brief, algorithm), algorithm.step
+    drifts = {"truncation": _slope(algorithm.run(_largest_turn(brief), steps))}
+    if brief.environment is not None:
+        shaken = vibration(brief.environment.lines(), brief)
+        record = _record(step, steps)
+        drifts["coning"] = _slope(algorithm.run(shaken, steps - steps % int(record / step), record))
+    return drifts
+
+
+def _steps(brief: DesignBrief, algorithm: Algorithm) -> int:
+    """Return the steps of a run."""
+    return max(_FEWEST, math.floor(min(Fraction(_LONGEST), brief.budget.over_s) / algorithm.step))
+
+
+def _largest_turn(brief: DesignBrief) -> Motion:
+    """Return the steady turn at the largest rate."""
+    return motion("constant", z_deg_s=brief.max_rate_deg_s)
+
+
+def confirmed(brief: DesignBrief, path: str | Path, ordered: Iterable[Judgement]) -> list[Judgement]:
+    """Run algorithms that meet a brief, the cheapest first, until one meets it in its run too.
+
+    A prediction is of second order in the angles of the vibration. What is of higher order shows in the run alone:
+    where a frequency is the sum of two others, and at angles of some tenths of a degree.
+
+    Parameters
+    ----------
+    brief : DesignBrief
+    path : path
+        The file of the brief.
+    ordered : iterable of Judgement
+        As `in_order` returns them.
+
+    Returns
+    -------
+    list of Judgement
+        In order, with the verdicts of the runs.
+    """
+    left = list(ordered)
+    run_ones: list[Judgement] = []
+    while left and left[0].meets and not (run_ones and run_ones[-1].meets):
+        one = left.pop(0)
+        run_ones.append(after_run(brief, one, software_drifts(brief, algorithm_named(one, brief, path))))
+    return in_order([*run_ones, *left])
+
+
+def _of_pulses(
+    brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: int | None
+) -> RandomDrift | None:
+    """Return the drift of random runs with the gyro's pulses, as the closed form has it grow to the budget's time."""
+    if not brief.gyro.pulse_arcsec:
+        return None
+    pulse = math.radians(float(brief.gyro.pulse_arcsec) / 3600)
+    seconds = _RANDOM_STEPS * algorithm.step
+    expected = algorithm.quantization(seconds)
+    at_the_end = judgement.drift_deg_h["quantization"]
+    assert at_the_end is not None, "the algorithm meets the brief"
+    outcome = _random(brief, algorithm, Errors(pulse, 0.0, _turn(brief)), jobs)
+    return _drift(outcome, float(seconds), at_the_end / expected)
+
+
+def _of_noise(brief: DesignBrief, algorithm: Algorithm, jobs: int | None) -> RandomDrift | None:
+    """Return the drift of random runs with the gyro's noise, which falls with the root of the time."""
+    if not brief.gyro.noise_deg_sqrt_h:
+        return None
+    size = math.radians(brief.gyro.noise_deg_sqrt_h) / 60 / math.sqrt(brief.gyro.sample_hz)
+    outcome = _random(brief, algorithm, Errors(0.0, size, _turn(brief)), jobs)
+    seconds = float(_RANDOM_STEPS * algorithm.step)
+    return _drift(outcome, seconds, math.sqrt(seconds / float(brief.budget.over_s)))
+
+
+def _turn(brief: DesignBrief) -> float:
+    """Return the angle from sample to sample at the largest rate."""
+    return math.radians(float(brief.max_rate_deg_s / brief.gyro.sample_hz))
+
+
+def _random(brief: DesignBrief, algorithm: Algorithm, errors: Errors, jobs: int | None) -> MeanSquare:
+    """Return the squared angle at the end of random runs."""
+    runs = SteadyRuns(algorithm.steady(), errors, _RANDOM_STEPS, RANDOM_RUNS, (_SEED,))
+    return MeanSquare.of(random_runs(runs, jobs=jobs))
+
+
+def _drift(outcome: MeanSquare, seconds: float, factor: float) -> RandomDrift:
+    """Return a squared angle at the end of runs as a drift over the time of the budget."""
+    low, high = outcome.interval()
+    return RandomDrift(
+        *(factor * math.sqrt(square) / seconds * causes.DEG_H for square in (outcome.mean, low, high))
+    )
+
+
+def _record(step: Fraction, steps: int) -> Fraction:
+    """Return the interval of records: where the reference attitude is stored, if that leaves enough of them."""
+    knot = Fraction(str(KNOT))
+    common = Fraction(math.lcm(step.numerator * knot.denominator, knot.numerator * step.denominator))
+    common /= step.denominator * knot.denominator
+    return common if steps * step >= _FEWEST_RECORDS * common else step
+
+
+def _slope(run: Run) -> float:
+    """Return the slope of the error in deg/h; records in the middle weigh most, so that what swings cancels."""
+    time = run.time - run.time.mean()
+    weights = np.hanning(len(time) + 2)[1:-1]
+    time = time - np.average(time, weights=weights)
+    slope = (weights * time) @ run.drift / (weights @ time**2)
+    return float(np.linalg.norm(slope)) * causes.DEG_H

@@ -1,0 +1,1 @@
+"""Windows for a band of frequencies and a sensor."""

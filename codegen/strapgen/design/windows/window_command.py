@@ -1,0 +1,275 @@
+"""The commands ``strapgen window design`` and ``strapgen window show`` design the filters of windows and show them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import typer
+
+from strapgen.analysis.vibration.band_options import BandOptions, command_line, not_negative
+from strapgen.cli.help import PlainCommand, PlainGroup
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option, whole
+from strapgen.cli.output import Output
+from strapgen.cli.progress import waiting
+from strapgen.design.windows.window_argument import WindowArgument, window_of
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.design.windows.family import FamilyBrief
+
+_Text = str | None
+
+app = typer.Typer(cls=PlainGroup, rich_markup_mode=None)
+
+
+@app.callback()
+def _group() -> None:
+    """Design windows, filters of samples on both sides of a step."""
+
+
+@dataclass(frozen=True)
+class WindowSize:
+    """Options of the samples that filters take, and of what they estimate."""
+
+    panel: ClassVar[str] = "Window"
+
+    samples: Annotated[
+        str,
+        option("--samples", metavar="N", help="Number of samples in a step; several take --rotation exact."),
+    ] = "1"
+    previous: Annotated[
+        _Text,
+        option(*("--previous", "--kept"), metavar="N", help="Number of samples from before the step."),
+    ] = None
+    ahead: Annotated[_Text, option("--ahead", metavar="N", help="Number of samples ahead of the step.")] = (
+        None
+    )
+    powers: Annotated[
+        str,
+        option(
+            "--powers",
+            metavar="N",
+            help="Powers of time, from 0 on, on which the filters are exact; 4 is exact on cubic rates.",
+        ),
+    ] = "4"
+    coefficients: Annotated[
+        str,
+        option("--coefficients", metavar="N", help="Highest Legendre coefficient of the rate, 1 to 8."),
+    ] = "4"
+    rotation: Annotated[
+        str,
+        option(
+            "--rotation",
+            metavar="NAME",
+            help="How the rotation follows: fourth, the rotation vector to fourth order, or exact, a power series.",
+        ),
+    ] = "fourth"
+    series_terms: Annotated[
+        _Text,
+        option("--series-terms", metavar="N", help="Terms of that power series.  [default: 16]"),
+    ] = None
+
+
+@dataclass(frozen=True)
+class Band(BandOptions):
+    """Options of the motion and the gyro for which filters are designed."""
+
+    noise: Annotated[
+        str,
+        option(
+            "--noise",
+            metavar="RATIO",
+            help="Noise of an increment by the rate times the sampling interval; above 0, the committed filters are "
+            "those of the least mean square error.",
+        ),
+    ] = "0"
+    now_noise: Annotated[
+        str,
+        option(
+            "--now-noise",
+            metavar="RATIO",
+            help="The same for the filters of the attitude of now; or the file of a brief, of whose gyro it is the "
+            "noise at the largest rate.",
+        ),
+    ] = "3e-4"
+    start_noise: Annotated[
+        str,
+        option("--start-noise", metavar="RATIO", help="The same for the first intervals of a recording."),
+    ] = "0"
+    spectrum: Annotated[
+        Path | None,
+        option(
+            "--spectrum",
+            metavar="FILE",
+            help="CSV file of the motion, as for strapgen vibration: the filters are those of the least mean square "
+            "error on it.",
+        ),
+    ] = None
+
+    def densities(self, band: Fraction) -> tuple[int, ...] | None:
+        """Return the density of the rate over the band; None if it is flat."""
+        if self.spectrum is None:
+            return None
+        from strapgen.analysis.vibration.spectrum import read_spectrum
+        from strapgen.design.filters import spectra
+
+        return spectra.weights(read_spectrum(self.spectrum), band, self.sampling("--spectrum"))
+
+    def check(self) -> None:
+        """Refuse a sampling frequency that nothing needs."""
+        needs = (self.band_hz, self.gyro_bandwidth_hz, self.gyro_damping, self.spectrum)
+        if self.sample_hz is not None and all(value is None for value in needs):
+            raise InputError("--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum")
+
+
+@app.command("design", cls=PlainCommand)
+@grouped
+def design(
+    *,
+    size: WindowSize,
+    band: Band,
+    name: Annotated[
+        _Text,
+        option(
+            "--name",
+            metavar="NAME",
+            help="Title of the window, from which its name follows.  [default: from samples and band]",
+            panel="Output",
+        ),
+    ] = None,
+    output: Annotated[Output, Shown(only=("out",))],
+) -> None:
+    """Design the filters of a window and write them as a file of exact rationals.
+
+    The file holds the filters that commit an attitude and one-sided ones, with fewer samples ahead, for the attitude of
+    now. Each is exact for polynomial rates, and the best one over the band. A second design gives the same file.
+
+    Example: strapgen window design --previous 7 --ahead 7 --band 1.3 --out out/window.toml
+    """
+    output.check(band.spectrum)
+    brief = _brief(size, band, name)
+    from strapgen.catalogue.methods import windows
+    from strapgen.design.windows import family, family_file
+    from strapgen.design.windows.window_report import window_warnings
+
+    with waiting("designing"):
+        window = family.design(brief)
+        windows.verify(window)
+        text = family_file.written(window, _command(size, band, name, output.file))
+        warnings = window_warnings(window)
+    output.deliver(text)
+    for warning in warnings:
+        typer.echo(f"strapgen: {warning}", err=True)
+
+
+def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
+    """Return what the options say."""
+    from strapgen.catalogue.methods import windows
+    from strapgen.design.windows.family import FamilyBrief
+
+    counts = {"--previous": size.previous, "--ahead": size.ahead}
+    for stated, value in counts.items():
+        if value is None:
+            raise InputError(f"{stated} is needed, a number of samples")
+    previous, ahead = (
+        checks.count(stated, whole(stated, value), smallest=0, largest=windows.MOST_SAMPLES - 1)
+        for stated, value in counts.items()
+    )
+    increments = checks.count("--samples", whole("--samples", size.samples), largest=windows.MOST_SAMPLES)
+    samples = previous + increments + ahead
+    if samples > windows.MOST_SAMPLES:
+        step = "" if increments == 1 else f" with --samples {increments}"
+        raise InputError(
+            f"--previous {previous} and --ahead {ahead}{step} make {samples} samples; "
+            f"at most {windows.MOST_SAMPLES} are allowed"
+        )
+    rotation = checks.choice("rotation", size.rotation, windows.ROTATIONS)
+    if size.series_terms is not None and rotation != "exact":
+        raise InputError("--series-terms goes with --rotation exact")
+    radians, gyro = band.radians(), band.gyro()
+    band.check()
+    return FamilyBrief(
+        previous,
+        ahead,
+        radians,
+        checks.count(
+            "--powers", whole("--powers", size.powers), largest=min(samples, windows.MOST_CONDITIONS)
+        ),
+        checks.count(
+            "--coefficients", whole("--coefficients", size.coefficients), largest=windows.MOST_DEGREE
+        ),
+        gyro,
+        not_negative("--noise", band.noise),
+        _now_noise(band.now_noise),
+        band.densities(radians),
+        rotation,
+        checks.count(
+            "--series-terms", whole("--series-terms", size.series_terms or "16"), largest=windows.MOST_TERMS
+        ),
+        _title(name),
+        not_negative("--start-noise", band.start_noise),
+        increments,
+    )
+
+
+def _now_noise(value: str) -> Fraction:
+    """Return the noise of an increment by the rate times the sampling interval: a ratio, or that of a brief's gyro."""
+    if not value.endswith(".toml"):
+        return not_negative("--now-noise", value)
+    from strapgen.design.brief import read_brief
+
+    brief = read_brief(Path(value))
+    if not brief.gyro.noise_deg_sqrt_h or not brief.max_rate_deg_s:
+        raise InputError(
+            f"--now-noise {value}: the gyro's noise_deg_sqrt_h is 0; a brief with noise is needed"
+        )
+    # A random walk of N deg in a root of an hour is N / 60 in a root of a second.
+    increment = brief.gyro.noise_deg_sqrt_h / 60 / math.sqrt(brief.gyro.sample_hz)
+    return Fraction(f"{increment * brief.gyro.sample_hz / brief.max_rate_deg_s:.3e}")
+
+
+def _title(name: str | None) -> str:
+    """Return the title of a window, whose name no window of the catalogue has; empty for the default."""
+    from strapgen.catalogue.methods import coefficient_files, windows
+
+    if name is None:
+        return ""
+    if coefficient_files.slug(checks.text("--name", name)) in windows.WINDOWS:
+        raise InputError(f"--name {name} is that of a window of the catalogue; another one is needed")
+    return name
+
+
+def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -> str:
+    """Return the command that designs the filters, with what differs from its defaults."""
+    out_name = None if out is None else out.name
+    return command_line(("strapgen", "window", "design"), (size, band), name=name, out=out_name)
+
+
+@app.command("show", cls=PlainCommand)
+@grouped
+def show(
+    window: WindowArgument,
+    *,
+    output: Output,
+) -> None:
+    """Show the filters of a window, their errors and their gains.
+
+    The conditions are checked exactly. --format json has the exact taps. An argument that ends in .toml or holds a path
+    separator is read as a file.
+
+    Example: strapgen window show window-7-7
+    """
+    output.check(window)
+    from strapgen.design.windows.window_plot import window_image
+    from strapgen.design.windows.window_report import window_report
+
+    family = window_of(window)
+    with waiting("evaluating the filters"):
+        report = window_report(family)
+    output.report(report, lambda path: window_image(family, path))

@@ -1,0 +1,166 @@
+"""The command ``strapgen evidence`` has independent tools examine what generated C in fixed point promises."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import KernelOptions, option
+from strapgen.cli.output import format_option
+from strapgen.cli.progress import track
+from strapgen.ir.exceptions import InputError
+from strapgen.navigation.systems.built_in import is_system
+
+if TYPE_CHECKING:
+    from strapgen.evidence.subjects import Subject
+    from strapgen.evidence.verdicts import Verdict
+
+_FORMATS = ("text", "json", "csv", "markdown", "latex")
+
+
+@grouped
+def evidence(
+    kernels: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="NAME...",
+            help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file, "
+            "or a described system, of which every stage is examined.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    all_: Annotated[
+        bool,
+        option("--all", help="Examine the standard catalogue in 32-bit fixed point.", panel="Algorithm"),
+    ] = False,
+    method: KernelOptions,
+    fixed: FixedOptions,
+    tool: Annotated[
+        str | None,
+        option("--tool", metavar="NAME,...", help="Tools to run.  [default: all]", panel="Evidence"),
+    ] = None,
+    complete: Annotated[
+        bool,
+        option("--complete", help="Fail, with exit status 1, if a tool is not installed.", panel="Evidence"),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        option(
+            "--out",
+            metavar="FOLDER",
+            help="Folder for what the tools read; each file says how you run it.  [default: none is kept]",
+            panel="Output",
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        option("--page", metavar="FILE", help="Write a page of tables in Markdown.", panel="Output"),
+    ] = None,
+    check: Annotated[
+        bool,
+        option(
+            "--check", help="Compare the page with its file, but for versions; write nothing.", panel="Output"
+        ),
+    ] = False,
+    format: Annotated[str, format_option(_FORMATS)] = "text",
+) -> None:
+    """Have independent tools examine what generated C promises.
+
+    From the program of the C come a harness for Frama-C, formulas for a solver, a script for Gappa, runners for
+    processors and a driver for a fuzzer. The tools that are installed say whether any sum can overflow, whether the
+    error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
+
+    Example: strapgen evidence euler --method rk4 --out out/evidence
+    """
+    from strapgen.evidence import collection
+    from strapgen.evidence.evidence_report import evidence_page, evidence_report
+    from strapgen.ir import checks
+
+    checks.choice("format", format, _FORMATS)
+    if check and page is None:
+        raise InputError("--check compares a page; --page is missing, which names its file")
+    subjects = [*_subjects(kernels or [], all_, method, fixed)]
+    tools = [] if tool is None else [name.strip() for name in tool.split(",")]
+    with _folder(out) as folder:
+        tasks = collection.collect(subjects, folder, tools)
+        total = len(tools or collection.CHECKS) * len(subjects)
+        verdicts = collection.in_order(
+            [verdict for part in track(tasks, "examining", total) for verdict in part], subjects
+        )
+    typer.echo(evidence_report(verdicts).written(format).rstrip("\n"))
+    status = _status(verdicts, complete)
+    if page is not None:
+        text = evidence_page(verdicts, {subject.name: subject.digest for subject in subjects})
+        status = max(status, _page(page, text, check))
+    raise typer.Exit(status)
+
+
+def _subjects(
+    kernels: list[str], all_: bool, method: KernelOptions, fixed: FixedOptions
+) -> Iterator[Subject]:
+    from strapgen.evidence import subjects
+
+    stated = [*method.stated, *fixed.stated]
+    if all_ and (kernels or stated):
+        raise InputError(f"--all examines the whole catalogue; {[*stated, *kernels][0]} does not go with it")
+    if not all_ and not kernels:
+        raise InputError("a kernel is needed, or --all; strapgen list kernels shows them")
+    if all_:
+        yield from subjects.standard()
+    for kernel in kernels:
+        if is_system(kernel):
+            yield from _stages(kernel, method, fixed)
+            continue
+        choice = method.choose(kernel, step=False)
+        yield subjects.Subject(choice, fixed.settings(choice.increments_per_step))
+
+
+def _stages(name: str, method: KernelOptions, fixed: FixedOptions) -> Iterator[Subject]:
+    """Yield the stages of a described system."""
+    from strapgen.evidence import subjects
+    from strapgen.navigation.systems.simulate_system import refuse_options
+    from strapgen.navigation.systems.wiring import described
+
+    refuse_options(method, fixed, ["--constant"] if method.constant else [])
+    yield from subjects.of_system(described(name), fixed.settings(1))
+
+
+@contextlib.contextmanager
+def _folder(out: Path | None) -> Iterator[Path]:
+    if out is None:
+        from strapgen.storage.drafts import temporary_folder
+
+        with temporary_folder() as folder:
+            yield folder
+        return
+    yield out
+
+
+def _status(verdicts: list[Verdict], complete: bool) -> int:
+    """Return 1 if a claim fails that no other tool proves, or if a tool is missing that must be there."""
+    from strapgen.evidence.verdicts import failures
+
+    missing = complete and any(verdict.result == "not installed" for verdict in verdicts)
+    return int(missing or bool(failures(verdicts)))
+
+
+def _page(page: Path, text: str, check: bool) -> int:
+    """Write the page, or return 1 if its file differs from it, but for the versions of tools."""
+    from strapgen.evidence.evidence_report import without_versions
+    from strapgen.storage.files import write_files
+
+    if not check:
+        write_files(Path(), {str(page): text})
+        return 0
+    written = page.read_text() if page.is_file() else ""
+    same = without_versions(written) == without_versions(text)
+    other = ", of other versions" if same and written != text else ""
+    typer.echo(f"{page} is {'in step' if same else 'out of step'} with what the tools{other} say", err=True)
+    return int(not same)

@@ -1,0 +1,217 @@
+"""Lays out what independent tools say of generated code: a list, or a page with a table for each promise."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from strapgen.evidence.verdicts import Verdict
+from strapgen.results.report import Report
+from strapgen.results.table import Column, TextTable
+
+_HEAD = """# Evidence for the standard catalogue
+
+`make evidence-page` writes this page; `make evidence` runs all tools and compares it with what they say.
+
+The kernels of `c_fixed/`: 32-bit fixed point for increments of up to 1/8 rad. "proved" holds for all inputs in their
+ranges; "agrees" holds for the inputs that were run; "fails" says that a tool has no proof, where another has one; "not
+examined" that it has no theorem for something in the code. [docs/evidence.md](../docs/evidence.md) says what each claim
+means and how you repeat a proof by hand. The digest is that of the kernel's source and header without
+the version of strapgen, so that a changed file shows.
+"""
+
+
+_VERSIONS = "## Versions"
+
+
+def evidence_report(verdicts: Sequence[Verdict]) -> Report:
+    """Return verdicts as a report."""
+    return Report(lambda: _text(verdicts), lambda: _data(verdicts), lambda: _table(verdicts))
+
+
+def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> str:
+    """Return the page of the standard catalogue in Markdown.
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+        Their claims are a promise and a case, as "no overflow: x86_64".
+    digests : mapping of str to str
+        Digest of each kernel's files.
+    """
+    parts = [_HEAD, "## Summary", summary(verdicts).as_markdown()]
+    for promise in dict.fromkeys(_promise(verdict)[0] for verdict in verdicts):
+        members = [verdict for verdict in verdicts if _promise(verdict)[0] == promise]
+        parts += [f"## {promise[0].upper()}{promise[1:]}", _matrix(members).as_markdown(), *_reasons(members)]
+    files = TextTable([Column("kernel", "<"), Column("digest", "<")], [[*row] for row in digests.items()])
+    parts += ["## What was examined", files.as_markdown()]
+    versions = dict.fromkeys(f"{verdict.tool} {verdict.version}".strip() for verdict in verdicts)
+    parts += [_VERSIONS, "\n".join(f"- {version}" for version in sorted(versions))]
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+@dataclass(frozen=True)
+class EvidencePage:
+    """What a page of evidence says of its kernels.
+
+    Parameters
+    ----------
+    results : dict of str to dict of str to str
+        By the name of the function, then by the claim: a result and its tools, as in "proved, Gappa".
+    digests : dict of str to str
+        Digest of each kernel's files.
+    versions : tuple of str
+        The tools, with their versions.
+    """
+
+    results: dict[str, dict[str, str]]
+    digests: dict[str, str]
+    versions: tuple[str, ...]
+
+
+def read_page(page: str) -> EvidencePage:
+    """Return what the text of `evidence_page` says.
+
+    Parameters
+    ----------
+    page : str
+
+    Examples
+    --------
+    >>> proof = Verdict("a_w32", "no overflow: AVR", "z3", "4.16", "proved", 0.1)
+    >>> read_page(evidence_page([proof], {"a_w32": "0123"})).results
+    {'a_w32': {'no overflow: AVR': 'proved, z3'}}
+    """
+    results: dict[str, dict[str, str]] = {}
+    digests: dict[str, str] = {}
+    for section in page.split("\n## ")[1:]:
+        title, _, text = section.partition("\n")
+        rows = [re.split(r" *\| *", line.strip("| ")) for line in text.splitlines() if line.startswith("| ")]
+        if not rows or rows[0][0] != "kernel":
+            continue
+        if rows[0][1] == "digest":
+            digests |= dict(rows[2:])
+            continue
+        promise = f"{title[0].lower()}{title[1:]}"
+        for name, *cells in rows[2:]:
+            for case, cell in zip(rows[0][1:], cells, strict=True):
+                if cell != "-":
+                    results.setdefault(name, {})[f"{promise}: {case}"] = cell
+    tools = page.partition(f"\n{_VERSIONS}")[2]
+    versions = tuple(line.removeprefix("- ") for line in tools.splitlines() if line.startswith("- "))
+    return EvidencePage(results, digests, versions)
+
+
+def without_versions(page: str) -> str:
+    """Return a page without the versions of the tools, which differ between machines where the results do not."""
+    return page.partition(_VERSIONS)[0]
+
+
+def summary(verdicts: Sequence[Verdict]) -> TextTable:
+    """Return how many verdicts of each kind there are, by claim and tool."""
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    for verdict in verdicts:
+        counts.setdefault((verdict.claim, verdict.tool), Counter())[verdict.result] += 1
+    columns = [Column("claim", "<"), Column("tool", "<"), *map(Column, _RESULTS)]
+    return TextTable(
+        columns,
+        [[*place, *(count[result] for result in _RESULTS)] for place, count in sorted(counts.items())],
+    )
+
+
+_RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
+
+
+def _promise(verdict: Verdict) -> tuple[str, str]:
+    promise, _, case = verdict.claim.partition(": ")
+    return promise, case
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """The verdicts of one kernel on one claim."""
+
+    verdicts: tuple[Verdict, ...]
+
+    def text(self) -> str:
+        """Return the strongest result with its tools; a proof makes up for a failure."""
+        for result in _RESULTS:
+            tools = [verdict.tool for verdict in self.verdicts if verdict.result == result]
+            if tools:
+                return f"{result}, {' and '.join(dict.fromkeys(tools))}"
+        return "-"
+
+
+def _matrix(verdicts: Sequence[Verdict]) -> TextTable:
+    cases = list(dict.fromkeys(_promise(verdict)[1] for verdict in verdicts))
+    kernels = dict.fromkeys(verdict.kernel for verdict in verdicts)
+    rows = [
+        [
+            kernel,
+            *(
+                _Cell(tuple(v for v in verdicts if (v.kernel, _promise(v)[1]) == (kernel, case))).text()
+                for case in cases
+            ),
+        ]
+        for kernel in kernels
+    ]
+    return TextTable([Column("kernel", "<"), *(Column(case, "<") for case in cases)], rows)
+
+
+def _reasons(verdicts: Sequence[Verdict]) -> list[str]:
+    """Return what is said beside the results, a line for each text with the kernels that it stands for."""
+    said: dict[str, dict[str, None]] = {}
+    for verdict in verdicts:
+        if verdict.detail:
+            said.setdefault(f"{_promise(verdict)[1]}, {verdict.tool}: {verdict.detail}", {})[
+                verdict.kernel
+            ] = None
+    every = {verdict.kernel for verdict in verdicts}
+
+    def named(kernels: Collection[str]) -> str:
+        return "all" if every == {*kernels} and len(every) > 1 else ", ".join(kernels)
+
+    return ["\n".join(f"- {text} ({named(kernels)})" for text, kernels in said.items())] if said else []
+
+
+def _data(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """Return what tools say of the claims that they can examine; the text and the page name the others too."""
+    return [
+        {
+            "kernel": verdict.kernel,
+            "claim": verdict.claim,
+            "tool": verdict.tool,
+            "version": verdict.version,
+            "result": verdict.result,
+            "seconds": round(verdict.seconds, 2),
+            "detail": verdict.detail,
+        }
+        for verdict in verdicts
+        if verdict.result != "not examined"
+    ]
+
+
+def _table(verdicts: Sequence[Verdict]) -> TextTable:
+    columns = [
+        *(Column(name, "<") for name in ("kernel", "claim", "tool", "version", "result")),
+        Column("seconds", ">", ".1f"),
+        Column("detail", "<"),
+    ]
+    return TextTable(columns, [[*row.values()] for row in _data(verdicts)])
+
+
+def _text(verdicts: Sequence[Verdict]) -> str:
+    columns = [
+        *(Column(name, "<") for name in ("kernel", "claim", "tool", "result")),
+        Column("s", ">", ".1f"),
+    ]
+    rows = [[v.kernel, v.claim, v.tool, v.result, v.seconds] for v in verdicts]
+    notes = [
+        f"{verdict.kernel}, {verdict.claim}, {verdict.tool} {verdict.version}: {verdict.detail}"
+        for verdict in verdicts
+        if verdict.detail
+    ]
+    return "\n".join([TextTable(columns, rows).as_text(), *([""] if notes else []), *notes])

@@ -1,1 +1,0 @@
-"""Experiments measure with back ends: orders, tables, word lengths, agreement. `reports` prints their results."""

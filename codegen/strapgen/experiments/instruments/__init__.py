@@ -1,1 +1,0 @@
-"""Experiments on the instruments and systems of 1984."""

@@ -1,0 +1,1 @@
+"""Delivery into firmware: projects, test vectors, verification, check of foreign code."""

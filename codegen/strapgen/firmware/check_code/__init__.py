@@ -1,0 +1,1 @@
+"""Conformance tests of attitude steps written by others."""

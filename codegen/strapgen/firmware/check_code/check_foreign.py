@@ -1,0 +1,393 @@
+"""`check_foreign` holds a user's function in C or C++ to the behaviour of an attitude step, and names what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.firmware.check_code import coning_causes, ladder
+from strapgen.firmware.check_code.axes import (
+    DIRECTION_WITHIN,
+    SIZE_WITHIN,
+    convention_of,
+    fits,
+    in_words,
+    off,
+    sizes_in_words,
+)
+from strapgen.firmware.check_code.conformance import Finding
+from strapgen.firmware.check_code.foreign_arguments import RATES
+from strapgen.firmware.check_code.probes import (
+    Directions,
+    Products,
+    direction_segments,
+    directions,
+    product_segments,
+    products,
+)
+from strapgen.firmware.check_code.rest import Rest, rest, rest_segments
+from strapgen.firmware.check_code.rotation import rotation, rotation_segments
+from strapgen.firmware.check_code.runs import (
+    ENDS,
+    RATE_INPUTS,
+    Convention,
+    ForeignSegments,
+    ForeignStep,
+    Segment,
+    SegmentRun,
+    departure,
+    lengths,
+)
+from strapgen.lab.motions.motions import motion
+
+Array = NDArray[np.float64]
+
+#: Largest departure of C C' from the unit matrix that is no fault in itself.
+_NORM_WITHIN = 1e-4
+#: Units in the last place that rounding adds in a call.
+_UNITS_A_CALL = 64
+#: Largest component in rad of random increments.
+_RANDOM = 0.02
+#: Most coefficients that a line shows; those come first that differ most from what is wanted.
+_MOST_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class SeenCoefficient:
+    """The coefficient of the cross product of two samples, older times newer.
+
+    Parameters
+    ----------
+    older, newer : int
+        Samples of a call have the numbers from 0, those before it are negative.
+    seen, wanted : float
+        That of the function, and that of the published correction whose pattern is nearest.
+    """
+
+    older: int
+    newer: int
+    seen: float
+    wanted: float
+
+
+@dataclass(frozen=True)
+class ForeignOutcome:
+    """What the check of a user's function has shown.
+
+    Parameters
+    ----------
+    file : str
+    findings : tuple of Finding
+    order : float or None
+        Observed order.
+    drift_deg_h : float or None
+        Magnitude of the drift on the cone in deg/h.
+    closed_form_deg_h : float or None
+        The one that a published coning correction on the same samples leaves, in closed form.
+    cause : str or None
+        The likely cause of what fails; None if nothing does, or the cause is not known.
+    drift_by_axis_deg_h : tuple of float or None
+        The drift about x, y and z of the reference axes in deg/h; its length is the magnitude.
+    coefficients : tuple of SeenCoefficient
+        Those of cross products that are seen or wanted; none where samples are rates at instants.
+    coefficient_ratio : float or None
+        What they correct of the drift on coning to leading order, 1 if they are right.
+    """
+
+    file: str
+    findings: tuple[Finding, ...]
+    order: float | None
+    drift_deg_h: float | None
+    closed_form_deg_h: float | None
+    cause: str | None
+    drift_by_axis_deg_h: tuple[float, ...] | None = None
+    coefficients: tuple[SeenCoefficient, ...] = ()
+    coefficient_ratio: float | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the function does all that is required."""
+        return all(finding.holds is not False for finding in self.findings)
+
+
+def check_foreign(step: ForeignStep) -> ForeignOutcome:
+    """Check a user's function.
+
+    Parameters
+    ----------
+    step : ForeignStep
+
+    Returns
+    -------
+    ForeignOutcome
+
+    Raises
+    ------
+    InputError
+        If a choice does not fit the function.
+    """
+    return _Check(step).outcome()
+
+
+class _Check:
+    """The checks of one function, and what they measure."""
+
+    def __init__(self, step: ForeignStep) -> None:
+        self.step = step
+        self.count = step.samples
+        self.causes: list[str] = []
+        self.order: float | None = None
+        self.drift: Array | None = None
+        self.closed: float | None = None
+        self.coefficients: tuple[SeenCoefficient, ...] = ()
+        self.ratio: float | None = None
+
+    def outcome(self) -> ForeignOutcome:
+        """Run all checks."""
+        findings = tuple(self.findings())
+        failed = any(finding.holds is False for finding in findings)
+        cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
+        return ForeignOutcome(
+            str(self.step.source.file),
+            findings,
+            self.order,
+            None if self.drift is None else float(np.linalg.norm(self.drift)),
+            self.closed,
+            cause,
+            None if self.drift is None else tuple(map(float, self.drift)),
+            self.coefficients,
+            self.ratio,
+        )
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield what is seen; after a fault that hides all others there is no more."""
+        first = self.step.run(direction_segments(self.step))
+        calls = self.calls(first)
+        if calls.holds is False:
+            yield calls
+            return
+        convention, response = convention_of(self.step, directions(self.step, first.runs))
+        if convention is None:
+            yield calls
+            yield self.failed("axes", in_words(self.step, response.steady), off(response))
+            return
+        everything = self.segments()
+        done = self.step.run([segment for _, part in everything for segment in part], convention)
+        calls = self.calls(done)
+        yield calls
+        if calls.holds is False:
+            return
+        axes = [*self.axes(convention, response)]
+        yield from axes
+        if axes[-1].holds is False and off(response) <= SIZE_WITHIN:  # about reference axes
+            return
+        runs, place = {}, 0
+        for name, part in everything:
+            runs[name] = done.runs[place : place + len(part)]
+            place += len(part)
+        yield from self.measured(convention, runs)
+
+    def failed(self, name: str, text: str, measured: float | None = None) -> Finding:
+        """Return a finding whose text is its own cause."""
+        self.causes.append(text)
+        return Finding(name, False, text, measured)
+
+    def calls(self, done: ForeignSegments) -> Finding:
+        """Return the finding on how calls end, and on what they do to memory."""
+        if done.stopped:
+            return self.failed("calls", done.stopped)
+        if done.writes_beyond:
+            return self.failed("calls", "it writes beyond the ends of its arrays")
+        if done.changes_inputs:
+            return self.failed("calls", "it changes an argument that is no result")
+        return Finding("calls", True, "all calls return, and write nothing but the result")
+
+    # Conventions
+
+    def axes(self, known: Convention, response: Directions) -> Iterator[Finding]:
+        """Yield the findings on scalar part, sense and axes of a function that follows a known convention."""
+        declared = self.step.convention
+        if self.step.source.arguments.elements == 4:
+            yield self.fits("scalar", declared.scalar, known.scalar, "the scalar part stands")
+        yield self.fits("sense", declared.sense, known.sense, "the attitude is")
+        if off(response) > SIZE_WITHIN:
+            yield self.failed("axes", sizes_in_words(response.steady), off(response))
+        elif response.order_of_turns < response.other_order:
+            text = "rotations about x, y and z are those of the body"
+            yield Finding("axes", True, text, off(response), SIZE_WITHIN)
+        else:
+            text = "a rotation turns about reference axes, not about body axes: a product in the wrong order"
+            yield self.failed("axes", text, response.order_of_turns)
+
+    def fits(self, name: str, ours: str, known: str, what: str) -> Finding:
+        """Return the finding on a declared part of the convention."""
+        if ours == known:
+            return Finding(name, True, f"{what} {ours}")
+        option = "--scalar" if name == "scalar" else "--sense"
+        return self.failed(name, f"{what} {known}, not {ours}: {option} {known} fits")
+
+    # Measurements
+
+    def segments(self) -> list[tuple[str, list[Segment]]]:
+        """Return all segments of the measurements under their names."""
+        generator = np.random.default_rng(1969)
+        size = min(_RANDOM, self.step.most / 2)  # of a component, half as large as a vector may be
+        increments = generator.uniform(-size, size, (20, self.count, 3))
+        return [
+            ("runs", [Segment(increments, settled=False), Segment(increments, settled=False)]),
+            ("at rest", rest_segments(self.step)),
+            ("directions", direction_segments(self.step)),
+            ("rotation", rotation_segments(self.step)),
+            ("products", [] if self.step.takes == ENDS else product_segments(self.step)),
+            ("symmetry", [Segment(increments), Segment(increments @ _frame().T)]),
+            ("order", ladder.ladder_segments(self.step)),
+            ("drift", ladder.drift_segments(self.step)),
+        ]
+
+    def measured(self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
+        """Yield what is measured on all segments."""
+        still = rest(self.step, runs["at rest"])
+        yield self.at_rest(still)
+        runs = {name: tuple(run.unturned(still.frame) for run in part) for name, part in runs.items()}
+        response = directions(self.step, runs["directions"])
+        delay = self.delay(response)
+        coefficients = None
+        turned = rotation(self.step, convention, runs["rotation"])
+        if self.step.takes != ENDS and delay.holds and off(response) <= SIZE_WITHIN:
+            coefficients = products(self.step, runs["products"], exact=turned.order >= 3)
+            if coning_causes.comes_late(coefficients):
+                delay = Finding("delay", False, "a later call corrects the samples of a call", delay.measured)
+        yield delay
+        self.causes.extend([turned.cause] if turned.cause else [])
+        yield Finding("rotation", turned.order >= 3, turned.text, turned.square)
+        distorted = still.strays or off(response) > SIZE_WITHIN
+        proved = 0 if distorted else turned.order if delay.holds else min(turned.order, 1)
+        yield from self.corrected(coefficients, proved, runs)
+        yield self.symmetry(*runs["symmetry"])
+        yield self.norm(convention, runs["drift"][0])
+        yield self.repeated(*runs["runs"])
+
+    def at_rest(self, still: Rest) -> Finding:
+        """Return the finding on what happens without rotation."""
+        allowed = _UNITS_A_CALL * self.step.unit
+        text = f"without rotation the state {'stays as it is' if still.moved <= allowed else 'moves'}"
+        self.causes.extend(still.causes(float(self.step.interval * self.count)))
+        return Finding("at rest", still.moved <= allowed, text, still.moved, allowed)
+
+    def delay(self, response: Directions) -> Finding:
+        """Return the finding on a rotation that another call brings."""
+        lag, ends = response.lag, self.step.takes == ENDS
+        if abs(lag) <= DIRECTION_WITHIN if ends else fits(response.at_once):
+            return Finding("delay", True, "a call turns by its own samples", lag)
+        half = 0.5 if self.step.takes == RATES else -0.5
+        if (
+            self.step.takes in RATE_INPUTS
+            and abs(lag - half) < DIRECTION_WITHIN
+            and (said := self.other_rates())
+        ):
+            return self.failed("delay", said, lag)
+        size = "one sample" if abs(abs(lag) - 1) < DIRECTION_WITHIN else f"{abs(lag):.2g} samples"
+        return self.failed("delay", f"rotation {size} {'late' if lag > 0 else 'early'}", lag)
+
+    def other_rates(self) -> str | None:
+        """Return the cause if the function is right for the other kind of rates, where it has no delay."""
+        other = ENDS if self.step.takes == RATES else RATES
+        checked = _Check(replace(self.step, takes=other))
+        holds = {finding.name: finding.holds for finding in checked.findings()}
+        if not holds.get("delay") or holds.get("order") is False:
+            return None
+        order = "" if checked.order is None else f", order {checked.order:.2f}"
+        said = (
+            "rates at instants are taken for means: its rates are those at the ends of the intervals"
+            if other == ENDS
+            else "means are taken for rates at instants: its rates are means over the intervals"
+        )
+        return f"{said}; --input {other} fits{order}"
+
+    def corrected(
+        self,
+        coefficients: Products | None,
+        proved: int,
+        runs: dict[str, tuple[SegmentRun, ...]],
+    ) -> Iterator[Finding]:
+        """Yield the findings on the coning correction: its coefficients, the order, and the drift.
+
+        Without coefficients the order that is proved counts, as far as rounding hides the one that is measured.
+        """
+        if coefficients is None:
+            standard = coning_causes.plain_design(self.count)
+        else:
+            standard = coning_causes.standard_design(coefficients)
+            shown = self.shown(coefficients)
+            yield shown
+            proved = proved if shown.holds else min(proved, 2)
+        seen = ladder.ladder(self.step, runs["order"], standard)
+        if self.step.source.precision == "float":
+            order, self.order = ladder.order_in_float(self.step, seen, standard, proved)
+        else:
+            order, self.order = ladder.order_on_ladder(self.step, seen)
+        yield order
+        seen_design = None if coefficients is None else coning_causes.seen_design(coefficients)
+        drift, self.drift, self.closed = ladder.drift_on_cones(
+            self.step, runs["drift"], standard, seen_design
+        )
+        yield drift
+
+    def shown(self, known: Products) -> Finding:
+        """Return the finding on the coefficients, and keep them beside those that are wanted."""
+        self.coefficients = tuple(
+            SeenCoefficient(older, newer, known.at_once[older, newer], value)
+            for (older, newer), value in coning_causes.wanted(known).items()
+            if value or abs(known.at_once[older, newer]) > coning_causes.LEAST
+        )
+        self.ratio = coning_causes.ratio(known)
+        holds = coning_causes.corrects_coning(known) and not coning_causes.weights_off(known)
+        if (said := coning_causes.cause(known)) is not None:
+            self.causes.append(said)
+        by_difference = sorted(self.coefficients, key=lambda each: -abs(each.seen - each.wanted))
+        parts = [
+            f"d{each.older} x d{each.newer} {each.seen:.4g} ({each.wanted:.4g})"
+            for each in by_difference[:_MOST_SHOWN]
+        ]
+        rest = f" and {len(by_difference) - _MOST_SHOWN} more" if len(by_difference) > _MOST_SHOWN else ""
+        text = f"seen (wanted): {', '.join(parts)}{rest}; {self.ratio:.3f} of what coning needs"
+        return Finding("coefficients", holds, text, self.ratio, coning_causes.tolerance(known))
+
+    def symmetry(self, plain: SegmentRun, turned: SegmentRun) -> Finding:
+        """Turn all increments: the attitude must turn with them."""
+        frame = _frame()
+        off = float(np.abs(turned.relative - frame @ plain.relative @ frame.T).max())
+        allowed = _UNITS_A_CALL * self.step.unit * len(plain.relative)
+        says = "turns" if off <= allowed else "does not turn"
+        text = f"with all increments turned the attitude {says} with them"
+        return Finding("symmetry", off <= allowed, text, off, allowed)
+
+    def norm(self, convention: Convention, run: SegmentRun) -> Finding:
+        """Look at the length of the state along the cone."""
+        off = departure(run.states)
+        allowed = max(_NORM_WITHIN, 4 * self.step.unit * len(run.matrices))
+        text = f"on the cone C C' departs from the unit matrix by at most {off:.3g}"
+        if off > allowed:
+            size = lengths(run.states)
+            self.causes.append(
+                f"the state's length is off: {size[0]:.6g} at first, {size[-1]:.6g} in the end"
+            )
+        return Finding("norm", off <= allowed, text, off, allowed)
+
+    def repeated(self, first: SegmentRun, second: SegmentRun) -> Finding:
+        """Compare a run with the same run again, after a reset."""
+        off = float(np.abs(first.states - second.states).max())
+        if off == 0:
+            return Finding("runs", True, "a second run gives the same numbers", off, 0.0)
+        self.causes.append(coning_causes.STATE_KEPT)
+        init = self.step.source.init
+        after = f"after {init}" if init else "no --init is named, and"
+        return Finding("runs", False, f"{after} a second run differs from the first by {off:.3g}", off, 0.0)
+
+
+def _frame() -> Array:
+    """Return a rotation that takes no axis to an axis."""
+    return motion("constant", x_rad_s=0.48, y_rad_s=-0.6, z_rad_s=0.64).attitude(1.0)

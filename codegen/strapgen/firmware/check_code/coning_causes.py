@@ -1,0 +1,336 @@
+"""Names the likely cause of a wrong coning correction from the coefficients that a function is seen to have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+from strapgen.catalogue.methods.coning_coefficients import FORMS, Design, design
+from strapgen.firmware.check_code.probes import MOST_PREVIOUS, Products, Table
+
+ABSENT = "correction absent or zero"
+WRONG_SIGN = "correction of the wrong sign"
+LATE = "correction one sample late"
+FACTOR_TWO = "correction off by a factor of 2"
+SUM_LATE = "the sum of the samples before lacks the last one (one sample late)"
+REVERSED = "the samples of a call are taken in reverse order"
+STATE_KEPT = "state kept between runs"
+
+#: Smallest coefficient that counts as one.
+LEAST = 0.001
+#: Largest departure from a known pattern of coefficients, by the largest of these.
+_CLOSE = 0.01
+#: Alignment of coefficients that are a multiple of others, and how much better than another one it has to be.
+_MULTIPLE, _AS_GOOD = 0.999, 1e-6
+#: Largest denominator of a coefficient as a fraction.
+_DENOMINATOR = 10**6
+#: Largest departure of a ratio of corrections from 1 that is no fault in itself.
+_RATIO_WITHIN = 0.005
+#: The same for weights of samples.
+_WEIGHT_WITHIN = 0.01
+
+
+def standard_design(products: Products) -> Design:
+    """Return the published correction that a function is measured by.
+
+    It has the samples of a call, and from before the call as many as the function is seen to use rightly, but for one
+    sample a call at least one, without which nothing can be corrected. A function that turns by every sample on its own
+    with the correction of one sample is measured by that.
+
+    Parameters
+    ----------
+    products : Products
+        The coefficients of the function.
+
+    Returns
+    -------
+    Design
+    """
+    samples = products.samples
+    if not corrects_coning(products):
+        return plain_design(samples)
+    ideal, base = _one_by_one(samples)
+    if _alike(_less(products.at_once, base), ideal, products.noise):
+        return design(1, 1)
+    used = [-older for (older, _), c in products.at_once.items() if older < 0 and abs(c) > LEAST]
+    return design(samples, min(MOST_PREVIOUS, max([plain_design(samples).previous, *used])))
+
+
+def plain_design(samples: int) -> Design:
+    """Return the published correction on the samples of a call, for one sample that with one from before it.
+
+    Parameters
+    ----------
+    samples : int
+
+    Returns
+    -------
+    Design
+    """
+    return design(samples, 1 if samples == 1 else 0)
+
+
+def seen_design(products: Products) -> Design:
+    """Return the correction that a function is seen to have, as a design with the samples that are looked at.
+
+    Parameters
+    ----------
+    products : Products
+
+    Returns
+    -------
+    Design
+    """
+    previous = -min(older for older, _ in products.finally_)
+    table = {
+        (older + previous, newer + previous): Fraction(c).limit_denominator(_DENOMINATOR)
+        for (older, newer), c in products.finally_.items()
+    }
+    return Design("seen", products.samples, previous, table)
+
+
+def wanted(products: Products) -> Table:
+    """Return the coefficients of the published correction whose pattern is nearest to that of a function.
+
+    Parameters
+    ----------
+    products : Products
+
+    Returns
+    -------
+    dict
+        A coefficient for each pair of the function.
+    """
+    pairs, seen = list(products.at_once), products.at_once
+    tables = [
+        ({pair: ideal.get(pair, 0.0) for pair in pairs}, base) for ideal, base in _ideals(products.samples)
+    ]
+    totals = [{pair: c + base.get(pair, 0.0) for pair, c in ideal.items()} for ideal, base in tables]
+    nearest = min(totals, key=lambda total: _size(_less(seen, total)))
+    most = _MULTIPLE
+    for (ideal, base), total in zip(tables, totals, strict=True):
+        alike = _alignment(_less(seen, base), ideal)
+        if alike > most:
+            most, nearest = alike + _AS_GOOD, total
+    return nearest
+
+
+def ratio(products: Products) -> float:
+    """Return the coefficients by what annuls the drift on coning to leading order, 1 where they are right.
+
+    Parameters
+    ----------
+    products : Products
+
+    Returns
+    -------
+    float
+    """
+    return _moment(products.finally_) / _needed(products.samples)
+
+
+def tolerance(products: Products) -> float:
+    """Return the largest departure of `ratio` from 1 that is no fault, rounding included.
+
+    Parameters
+    ----------
+    products : Products
+
+    Returns
+    -------
+    float
+    """
+    distances = sum(newer - older for older, newer in products.finally_)
+    return _RATIO_WITHIN + products.noise * distances / _needed(products.samples)
+
+
+def corrects_coning(products: Products) -> bool:
+    """Return whether the coefficients annul the drift on coning to leading order, about every axis."""
+    needed = _needed(products.samples)
+    tables = (products.finally_, *products.by_axis)
+    return all(abs(_moment(table) / needed - 1) < tolerance(products) for table in tables)
+
+
+def comes_late(products: Products) -> bool:
+    """Return whether a call adds no correction, and a later one does."""
+    for base in _bases(products.at_once, products.samples):
+        if not _any(_less(products.at_once, base)):
+            return _any(_less(products.finally_, base))
+    return False
+
+
+def weights_off(products: Products) -> bool:
+    """Return whether the attitude turns by more or less of a sample than it is."""
+    return any(abs(weight - 1) > _WEIGHT_WITHIN for weight in products.weights)
+
+
+def cause(products: Products) -> str | None:
+    """Return the likely cause of coefficients that do not correct coning.
+
+    A cause is named where all coefficients are those of the fault; other ones are told by their size.
+
+    Parameters
+    ----------
+    products : Products
+
+    Returns
+    -------
+    str or None
+        None if they correct it.
+
+    Examples
+    --------
+    One sample a call and one from before it: 1/12 is right.
+
+    >>> tables = [{(-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): c} for c in (1 / 12, 0.0, -1 / 12, 1 / 6)]
+    >>> [cause(Products(1, table, table)) for table in tables]
+    [None, 'correction absent or zero', 'correction of the wrong sign', 'correction off by a factor of 2']
+    """
+    if weights_off(products):
+        weights = ", ".join(f"{weight:.3g}" for weight in products.weights)
+        return f"samples weighted by {weights} in place of 1"
+    if (uneven := _uneven(products)) is not None:
+        return uneven
+    if comes_late(products):
+        return LATE
+    now, samples, noise = products.at_once, products.samples, products.noise
+    right = corrects_coning(products)
+    if not right and not all(_any(_less(now, base)) for base in _bases(now, samples)):
+        return ABSENT
+    for ideal, base in _ideals(samples):
+        correction = _less(now, base)
+        for factor, said in ((-1.0, WRONG_SIGN), (2.0, FACTOR_TWO), (0.5, FACTOR_TWO)):
+            if _alike(correction, {pair: factor * c for pair, c in ideal.items()}, noise):
+                return said
+        if any(_alike(correction, shifted, noise) for shifted in _delayed(ideal, samples)):
+            return LATE
+    ideal, turned = _one_by_one(samples)
+    late_sum = {(older, newer): c for (older, newer), c in turned.items() if newer - older > 1}
+    if samples > 1 and _alike(_less(now, late_sum), ideal, noise):
+        return SUM_LATE
+    if right or samples == 1:
+        return None if right else _by_size(products)
+    if _alike(now, _reversed(turned, samples, now), noise):
+        return f"{REVERSED}; {ABSENT}"
+    if any(_alike(now, _reversed(_plus(*each), samples, now), noise) for each in _ideals(samples)):
+        return REVERSED
+    return _by_size(products)
+
+
+def _by_size(products: Products) -> str:
+    """Return the size of a correction that is a multiple of a known one, or else that it is none."""
+    for ideal, base in _ideals(products.samples):
+        correction = _less(products.finally_, base)
+        visible = {pair: ideal.get(pair, 0.0) for pair in correction}
+        if _alignment(correction, visible) > _MULTIPLE:
+            size = _moment(correction) / _moment(visible)
+            return f"correction {size:.3g} times as large as needed"
+    return f"coefficients of no single fault that is known, {ratio(products):.3g} of what coning needs"
+
+
+def _uneven(products: Products) -> str | None:
+    """Return the size of the correction about each axis; None where they are alike."""
+    mean = products.finally_
+    allowed = LEAST + products.noise
+    if all(abs(table[pair] - mean[pair]) < allowed for table in products.by_axis for pair in mean):
+        return None
+    sizes = ", ".join(f"{_moment(table) / _needed(products.samples):.3g}" for table in products.by_axis)
+    return f"the corrections about x, y, z differ: {sizes} of what is needed"
+
+
+def _bases(now: Table, samples: int) -> list[Table]:
+    """Return the products of a call without correction: samples added up, or each of them turned on its own.
+
+    The likelier one comes first: with a memory of samples before the call, each sample is turned on its own.
+    """
+    added: Table = {}
+    turned = {pair: 0.5 for pair in now if pair[0] >= 0}
+    remembers = _any({pair: c for pair, c in now.items() if pair[0] < 0})
+    bases = [turned, added] if remembers else [added, turned]
+    return bases[:1] if samples == 1 else bases
+
+
+def _ideals(samples: int) -> Iterator[tuple[Table, Table]]:
+    """Yield corrections that are right, by their coefficients, each with the products that it is added to."""
+    for previous in range(MOST_PREVIOUS + 1):
+        for form in FORMS:
+            coefficients = design(samples, previous, form).pairs
+            table = {
+                (older - previous, newer - previous): float(c)
+                for (older, newer), c in coefficients.items()
+                if newer >= previous
+            }
+            if any(table.values()):
+                yield table, {}
+    if samples > 1:
+        yield _one_by_one(samples)
+
+
+def _one_by_one(samples: int) -> tuple[Table, Table]:
+    """Return the right correction of a function that turns by each sample on its own, and what it is added to."""
+    coefficient = float(design(1, 1).pairs[0, 1])
+    turned = {(older, newer): 0.5 for newer in range(samples) for older in range(newer)}
+    return {(newer - 1, newer): coefficient for newer in range(samples)}, turned
+
+
+def _delayed(ideal: Table, samples: int) -> Iterator[Table]:
+    """Yield corrections with one sample of delay: of the older factor, of both, and of a whole call."""
+    yield {(older - 1, newer): c for (older, newer), c in ideal.items()}
+    both = {(older - 1, newer - 1): c for (older, newer), c in ideal.items()}
+    yield {pair: c for pair, c in both.items() if pair[1] >= 0}
+    yield {(older - samples, newer): c for (older, newer), c in ideal.items()}
+
+
+def _reversed(table: Table, samples: int, visible: Table) -> Table:
+    """Return what is seen of coefficients where the samples of each call are taken from the last to the first.
+
+    Of a correction that is even in this order, as that of added samples often is, it is the wrong sign.
+    """
+    seen: Table = {}
+    for pair, c in table.items():
+        older, newer = (number - number % samples + samples - 1 - number % samples for number in pair)
+        place, value = ((older, newer), c) if older < newer else ((newer, older), -c)
+        if place in visible:
+            seen[place] = value
+    return seen
+
+
+def _any(table: Table) -> bool:
+    return any(abs(c) > LEAST for c in table.values())
+
+
+def _less(table: Table, base: Table) -> Table:
+    return {pair: c - base.get(pair, 0.0) for pair, c in table.items()}
+
+
+def _plus(table: Table, other: Table) -> Table:
+    return {pair: table.get(pair, 0.0) + other.get(pair, 0.0) for pair in {*table, *other}}
+
+
+def _alike(table: Table, other: Table, noise: float) -> bool:
+    """Return whether a table is a known one, of which it has every pair."""
+    allowed = _CLOSE * max(map(abs, other.values()), default=0.0) + noise
+    pairs = {*table, *(pair for pair, c in other.items() if c)}
+    return _any(other) and all(abs(table.get(pair, 0.0) - other.get(pair, 0.0)) < allowed for pair in pairs)
+
+
+def _alignment(table: Table, other: Table) -> float:
+    """Return how far a table is a multiple of another one with the same pairs: 1 if it is, of either sign."""
+    size = _size(table) * _size(other)
+    return abs(sum(c * other[pair] for pair, c in table.items())) / size if size else 0.0
+
+
+def _size(table: Table) -> float:
+    return math.hypot(*table.values())
+
+
+def _moment(table: Table) -> float:
+    """Return the sum of coefficients times distances, which sets the drift on coning to leading order."""
+    return sum(c * (newer - older) for (older, newer), c in table.items())
+
+
+def _needed(samples: int) -> float:
+    """Return the moment of a correction that annuls the drift to leading order, that of a published one."""
+    pairs = plain_design(samples).pairs
+    return float(sum(c * (newer - older) for (older, newer), c in pairs.items()))

@@ -1,0 +1,310 @@
+"""Runs a user's function along motions with known attitude: the order on a ladder of steps, and the drift on a cone."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen import pipeline
+from strapgen.catalogue.methods.coning_coefficients import FORMS, Design, design
+from strapgen.firmware.check_code.cone import (
+    SAMPLES,
+    SAMPLING,
+    closed_form_deg_h,
+    cone,
+    drift_deg_h,
+    generated_drifts,
+    published_step,
+    seconds,
+)
+from strapgen.firmware.check_code.conformance import ORDER_WITHIN, Finding
+from strapgen.firmware.check_code.runs import ENDS, ForeignStep, Segment, SegmentRun
+from strapgen.lab.converge.convergence import MOST_ERROR, Convergence, fitted
+from strapgen.lab.motions.motions import GENERAL, Motion, motion
+from strapgen.lab.simulate.runs import drift_between, simulate
+from strapgen.run.backends import backend as attitude_backend
+from strapgen.run.backends import evaluator
+
+Array = NDArray[np.float64]
+
+#: Axes about which a cone turns, and what turns that of `cone`, which is nearly y, to each: an integrator without
+#: symmetry drifts differently on each.
+_CONES = {
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "x": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+}
+#: Numbers of steps of the ladder in a second of the motion, and the largest rate of the motion in rad/s, rounded up.
+_LADDER, _FASTEST = (8, 16, 32, 64, 128), Fraction(6, 5)
+#: Order of a linear rate between rates at instants.
+_LINEAR_ORDER = 2
+#: How much more than the worst of published steps a drift may be.
+_DRIFT_WITHIN = 1.2
+#: The same for errors at the longest step, which differ more with the start of the run.
+_ERROR_WITHIN = 2.0
+
+
+def ladder_segments(step: ForeignStep) -> list[Segment]:
+    """Return the runs of the ladder, from the longest step to the shortest."""
+    return [_along(step, _general(), length, calls) for length, calls in _rungs(step)]
+
+
+def drift_segments(step: ForeignStep) -> list[Segment]:
+    """Return the runs on the cones."""
+    plain = _along(step, cone(), SAMPLING * step.samples, SAMPLES // step.samples)
+    return [Segment(plain.increments @ turn.T) for turn in _CONES.values()]
+
+
+def _general() -> Motion:
+    return motion("coning", **GENERAL)
+
+
+def _rungs(step: ForeignStep) -> list[tuple[Fraction, int]]:
+    """Return step lengths in s of the motion, and the number of steps of each.
+
+    The function is told the sampling interval all the same: the motion is as much faster or slower. At short intervals
+    it becomes smaller with the interval, so that a gyro can measure its rates.
+    """
+    reach = min(Fraction(1), Fraction(step.most) * step.samples * _LADDER[0] / _FASTEST)
+    return [(reach / count, count) for count in _LADDER]
+
+
+def _along(step: ForeignStep, profile: Motion, length: Fraction, calls: int) -> Segment:
+    """Return the samples of a motion, those of calls before it included."""
+    count = step.settling + calls
+    if step.takes != ENDS:
+        return Segment(profile.increments(length, count, step.samples))
+    between = float(length / step.samples)
+    ends = profile.rate(between * np.arange(1, count * step.samples + 1)) * between
+    return Segment(ends.reshape(count, step.samples, 3))
+
+
+def _aligned(step: ForeignStep, relative: Array, profile: Motion, length: Fraction) -> tuple[Array, Array]:
+    """Return computed and true matrices, equal at the end of the calls before the run."""
+    first = step.settling
+    true = profile.attitude(np.arange(first, len(relative)) * float(length))
+    after = relative[first:]
+    return true[0] @ after[0].T @ after, true
+
+
+def _error(step: ForeignStep, relative: Array, profile: Motion, length: Fraction) -> float:
+    """Return the largest error of a run in rad."""
+    computed, true = _aligned(step, relative, profile, length)
+    return float((np.linalg.norm(computed - true, axis=(-2, -1)) / math.sqrt(2)).max())
+
+
+def linear_rates(segment: Segment) -> Array:
+    """Return the attitudes of a rate that is linear between instants, corrected for coning, relative to the first.
+
+    Parameters
+    ----------
+    segment : Segment
+        Rates at the ends of the intervals, times the interval.
+
+    Returns
+    -------
+    array, (1 + N, 3, 3)
+    """
+    count, samples, _ = segment.increments.shape
+    ends = segment.increments.reshape(-1, 3)
+    starts = np.concatenate([np.zeros((1, 3)), ends[:-1]])
+    coefficient = float(design(1, 1).pairs[0, 1])
+    vectors = (starts + ends) / 2 + coefficient * np.cross(starts, ends)
+    turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(vectors), 3, 3)), vectors)
+    relative = [np.eye(3)]
+    for turn in turns:
+        relative.append(relative[-1] @ turn)
+    return np.array(relative)[::samples][: count + 1]
+
+
+def ladder(step: ForeignStep, runs: tuple[SegmentRun, ...], standard: Design) -> Convergence:
+    """Return the errors of a function on the ladder, beside the order of theory.
+
+    Parameters
+    ----------
+    step : ForeignStep
+    runs : tuple of SegmentRun
+        Of `ladder_segments`.
+    standard : Design
+        The published correction that the function is measured by.
+
+    Returns
+    -------
+    Convergence
+    """
+    rungs = []
+    for (length, calls), run in zip(_rungs(step), runs, strict=True):
+        error = _error(step, run.relative, _general(), length)
+        floor = _floor(step, calls)
+        rungs.append((float(length), error, floor < error < MOST_ERROR))
+    theory = pipeline.derive(published_step("coning-compressed", standard)).order
+    return fitted(step.source.function, step.source.precision, theory, rungs)
+
+
+def _floor(step: ForeignStep, calls: int) -> float:
+    """Return the error in rad that rounding may cause in so many calls."""
+    return 8 * step.unit * (calls + step.settling)
+
+
+def order_on_ladder(step: ForeignStep, seen: Convergence) -> tuple[Finding, float | None]:
+    """Return the finding on the order by the slope on the ladder, and the order.
+
+    Parameters
+    ----------
+    step : ForeignStep
+    seen : Convergence
+        Of `ladder`.
+
+    Returns
+    -------
+    Finding, float or None
+    """
+    needed = _LINEAR_ORDER if step.takes == ENDS else seen.predicted
+    assert needed is not None
+    words = (
+        f"a {'linear rate between instants' if step.takes == ENDS else 'published correction'} has {needed}"
+    )
+    if seen.observed is None:
+        errors = [rung.error_rad for rung in seen.rungs if rung.error_rad is not None]
+        holds = False if min(errors) > MOST_ERROR else None
+        return Finding("order", holds, f"{seen.hidden}; {words}"), None
+    return (
+        Finding(
+            "order",
+            seen.observed > needed - ORDER_WITHIN,
+            f"observed {seen.observed:.3f}; {words}",
+            seen.observed,
+            needed - ORDER_WITHIN,
+        ),
+        seen.observed,
+    )
+
+
+def order_in_float(
+    step: ForeignStep, seen: Convergence, standard: Design, proved: int
+) -> tuple[Finding, float | None]:
+    """Return the finding on the order in single precision, whose rounding hides a slope, and the order.
+
+    It rests on what the probes have proved; beside it the error at the longest step is held to that of published
+    steps, as far as rounding shows it.
+
+    Parameters
+    ----------
+    step : ForeignStep
+    seen : Convergence
+        Of `ladder`.
+    standard : Design
+    proved : int
+        The order by the coefficients and by the rotation, 3 if both are right.
+
+    Returns
+    -------
+    Finding, float
+    """
+    (length, calls), error = _rungs(step)[0], seen.rungs[0].error_rad
+    assert error is not None
+    hidden = _floor(step, calls)
+    if step.takes == ENDS:
+        segment = ladder_segments(step)[0]
+        published, needed = _error(step, linear_rates(segment), _general(), length), _LINEAR_ORDER
+    else:
+        published, needed = _published_error(step, standard, length, calls), seen.predicted or 0
+    allowed = _ERROR_WITHIN * published + hidden
+    is_too_low = proved < min(needed, 3)
+    words = f"observed {proved}" if is_too_low else f"{min(proved, needed)} or more by its coefficients"
+    text = (
+        f"{words}, needed {needed}; at the longest step {error:.2g} rad, published {published:.2g}, "
+        f"single precision hides {hidden:.2g}"
+    )
+    order = float(min(proved, needed))
+    return Finding("order", not is_too_low and error <= allowed, text, order, float(min(needed, 3))), order
+
+
+def _published_error(step: ForeignStep, standard: Design, length: Fraction, calls: int) -> float:
+    """Return the largest error in rad of the published steps on the same samples."""
+    between = length / step.samples * standard.samples
+    errors = []
+    for form in FORMS:
+        published = attitude_backend(published_step(f"coning-{form}", standard))
+        run = simulate(published, _general(), between, length * calls)
+        errors.append(float(np.linalg.norm(run.drift, axis=1).max()))
+    return max(errors)
+
+
+def drift_on_cones(
+    step: ForeignStep, runs: tuple[SegmentRun, ...], standard: Design, measured: Design | None
+) -> tuple[Finding, Array, float | None]:
+    """Return the finding on the drift on cones, the largest in deg/h about x, y, z, and its closed form.
+
+    Parameters
+    ----------
+    step : ForeignStep
+    runs : tuple of SegmentRun
+        Of `drift_segments`.
+    standard : Design
+        The published correction that the function is measured by.
+    measured : Design or None
+        The correction that the function is seen to have; it counts where rounding hides what the run shows.
+
+    Returns
+    -------
+    Finding, array, float or None
+    """
+    length, duration = SAMPLING * step.samples, seconds(step.samples)
+    drifts = {
+        axis: turn @ _drift(step, turn.T @ run.relative @ turn, length, duration)
+        for (axis, turn), run in zip(_CONES.items(), runs, strict=True)
+    }
+    axis = max(drifts, key=lambda axis: _size(drifts[axis]))
+    by_axis, size = drifts[axis], _size(drifts[axis])
+    published, beside, closed = _published_drifts(step, standard, length, duration)
+    best = min(published, key=lambda name: published[name])
+    least = _DRIFT_WITHIN * max(closed or 0.0, *published.values())
+    rounding = math.degrees(4 * step.unit * float(duration / length)) / float(duration) * 3600
+    text = f"{size:.4g} deg/h{_across(by_axis, axis)}; {beside}{best} {published[best]:.4g}"
+    holds = size <= least + rounding
+    if rounding > least / 100:
+        text += f"; single precision hides {rounding:.3g}"
+        if measured is not None:
+            left = abs(closed_form_deg_h(measured))
+            text += f", its coefficients leave {left:.4g}"
+            holds = holds and left <= least
+    return Finding("drift", holds, text, size, least + rounding), by_axis, closed
+
+
+def _published_drifts(
+    step: ForeignStep, standard: Design, length: Fraction, duration: Fraction
+) -> tuple[dict[str, float], str, float | None]:
+    """Return what published steps leave by their names, the closed form in words, and the closed form."""
+    if step.takes == ENDS:
+        linear = _drift(step, linear_rates(drift_segments(step)[0]), length, duration)
+        return {"a linear rate between instants": _size(linear)}, "", None
+    closed = abs(closed_form_deg_h(standard))
+    return generated_drifts(standard), f"closed form on {_samples(standard)} {closed:.4g}, ", closed
+
+
+def _drift(step: ForeignStep, relative: Array, length: Fraction, duration: Fraction) -> Array:
+    """Return the drift of a run on the cone in deg/h."""
+    computed, true = _aligned(step, relative, cone(), length)
+    return drift_deg_h(drift_between(computed, true), duration)
+
+
+def _size(drift: Array) -> float:
+    return float(np.linalg.norm(drift))
+
+
+def _across(by_axis: Array, axis: str) -> str:
+    """Return the drift about another axis than that of the cone, if it is no small part."""
+    across = max((k for k in range(3) if "xyz"[k] != axis), key=lambda k: abs(by_axis[k]))
+    part = abs(by_axis[across])
+    if part <= _size(by_axis) / 4:
+        return ""
+    return f" on a cone about {axis}, {part:.4g} of it about {'xyz'[across]}"
+
+
+def _samples(standard: Design) -> str:
+    before = f" and {standard.previous} before" if standard.previous else ""
+    return f"{standard.samples} sample{'s' if standard.samples > 1 else ''}{before}"

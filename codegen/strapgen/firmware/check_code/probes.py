@@ -1,0 +1,224 @@
+"""Probes a user's function with small increments: the rotation that it makes of each, and of every two of them.
+
+To second order the rotation vector of a run is the sum of all increments and of their products, each with a
+coefficient. A probe turns by one increment about x, by a later one about y, reads the rotation about z, and does the
+same with the axes interchanged: half the difference belongs to the cross product. An exact product of rotations gives
+1/2 to two increments of different calls; what a function adds to that, and all that it gives to two increments of one
+call, is its coning correction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.firmware.check_code.runs import ENDS, ForeignStep, Segment, SegmentRun, rotation_vectors
+from strapgen.lab.motions.motions import motion
+from strapgen.lab.simulate.runs import drift_between
+from strapgen.run.backends import evaluator
+
+Array = NDArray[np.float64]
+Table = dict[tuple[int, int], float]
+
+#: Rotation in rad of a call that shows directions: small enough to be read when it comes out 57.3 times as large.
+_TURN = 0.001
+#: Size of an increment of a product in rad, by precision: its square is seen, its fourth power is not.
+_SMALL = {"double": 0.002, "float": 0.02}
+#: Calls without rotation after a probe, in which what comes late arrives.
+_LATE = 2
+#: Most samples from before a call that a published correction takes.
+MOST_PREVIOUS = 3
+#: Samples from before a call whose products with those of the call are looked at: one more, for a late correction.
+_BEFORE = MOST_PREVIOUS + 1
+#: Fewest calls of each of two large rotations, and their angle in rad.
+_CALLS, _LARGE = 20, 0.5
+#: The axes of an older and of a newer increment, the axis of their cross product, and its sign.
+_AXES = [(0, 1, 2, 1), (1, 0, 2, -1), (1, 2, 0, 1), (2, 1, 0, -1), (2, 0, 1, 1), (0, 2, 1, -1)]
+_SIGNS = list(product((1, -1), repeat=2))
+
+
+@dataclass(frozen=True)
+class Directions:
+    """How a function answers rotations about the axes.
+
+    Parameters
+    ----------
+    at_once, steady : array, (3, 3)
+        Rotation vector of the first call of a constant rate, and of one after many calls, in units of the rotation
+        about each axis: a column for each.
+    lag : float
+        Number of samples by which a rotation at a growing rate comes too late.
+    order_of_turns : float
+        Angle in rad between the attitude after a rotation about x and then one about y, and the true one.
+    other_order : float
+        The same for the attitude of the two rotations in the other order.
+    """
+
+    at_once: Array
+    steady: Array
+    lag: float
+    order_of_turns: float
+    other_order: float
+
+
+def direction_segments(step: ForeignStep) -> list[Segment]:
+    """Return the segments that `directions` needs of a function."""
+    samples, calls = step.samples, step.settling + 1
+    segments = []
+    for axis, sign in product(range(3), (1, -1)):
+        increments = np.zeros((calls, samples, 3))
+        increments[:, :, axis] = sign * _TURN / samples
+        segments.append(Segment(increments))
+    for sign in (1, -1):
+        ramp = np.zeros((calls * samples, 3))
+        ramp[:, 0] = sign * _slope(step) * (np.arange(len(ramp)) + (1.0 if step.takes == ENDS else 0.5))
+        segments.append(Segment(ramp.reshape(calls, samples, 3)))
+    count = step.calls_for(_LARGE, _CALLS)
+    turns = np.zeros((2 * count, samples, 3))
+    turns[:count, :, 0] = turns[count:, :, 1] = _LARGE / (count * samples)
+    return [*segments, Segment(turns)]
+
+
+def _slope(step: ForeignStep) -> float:
+    """Return how much a sample of the growing rate is larger than the one before, in rad."""
+    return _TURN / ((step.settling + 1) * step.samples)
+
+
+def directions(step: ForeignStep, runs: Sequence[SegmentRun]) -> Directions:
+    """Return the answer to rotations about the axes.
+
+    Parameters
+    ----------
+    step : ForeignStep
+    runs : sequence of SegmentRun
+        Of `direction_segments`.
+
+    Returns
+    -------
+    Directions
+    """
+    first = rotation_vectors(np.array([run.relative[1] for run in runs[:8]]))
+    last = rotation_vectors(np.array([run.relative[-2].T @ run.relative[-1] for run in runs[:8]]))
+    at_once, steady = ((turns[:6:2] - turns[1:6:2]).T / (2 * _TURN) for turns in (first, last))
+    numbers = np.arange(step.settling * step.samples, (step.settling + 1) * step.samples) + 0.5
+    ramp = float(last[6, 0] - last[7, 0]) / (2 * _slope(step))
+    lag = (float(numbers.sum()) - ramp) / step.samples
+    about_x, about_y = (motion("constant", **{key: _LARGE}).attitude(1.0) for key in ("x_rad_s", "y_rad_s"))
+    turned = runs[8].relative[-1]
+    angles = (
+        float(np.linalg.norm(drift_between(turned, true))) for true in (about_x @ about_y, about_y @ about_x)
+    )
+    return Directions(at_once, steady, lag, *angles)
+
+
+@dataclass(frozen=True)
+class Products:
+    """The coefficients of cross products, older times newer sample, beside the sum of samples and exact products.
+
+    Parameters
+    ----------
+    samples : int
+        Samples of a call.
+    at_once, finally_ : dict
+        Coefficients after the call with the newer sample, and after more calls without rotation, means of the three
+        axes. Samples of the call have the numbers 0 to samples - 1, those before it are negative.
+    weights : tuple of float, optional
+        By how much of each sample of a call the attitude turns in the end; 1 for each is right.
+    by_axis : tuple of dict, optional
+        Coefficients in the end about x, y and z; none where they are alike.
+    noise : float, optional
+        What rounding and terms of fourth order may add to a coefficient.
+    """
+
+    samples: int
+    at_once: Table
+    finally_: Table
+    weights: tuple[float, ...] = ()
+    by_axis: tuple[Table, ...] = ()
+    noise: float = 0.0
+
+
+def pairs(samples: int) -> list[tuple[int, int]]:
+    """Return the pairs of samples whose products are looked at: the newer one is of the call."""
+    return [(older, newer) for newer in range(samples) for older in range(-_BEFORE, newer)]
+
+
+def _small(step: ForeignStep) -> float:
+    """Return the size of the increments of products in rad."""
+    return min(_SMALL[step.source.precision], step.most)
+
+
+def product_segments(step: ForeignStep) -> list[Segment]:
+    """Return the segments that `products` needs."""
+    samples, small = step.samples, _small(step)
+    calls_before = -(-_BEFORE // samples)
+    segments = []
+    for (older, newer), axes, signs in product(pairs(samples), _AXES, _SIGNS):
+        row = np.zeros(((calls_before + 1 + _LATE) * samples, 3))
+        row[calls_before * samples + older, axes[0]] = signs[0] * small
+        row[calls_before * samples + newer, axes[1]] = signs[1] * small
+        segments.append(Segment(row.reshape(-1, samples, 3)))
+    return segments
+
+
+def products(step: ForeignStep, runs: Sequence[SegmentRun], *, exact: bool) -> Products:
+    """Return the coefficients of all products.
+
+    Parameters
+    ----------
+    step : ForeignStep
+    runs : sequence of SegmentRun
+        Of `product_segments`.
+    exact : bool
+        Whether the function turns by a constant rate exactly. Otherwise its products have terms of fourth order too.
+
+    Returns
+    -------
+    Products
+    """
+    samples, small = step.samples, _small(step)
+    known = pairs(samples)
+    shape = (len(known), len(_AXES), len(_SIGNS))
+    of_turns = _odd(_exact_turns(small))[0] / small**2
+    tables = []
+    for call in (-(-_BEFORE // samples) + 1, -1):
+        turns = rotation_vectors(np.array([run.relative[call] for run in runs])).reshape(*shape, 3)
+        per_axis = _odd(turns) / small**2
+        per_axis -= np.array([older < 0 for older, _ in known])[:, None] * of_turns
+        tables.append(per_axis)
+    signs = np.array(_SIGNS)[:, 1]
+    newer_axes = [axes[1] for axes in _AXES]
+    linear = (turns * signs[:, None]).mean(axis=2)[:, range(len(_AXES)), newer_axes].mean(axis=1) / small
+    weights = [
+        float(linear[[newer == k for _, newer in known]].mean()) for k in range(samples)
+    ]  # of the newer sample of a pair
+    now, end = (dict(zip(known, map(float, table.mean(axis=1)), strict=True)) for table in tables)
+    by_axis = tuple(dict(zip(known, map(float, tables[1][:, axis]), strict=True)) for axis in range(3))
+    noise = 4 * step.unit / small + (0.0 if exact else small**2)
+    return Products(samples, now, end, tuple(weights), by_axis, noise)
+
+
+def _odd(turns: Array) -> Array:
+    """Return the part about x, y, z of rotations (N, axes, signs, 3) that belongs to the cross product."""
+    weights = np.array([first * second for first, second in _SIGNS])
+    odd = (turns * weights[:, None]).mean(axis=2)
+    parts = np.zeros((len(odd), 3))
+    for number, (_, _, axis, sign) in enumerate(_AXES):
+        parts[:, axis] += sign * odd[:, number, axis] / 2
+    return parts
+
+
+def _exact_turns(small: float) -> Array:
+    """Return the rotation vectors of exact products of rotations by two increments, (1, axes, signs, 3)."""
+    update = evaluator("dcm-update")
+    vectors = np.zeros((2, len(_AXES), len(_SIGNS), 3))
+    for number, (older, newer, _, _) in enumerate(_AXES):
+        vectors[0, number, :, older] = small * np.array(_SIGNS)[:, 0]
+        vectors[1, number, :, newer] = small * np.array(_SIGNS)[:, 1]
+    first, second = vectors.reshape(2, -1, 3)
+    turned = update(update(np.broadcast_to(np.eye(3), (len(first), 3, 3)), first), second)
+    return rotation_vectors(turned).reshape(1, len(_AXES), len(_SIGNS), 3)

@@ -1,0 +1,1 @@
+"""Firmware projects with CMake and tests."""

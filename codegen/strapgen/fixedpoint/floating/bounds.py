@@ -1,0 +1,229 @@
+"""Bounds the rounding of a call and of a run of generated floating-point code.
+
+A result is off by the sum over all operations of what is new in the error of the operation times how far it moves the
+result. Both are bounded over the box of the inputs, in interval arithmetic that rounds outward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from fractions import Fraction
+from functools import lru_cache
+
+from strapgen.fixedpoint.floating import proved
+from strapgen.fixedpoint.floating.errors import ComputedNumbers
+from strapgen.fixedpoint.floating.expressions import Expressions
+from strapgen.fixedpoint.floating.no_bound import NoBoundError
+from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.limits import largest_magnitude
+from strapgen.fixedpoint.terms import up
+from strapgen.ir import checks
+from strapgen.ir.fixed_interface import RoundingAccumulation
+from strapgen.ir.fixed_settings import TURNING, Settings
+from strapgen.ir.float_interface import Condition, RoundingBounds, StepRounding
+from strapgen.ir.program import Operation, Program, Result, walk
+
+#: The functions of the C library that operations call.
+_LIBRARY = {"sin": "sin", "cos": "cos", "sinc": "sin"}
+
+
+class _Analysis:
+    """What the two types of numbers share: the exact program."""
+
+    def __init__(self, program: Program, limits: tuple[tuple[str, Fraction], ...]) -> None:
+        largest = dict(limits)
+        box = {
+            name: Interval.symmetric(largest[signal.name])
+            for signal in program.inputs
+            for name in signal.elements
+        }
+        self.expressions = Expressions.of(program)
+        from strapgen.fixedpoint.floating.exact_ranges import ExactRanges  # loads numpy, as only proofs do
+
+        exact = ExactRanges(program, self.expressions, box)
+        self.ranges, self.conditions = exact.ranges, tuple(exact.conditions)
+        self._slopes = slopes(self.expressions, self.ranges)
+        self._moves: dict[tuple[str, tuple[int, ...]], list[dict[int, Fraction]]] = {}
+
+    def moves(self, result: Result, held: Collection[int] = ()) -> list[dict[int, Fraction]]:
+        """Return for every element of a result how far it moves with every operation, see `sensitivities`."""
+        key = result.signal.name, tuple(held)
+        if key not in self._moves:
+            places = self.expressions.results[result.signal.name]
+            self._moves[key] = [
+                sensitivities(self.expressions, self._slopes, place, held) for place in places
+            ]
+        return self._moves[key]
+
+
+@lru_cache(maxsize=64)
+def _analysis(program: Program, limits: tuple[tuple[str, Fraction], ...]) -> _Analysis | str:
+    """Return the analysis of a program on a box of inputs, or why there is none."""
+    try:
+        return _Analysis(program, limits)
+    except NoBoundError as error:
+        return str(error)
+    except ArithmeticError:  # ranges beyond all numbers of the samples
+        return "its values may overflow"
+
+
+def rounding_bounds(
+    program: Program, number: str = "double", settings: Settings | None = None
+) -> RoundingBounds:
+    """Bound how far generated C in floating point is from exact arithmetic on the same inputs.
+
+    The bounds hold for the operations in the order in which the targets `c` and `c-float` print them, with literals
+    rounded to the nearest number, in arithmetic of IEEE 754 without contraction (``-ffp-contract=off``).
+
+    Parameters
+    ----------
+    program : Program
+    number : str, optional
+        Type of the numbers: "double" or "float".
+    settings : Settings, optional
+        States the largest angle increment in rad, the allowance by which an element of a state may exceed 1, and ranges
+        of other inputs; what else it has does not count. By default 1/8 rad and 1/16.
+
+    Returns
+    -------
+    RoundingBounds
+        With `errors` for every element of every output, in the unit of the output. They are empty where no bound is
+        known, and `reason` says why; where numpy is missing, nothing is known but what `proved.load` was told.
+
+    Raises
+    ------
+    InputError
+        If there is no such type, or the settings have ranges of other inputs than the program.
+
+    Examples
+    --------
+    >>> from strapgen import derive, lower
+    >>> bounds = rounding_bounds(lower(derive("euler", method="rk4", increments=2)))
+    >>> max(bounds.errors["next"]) < 7e-16
+    True
+    >>> bounds.accumulation.bound(steps=1000) < 1.3e-12
+    True
+    """
+    checks.choice("number", number, NUMBERS)
+    settings = settings or Settings()
+    names = [signal.name for signal in program.inputs]
+    for name in settings.ranges:
+        checks.choice(f"input of {program.kernel}", name, names)
+    precision = NUMBERS[number].precision
+    if not _has_numpy():
+        return proved.bounds(program, number, precision)
+    known = {*settings.ranges, *TURNING}
+    for signal in program.inputs:
+        if signal.bound is None and not signal.constraint and signal.name not in known:
+            reason = f"the range of {signal.name} is not known"
+            return RoundingBounds(number, precision, reason=reason)
+    return _bounds(
+        program, tuple((s.name, largest_magnitude(program, s, settings)) for s in program.inputs), number
+    )
+
+
+@lru_cache(maxsize=64)
+def _bounds(program: Program, limits: tuple[tuple[str, Fraction], ...], number: str) -> RoundingBounds:
+    """Bound the rounding of a program on a box of inputs, once for all targets with such numbers."""
+    format_ = NUMBERS[number]
+    inputs = tuple(Condition(name, -largest, largest) for name, largest in limits)
+    analysis = _analysis(program, limits)
+    if isinstance(analysis, str):
+        return RoundingBounds(number, format_.precision, inputs, reason=analysis)
+    try:
+        computed = ComputedNumbers(analysis.expressions, analysis.ranges, format_)
+    except NoBoundError as error:
+        return RoundingBounds(number, format_.precision, inputs, reason=str(error))
+    added = [item.added for item in computed.items]
+    left_out = _left_out(program, analysis)
+    if left_out is None:
+        reason = "the series of its transition does not converge on this range"
+        return RoundingBounds(number, format_.precision, inputs, reason=reason)
+    if left_out and program.transition is not None:
+        for place in analysis.expressions.results[program.transition.signal.name]:
+            added[place] += left_out
+    outputs = {result.signal.name: _errors(analysis.moves(result), added) for result in program.outputs}
+    step = _step_rounding(program, analysis, added)
+    return RoundingBounds(
+        number,
+        format_.precision,
+        inputs,
+        analysis.conditions,
+        _library_functions(program),
+        outputs,
+        step,
+        None if step is None else _accumulation(program, dict(limits), step, *outputs.values()),
+    )
+
+
+def _has_numpy() -> bool:
+    try:
+        import numpy  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def _left_out(program: Program, analysis: _Analysis) -> Fraction | None:
+    """Return a bound of what the transition leaves out of a series; None where it is not known."""
+    if program.companions is None or program.companions.truncation is None:
+        return Fraction(0)
+    truncation = program.companions.truncation
+    left_out = truncation.bound(analysis.ranges[analysis.expressions.names[truncation.square]].magnitude)
+    return None if left_out is None else up(left_out)
+
+
+def _errors(moves: Iterable[Mapping[int, Fraction]], added: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """Return the error bound of every element of a result from what every operation adds to it."""
+    return tuple(up(sum((move * added[k] for k, move in element.items()), Fraction(0))) for element in moves)
+
+
+def _library_functions(program: Program) -> tuple[str, ...]:
+    """Return the functions of the C library that the code calls and whose errors no standard bounds."""
+    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
+    return tuple(sorted({_LIBRARY[node.kind] for node in nodes if node.kind in _LIBRARY}))
+
+
+def _step_rounding(program: Program, analysis: _Analysis, added: Sequence[Fraction]) -> StepRounding | None:
+    """Return what a call of an attitude step adds to the error of a run; None for other kernels."""
+    transition = program.transition
+    if program.companions is None or transition is None or len(program.outputs) > 1:
+        return None
+    places = analysis.expressions.results[transition.signal.name]
+    away = (
+        (analysis.ranges[place] - Interval.of(one)).magnitude
+        for place, one in zip(places, program.companions.identity, strict=True)
+    )
+    return StepRounding(
+        _errors(analysis.moves(program.outputs[0], held=places), added),
+        _errors(analysis.moves(transition), added),
+        tuple(away),
+    )
+
+
+def _accumulation(
+    program: Program, largest: Mapping[str, Fraction], step: StepRounding, errors: Sequence[Fraction]
+) -> RoundingAccumulation:
+    """Return how the errors of an attitude step add up: each call adds its error, and stretches that before it.
+
+    Lengths are those of a state, or of a row of a matrix.
+    """
+    state, transition = program.inputs[0], program.transition
+    assert transition is not None
+    width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
+    length = largest[state.name] * _length([Fraction(1)] * width)
+    rows = range(0, state.size, width)
+    whole = max(_length(errors[k : k + width]) for k in rows)
+    parts = max(_length(step.local[k : k + width]) for k in rows) + length * _length(step.transition)
+    sizes = tuple(largest[signal.name] for signal in program.inputs[1:] for _ in signal.elements)
+    from strapgen.fixedpoint.runs.accumulation import transition_growth
+
+    growth = transition_growth(program, transition, sizes, width, 1 + _length(step.away))
+    return RoundingAccumulation(Fraction(0), up(min(whole, parts)), Fraction(0), growth)
+
+
+def _length(values: Sequence[Fraction]) -> Fraction:
+    """Return a length that is not below that of a vector."""
+    return Interval.of(sum((value * value for value in values), Fraction(0))).sqrt().highest

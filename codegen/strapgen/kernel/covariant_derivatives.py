@@ -1,0 +1,211 @@
+"""Derivatives of covariant functions of vectors, which keep their form: few products, each written once.
+
+A function is a sum of tensors T_c(u), each times a polynomial P_c in the scalar products s_kj = u_k . u_j. Its
+derivative along an element of u_k is the sum of P_c dT_c plus, for every j, that element of u_j times the tensor
+H_kj = sum_c dP_c/ds_kj T_c, twice where j is k. The tensors H do not depend on the direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from strapgen.ir.signals import Signal
+from strapgen.kernel.covariants import Covariant, Decomposition
+from strapgen.kernel.evaluation import exact
+from strapgen.kernel.kernel import KernelBuilder
+from strapgen.kernel.polynomials import Polynomial
+from strapgen.kernel.rotations import cross, dot, skew
+
+
+@dataclass(frozen=True)
+class CovariantTerm:
+    """A tensor times a polynomial in scalar products.
+
+    Parameters
+    ----------
+    name : str
+        Ending of the names of its stages.
+    weight : Polynomial
+    written : sequence of Expr
+        The elements of the tensor in the elements of the vectors.
+    named : sequence of Expr
+        The same in the symbols of stages, where there are such.
+    """
+
+    name: str
+    weight: Polynomial
+    written: Sequence[sp.Expr]
+    named: Sequence[sp.Expr]
+
+
+class CovariantFunction:
+    """A covariant function under construction, with its derivatives.
+
+    Parameters
+    ----------
+    build : KernelBuilder
+        The kernel under construction.
+    decomposition : Decomposition
+        The function: a quaternion, a vector (a quaternion whose scalar is zero) or a matrix.
+    vectors : sequence of Matrix, 3 x 1
+        Symbols of the vectors.
+    label : str
+        Beginning of the names of all stages.
+
+    Examples
+    --------
+    >>> from strapgen.kernel.covariants import Frame
+    >>> frame = Frame(1)
+    >>> (x, y, z), = frame.vectors
+    >>> square = x * x + y * y + z * z
+    >>> build = KernelBuilder()
+    >>> u = build.input(Signal.vector("u", "u"))
+    >>> function = CovariantFunction(build, frame.quaternion([square * x, square * y, square * z], square), [u], "f_")
+    >>> function.values()
+    [f_product_0_0*u_x, f_product_0_0*u_y, f_product_0_0*u_z, f_product_0_0]
+    >>> function.derivative(0, 0)
+    [f_product_0_0 + 2*u_x**2, 2*u_x*u_y, 2*u_x*u_z, 2*u_x]
+    """
+
+    def __init__(
+        self,
+        build: KernelBuilder,
+        decomposition: Decomposition,
+        vectors: Sequence[sp.Matrix],
+        label: str = "",
+    ) -> None:
+        self._build, self._vectors, self._label = build, list(vectors), label
+        self._scalars: dict[tuple[int, ...], sp.Symbol] = {}
+        self._crossed: dict[Covariant, sp.Matrix] = {}
+        self._gradients: dict[tuple[int, int], list[sp.Expr]] = {}
+        self._terms = list(self._terms_of(decomposition))
+        self._weights = [self._value(f"weight_{term.name}", term.weight) for term in self._terms]
+
+    def values(self) -> list[sp.Expr]:
+        """Return the elements of the function: x, y, z, s of a quaternion, or a matrix row by row."""
+        pairs = list(zip(self._weights, self._terms, strict=True))
+        return [
+            sp.Add(*(weight * term.named[k] for weight, term in pairs))
+            for k in range(len(self._terms[0].written))
+        ]
+
+    def derivative(self, vector: int, axis: int) -> list[sp.Expr]:
+        """Return the derivatives of all elements along an element of a vector."""
+        along = self._vectors[vector][axis]
+        total = [sp.Integer(0)] * len(self._terms[0].written)
+        for weight, term in zip(self._weights, self._terms, strict=True):
+            total = [a + weight * sp.diff(x, along) for a, x in zip(total, term.written, strict=True)]
+        for other, element in enumerate(self._vectors):
+            factor = 2 if other == vector else 1
+            gradient = self._gradient(min(vector, other), max(vector, other))
+            total = [a + factor * element[axis] * h for a, h in zip(total, gradient, strict=True)]
+        return total
+
+    def _terms_of(self, decomposition: Decomposition) -> list[CovariantTerm]:
+        """Return the terms of a decomposition."""
+        size = 4 if decomposition.scalar is not None else 9
+        terms = []
+        for covariant, weight in decomposition.vector.items():
+            written, named = self._vector(covariant), self._named(covariant)
+            if size == 9:
+                terms.append(self._term(covariant, weight, list(skew(written)), list(skew(named))))
+            else:
+                terms.append(self._term(covariant, weight, [*written, 0], [*named, 0]))
+        if decomposition.scalar:
+            unit = [sp.Integer(0)] * 3 + [sp.Integer(1)]
+            terms.append(CovariantTerm("scalar", decomposition.scalar, unit, unit))
+        for covariant, weight in decomposition.symmetric.items():
+            written, named = (self._symmetric(covariant, which) for which in (self._vector, self._named))
+            name = "_".join(map(str, ("symmetric", *covariant)))
+            terms.append(CovariantTerm(name, weight, written, named))
+        return terms
+
+    @staticmethod
+    def _term(
+        covariant: Covariant, weight: Polynomial, written: list[sp.Expr], named: list[sp.Expr]
+    ) -> CovariantTerm:
+        return CovariantTerm("_".join(map(str, covariant)), weight, written, named)
+
+    def _vector(self, covariant: Covariant) -> sp.Matrix:
+        first, *rest = (self._vectors[k] for k in covariant)
+        return cross(first, rest[0]) if rest else first
+
+    def _named(self, covariant: Covariant) -> sp.Matrix:
+        """Return a vector, or the stage of a cross product."""
+        if len(covariant) == 1:
+            return self._vectors[covariant[0]]
+        if covariant not in self._crossed:
+            name = self._label + "cross_" + "_".join(map(str, covariant))
+            meaning = f"cross product of vectors {covariant[0]} and {covariant[1]}"
+            signal = Signal.vector(name, name, meaning=meaning)
+            self._crossed[covariant] = self._build.stage(signal, self._vector(covariant))
+        return self._crossed[covariant]
+
+    def _symmetric(self, covariant: Covariant, which: object) -> list[sp.Expr]:
+        """Return a symmetrized product of two vectors, or the unit matrix, row by row."""
+        assert callable(which)
+        if not covariant:
+            return list(sp.eye(3))
+        first, second = self._vectors[covariant[0]], which(covariant[1:])
+        return list(first * second.T + second * first.T)
+
+    def _gradient(self, k: int, j: int) -> list[sp.Expr]:
+        """Return the stage of a tensor H, in symbols where it is no constant."""
+        if (k, j) not in self._gradients:
+            size = len(self._terms[0].written)
+            total = [sp.Integer(0)] * size
+            for term in self._terms:
+                slope = self._polynomial(_slope(term.weight, (k, j)))
+                total = [a + slope * x for a, x in zip(total, term.named, strict=True)]
+            name = f"{self._label}gradient_{k}_{j}"
+            symbols = []
+            for place, expression in enumerate(total):
+                plain = expression.is_number or expression.is_Symbol
+                symbols.append(expression if plain else self._element(name, place, expression))
+            self._gradients[k, j] = symbols
+        return self._gradients[k, j]
+
+    def _element(self, name: str, place: int, expression: sp.Expr) -> sp.Symbol:
+        meaning = f"element {place} of the derivative by a scalar product"
+        return self._build.value(f"{name}_{place}", expression, meaning)
+
+    def _value(self, name: str, polynomial: Polynomial) -> sp.Expr:
+        """Name the value of a polynomial; a constant or a scalar product has no name of its own."""
+        expression = self._polynomial(polynomial)
+        if expression.is_number or expression.is_Symbol:
+            return expression
+        return self._build.value(self._label + name, expression, "weight of a vector or product")
+
+    def _polynomial(self, polynomial: Polynomial) -> sp.Expr:
+        return sp.Add(
+            *(
+                exact(c) * sp.Mul(*(self._scalar(factor) for factor in monomial))
+                for monomial, c in polynomial.items()
+            )
+        )
+
+    def _scalar(self, factor: tuple[int, ...]) -> sp.Symbol:
+        if factor not in self._scalars:
+            first, *rest = (self._vectors[k] for k in factor)
+            if len(rest) > 1:
+                raise NotImplementedError("a triple product is no scalar product")
+            name = self._label + "product_" + "_".join(map(str, factor))
+            meaning = f"scalar product of vectors {factor[0]} and {factor[1]}"
+            self._scalars[factor] = self._build.value(name, dot(first, rest[0]), meaning)
+        return self._scalars[factor]
+
+
+def _slope(polynomial: Polynomial, factor: tuple[int, int]) -> Polynomial:
+    """Return the derivative of a polynomial along a scalar product."""
+    slopes: dict[tuple[tuple[int, ...], ...], Fraction] = {}
+    for monomial, c in polynomial.items():
+        number = monomial.count(factor)
+        if number:
+            rest = list(monomial)
+            rest.remove(factor)
+            slopes[tuple(rest)] = slopes.get(tuple(rest), Fraction(0)) + c * number
+    return slopes

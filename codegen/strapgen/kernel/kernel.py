@@ -1,0 +1,377 @@
+"""Kernels are exact symbolic algorithms; each formula is written once, in a kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import sympy as sp
+
+from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import counted_shape, notebook_latex, short_repr
+from strapgen.ir.program import RESOLUTION
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal
+from strapgen.kernel import unknown_values
+from strapgen.kernel.evaluation import evaluate
+
+#: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
+resolution = sp.Symbol(RESOLUTION, real=True)
+
+
+def symbols(signal: Signal) -> sp.Matrix:
+    """Return the real symbols of a signal as a column vector, or as a matrix if it is one.
+
+    Parameters
+    ----------
+    signal : Signal
+
+    Returns
+    -------
+    Matrix
+        3 x 3 for a matrix, otherwise one column.
+
+    Examples
+    --------
+    >>> symbols(Signal.vector("rate", "w")).T
+    Matrix([[w_x, w_y, w_z]])
+    """
+    shape = signal.shape if len(signal.shape) == 2 else (signal.size, 1)
+    return sp.Matrix(*shape, [sp.Symbol(name, real=True) for name in signal.elements])
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A named quantity and the expressions of its elements.
+
+    Parameters
+    ----------
+    signal : Signal
+        Name, elements, unit and meaning.
+    expressions : tuple of Expr
+        One for each element, in row-major order.
+    """
+
+    signal: Signal
+    expressions: tuple[sp.Expr, ...]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        shape = counted_shape(self.signal.shape)
+        return f"{self.signal.name} ({shape}, unit {self.signal.unit}): {self.signal.meaning}".rstrip(": ")
+
+
+def evaluate_stages(
+    stages: Iterable[Stage],
+    values: Mapping[str, Any],
+    number: Callable[[sp.Rational], Any] | None = None,
+    function: Callable[[sp.Expr, list[Any]], Any] | None = None,
+) -> dict[str, Any]:
+    """Return the given values together with those of all elements of the stages.
+
+    Parameters
+    ----------
+    stages : iterable of Stage
+        Each may use the inputs and the stages before it.
+    values : mapping of str to number or ring element
+        A value for every symbol that no stage defines.
+    number, function : callable, optional
+        Convert rational numbers and evaluate functions, as for `algebra.evaluate`.
+
+    Returns
+    -------
+    dict of str to number or ring element
+    """
+    known = {RESOLUTION: sp.S.Zero, **values}
+    for stage in stages:
+        for name, expression in zip(stage.signal.elements, stage.expressions, strict=True):
+            known[name] = evaluate(expression, known, number, function)
+    return known
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """An algorithm as exact expressions.
+
+    Parameters
+    ----------
+    name : str
+        Name on the command line, lower case with hyphens.
+    title : str
+        One line that says what it computes.
+    source : str
+        Where the algorithm comes from, with the equation's number.
+    inputs : tuple of Signal
+        Inputs; their elements are the free symbols of the expressions.
+    outputs : tuple of Stage
+        Outputs, each with one expression an element.
+    stages : tuple of Stage
+        Intermediate quantities in order; later expressions may use their symbols.
+    transition : str or None
+        Name of the stage on which the state's update depends linearly, see `Program.transition`.
+    companions : Companions or None
+        The kernels of an attitude step; None for every other kernel.
+    order : Order or None
+        Order of an attitude step.
+    recursion : Recursion or None
+        The pairs of an output and the input that it becomes in the next call.
+    own : tuple of Kernel
+        Kernels that `companions` names and the catalogue does not have.
+    arguments : str
+        Name and options on the command line; by default the name alone. A whole command, such as
+        ``strapgen redundancy FILE``, where another than ``strapgen generate`` generates it.
+    notes : tuple of str
+        Remarks for the reader of generated code: domain, conventions.
+    unknowns : tuple of str
+        Names of the coefficients that are not known yet. Series and conditions are polynomials in them; no code can be
+        generated before `substitute` has replaced all of them.
+    previous, ahead : int
+        Of a step of velocity and position, numbers of samples from before it and from after it that it takes in
+        addition; `companions` has those of an attitude step.
+    """
+
+    name: str
+    title: str
+    source: str
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Stage, ...]
+    stages: tuple[Stage, ...] = ()
+    transition: str | None = None
+    companions: Companions | None = None
+    order: Order | None = None
+    recursion: Recursion | None = None
+    own: tuple[Kernel, ...] = ()
+    arguments: str = ""
+    notes: tuple[str, ...] = field(default=())
+    unknowns: tuple[str, ...] = ()
+    previous: int = 0
+    ahead: int = 0
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        ins = ", ".join(f"{signal.name} ({counted_shape(signal.shape)})" for signal in self.inputs)
+        outs = ", ".join(
+            f"{stage.signal.name} ({counted_shape(stage.signal.shape)})" for stage in self.outputs
+        )
+        order = "" if self.order is None else f"; order {self.order.step}"
+        return f"{self.name}: {self.title}\n{ins} -> {outs}{order}"
+
+    @property
+    def identifier(self) -> str:
+        """The name in generated code."""
+        return self.name.replace("-", "_")
+
+    @property
+    def takes_velocity(self) -> bool:
+        """Whether it is a step of velocity and position, from increments of both kinds."""
+        return [signal.name for signal in self.inputs] == ["increments", "velocity_increments"]
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Inputs, stages and outputs."""
+        return (*self.inputs, *(stage.signal for stage in (*self.stages, *self.outputs)))
+
+    def expand(
+        self, values: Mapping[str, Any] | None = None, number: Callable[[sp.Rational], Any] | None = None
+    ) -> dict[str, list[Any]]:
+        """Evaluate the outputs with all stages substituted.
+
+        Parameters
+        ----------
+        values : mapping of str to number or ring element, optional
+            A value for every input element: numbers, polynomials or symbols. By default the inputs' own
+            symbols, which gives each output as one expression of the inputs.
+        number : callable, optional
+            Converts a rational number, as for `algebra.evaluate`.
+
+        Returns
+        -------
+        dict of str to list
+            For each output its elements, row-major.
+        """
+        if values is None:
+            values = {n: sp.Symbol(n, real=True) for signal in self.inputs for n in signal.elements}
+        values = {name: sp.Symbol(name, real=True) for name in self.unknowns} | dict(values)
+        known = evaluate_stages((*self.stages, *self.outputs), values, number)
+        return {stage.signal.name: [known[n] for n in stage.signal.elements] for stage in self.outputs}
+
+    def polynomials(self) -> dict[str, list[Any]]:
+        """Return every output element as a polynomial of the inputs, with rational coefficients.
+
+        Returns
+        -------
+        dict of str to list of ring element
+            For each output its elements, row-major; the unknowns are the last generators of their ring.
+
+        Raises
+        ------
+        TypeError
+            If the kernel divides or calls functions.
+        """
+        names = [*(name for signal in self.inputs for name in signal.elements), *self.unknowns]
+        ring, *generators = sp.ring(names, sp.QQ)
+        try:
+            outputs = self.expand(dict(zip(names, generators, strict=True)))
+            return {name: [ring(element) for element in elements] for name, elements in outputs.items()}
+        except (TypeError, ValueError):  # SymPy's errors where a ring element meets what is no polynomial
+            raise TypeError(f"{self.name} is no polynomial: it divides or calls functions") from None
+
+    def require_known(self) -> None:
+        """Refuse a kernel with unknowns where numbers are needed.
+
+        Raises
+        ------
+        InputError
+            If it has any.
+        """
+        if self.unknowns:
+            raise InputError(
+                f"kernel {self.name} holds the unknowns {', '.join(self.unknowns)}; strapgen solve states what they "
+                "may be, and --constant or Kernel.substitute sets them"
+            )
+
+    def substitute(self, values: Mapping[str, Any]) -> Kernel:
+        """Return the kernel with values, or expressions in the unknowns that remain, in place of unknowns.
+
+        Parameters
+        ----------
+        values : mapping of str to number or Expr
+            By the name of the unknown; a text is read exactly, such as "57/80" or "1 - a/2".
+
+        Returns
+        -------
+        Kernel
+            An ordinary kernel once no unknown is left.
+
+        Raises
+        ------
+        InputError
+            If the kernel has no such unknown, or a value holds an unknown symbol, an inexact number, or none.
+
+        Examples
+        --------
+        >>> build = KernelBuilder()
+        >>> w = build.scalar(Signal.scalar("w"))
+        >>> a, b = build.parameter("a", "b")
+        >>> _ = build.output(Signal.scalar("sum"), [a * w + b])
+        >>> kernel = build.kernel("sum", "a sum", "this example")
+        >>> kernel.substitute({"a": "1/2"}).expand(), kernel.substitute({"a": "b/2"}).unknowns
+        ({'sum': [b + w/2]}, ('b',))
+        """
+        chosen = unknown_values.read(f"kernel {self.name}", self.unknowns, values)
+
+        def replaced(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+            return tuple(Stage(s.signal, tuple(x.xreplace(chosen) for x in s.expressions)) for s in stages)
+
+        stages, outputs = replaced(self.stages), replaced(self.outputs)
+        if any(x.has(sp.nan, sp.zoo) for stage in (*stages, *outputs) for x in stage.expressions):
+            raise InputError(f"kernel {self.name} divides by zero with these values of its unknowns")
+        remaining = unknown_values.remaining(self.unknowns, chosen)
+        return replace(self, stages=stages, outputs=outputs, unknowns=remaining)
+
+
+class KernelBuilder:
+    """Collects the inputs, stages and outputs of a kernel as its formulas are written.
+
+    Examples
+    --------
+    >>> build = KernelBuilder()
+    >>> w = build.input(Signal.vector("rate", "w"))
+    >>> v = build.stage(Signal.vector("twice", "v"), 2 * w)
+    >>> v.T
+    Matrix([[v_x, v_y, v_z]])
+    """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        parts = {"input": self.inputs, "stage": [s.signal for s in self.stages]}
+        parts["output"] = [s.signal for s in self.outputs]
+        names = {kind: ", ".join(signal.name for signal in signals) for kind, signals in parts.items()}
+        return "\n".join(f"{kind} {text or 'none'}" for kind, text in names.items())
+
+    def __init__(self) -> None:
+        self.inputs: list[Signal] = []
+        self.stages: list[Stage] = []
+        self.outputs: list[Stage] = []
+        self.unknowns: dict[sp.Symbol, sp.Symbol] = {}
+
+    def parameter(self, *names: str | sp.Symbol) -> Any:
+        """Declare coefficients that are not known yet, by name or as symbols, and return their symbols.
+
+        Returns
+        -------
+        Symbol or tuple of Symbol
+            As many as there are arguments. The symbols that were passed may be used in formulas too.
+
+        Examples
+        --------
+        >>> build = KernelBuilder()
+        >>> a, b = build.parameter(*sp.symbols("a b"))
+        """
+        declared = [sp.Symbol(name, real=True) if isinstance(name, str) else name for name in names]
+        self.unknowns |= {symbol: sp.Symbol(symbol.name, real=True) for symbol in declared}
+        real = tuple(self.unknowns[symbol] for symbol in declared)
+        return real if len(real) != 1 else real[0]
+
+    def input(self, signal: Signal) -> sp.Matrix:
+        """Declare an input and return its symbols."""
+        self.inputs.append(signal)
+        return symbols(signal)
+
+    def scalar(self, signal: Signal) -> sp.Symbol:
+        """Declare a scalar input and return its symbol."""
+        return self.input(signal)[0]
+
+    def stage(self, signal: Signal, expressions: Iterable[Any]) -> sp.Matrix:
+        """Name an intermediate quantity and return its symbols, which later expressions may use."""
+        self.stages.append(Stage(signal, _expressions(expressions)))
+        return symbols(signal)
+
+    def value(self, name: str, expression: Any, meaning: str = "") -> sp.Symbol:
+        """Name a scalar intermediate quantity and return its symbol."""
+        return self.stage(Signal.scalar(name, meaning=meaning), [expression])[0]
+
+    def output(self, signal: Signal, expressions: Iterable[Any]) -> sp.Matrix:
+        """Declare an output and return its symbols, which later outputs may use."""
+        self.outputs.append(Stage(signal, _expressions(expressions)))
+        return symbols(signal)
+
+    def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
+        """Return the kernel; `rest` are further fields of `Kernel`.
+
+        Of an attitude step, `previous` and `ahead` go into its companions, where its back ends read them.
+
+        Raises
+        ------
+        InputError
+            If the companions state other numbers.
+        """
+        step = rest.get("companions")
+        if isinstance(step, Companions):
+            stated = {what: rest.pop(what) for what in ("previous", "ahead") if rest.get(what)}
+            for what, number in stated.items():
+                if getattr(step, what) not in (0, number):
+                    raise InputError(
+                        f"kernel {name}: {what} is {number}, and {getattr(step, what)} in its companions"
+                    )
+            rest["companions"] = replace(step, **stated)
+        stages, outputs = (
+            tuple(Stage(s.signal, tuple(self._real(x) for x in s.expressions)) for s in stages)
+            for stages in (self.stages, self.outputs)
+        )
+        unknowns = tuple(dict.fromkeys(symbol.name for symbol in self.unknowns.values()))
+        return Kernel(name, title, source, tuple(self.inputs), outputs, stages, unknowns=unknowns, **rest)
+
+    def _real(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression with the real symbols of the unknowns."""
+        return expression.xreplace(self.unknowns) if self.unknowns else expression
+
+
+def _expressions(items: Iterable[Any] | Sequence[Any]) -> tuple[sp.Expr, ...]:
+    return tuple(sp.sympify(item) for item in items)

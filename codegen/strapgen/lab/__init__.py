@@ -1,0 +1,1 @@
+"""Simulation of generated code against truth: runs, comparisons, convergence, recordings, sensor errors, cost."""

@@ -1,0 +1,205 @@
+"""The command ``strapgen compare`` runs an algorithm on several back ends side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from strapgen import applications
+from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import (
+    STEP_OPTIONS,
+    FastBackends,
+    RunAlgorithm,
+    SeveralMethods,
+    backends,
+    limit,
+    one,
+    option,
+)
+from strapgen.cli.output import Output
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.described import described
+from strapgen.lab.simulate.sample_source import SampleSource
+
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+    from strapgen.lab.compare.comparison_report import ComparedKernel
+    from strapgen.run.backends import Backend
+    from strapgen.run.generation import Request
+
+
+RunDiffering = Annotated[
+    bool,
+    option(
+        "--run-differing",
+        help="Compile and run a file that differs from what its command generates, with all that is in it.",
+        panel="Input",
+    ),
+]
+
+
+@grouped
+def compare(
+    algorithm: RunAlgorithm,
+    *,
+    methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
+    backend: FastBackends = None,
+    reference: Annotated[
+        str,
+        option(
+            "--reference",
+            metavar="NAME",
+            help="Back end to compare with; exact computes with 40 digits.",
+            panel="Algorithm",
+        ),
+    ] = "numpy",
+    files: Annotated[
+        list[Path] | None,
+        option(
+            "--source",
+            metavar="FILE",
+            help="C file that strapgen generated, as one more back end, in its own formats.",
+            panel="Algorithm",
+        ),
+    ] = None,
+    run_differing: RunDiffering = False,
+    source: SampleSource,
+    fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
+    fail_above: Annotated[
+        str | None,
+        option(
+            "--fail-above",
+            metavar="RAD",
+            help="Exit with 1 if a back end departs from the reference by more than this angle in rad.",
+            panel="Output",
+        ),
+    ] = None,
+    output: Output,
+) -> None:
+    """Compare back ends on the same increments with a reference.
+
+    For each back end the table shows the largest and the rms angle from the reference in rad, for fixed point the
+    certified bound, the largest angle in units in the last place, the drift, the time of a step, the bytes of its
+    object code and its operations. Fixed-point formats are chosen for the increments of the run, or for
+    --max-rate-deg-s if you give it. --plot draws the angle over time, and the certified bound after as many steps.
+
+    Of a described system you see how far each output departs over the run, and after a single pass from equal memories,
+    beside the certified bound of a pass; the exit status is 1 if one is outside its bound.
+
+    Example: strapgen compare euler --method rk4 --increments 2 --backend numpy,c,c-fixed32,c-fixed16 --carry full
+    --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
+    """
+    output.check(algorithm, *methods.files, *source.files)
+    names = _backends(backend, reference, files)
+    if (system := described(algorithm)) is not None:
+        limits = {"--fail-above": fail_above, "--plot": output.plot}
+        stated = [name for name in limits if limits[name]]
+        to_run = (names, reference), (files, run_differing)
+        return system.compare(algorithm, methods, stated, *to_run, source, fixed, output)
+    choices = _taking_increments(methods.choices(algorithm))
+    requests = {path: _source_files().header_command_of(path).request([algorithm]) for path in files or ()}
+    counts = {path: request.settings for path, request in requests.items()}
+    most = limit("--fail-above", fail_above)
+    source.check()
+    _check_fixed(fixed, {*names, reference}, source.pulse_arcsec)
+
+    import numpy as np
+
+    from strapgen.lab.compare import comparison
+    from strapgen.lab.compare.comparison_plot import comparison_image
+    from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
+    from strapgen.lab.compare.file_counts import counted
+
+    kernels = []
+    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+        for choice in choices:
+            inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
+            rows = comparison.compare(
+                choice,
+                backends=[*names, *_of_files(requests, choice, run_differing)],
+                increments=inputs.increments,
+                reference=reference,
+                truth=inputs.truth,
+                settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
+            )
+            kernels.append(
+                ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
+            )
+    drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
+    output.report(
+        comparison_report(kernels, reference, drift),
+        lambda path: comparison_image(kernels, reference, path),
+    )
+    _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
+
+
+def _taking_increments(choices: list[Choice]) -> list[Choice]:
+    """Return choices, and refuse a user's step that takes rates: back ends are compared on increments."""
+    for choice in choices:
+        if choice.increments is None:
+            raise InputError(
+                f"kernel {choice.kernel} takes rates at nodes; compare needs a step that takes increments"
+            )
+    return choices
+
+
+def _of_files(requests: Mapping[Path, Request], choice: Choice, run_differing: bool) -> list[Backend]:
+    """Return files as back ends of a step that is compared."""
+    result = []
+    for path, request in requests.items():
+        if request.choice.kernel != choice.kernel:
+            raise InputError(f"{path} is {request.choice.kernel}, and {choice.kernel} is compared")
+        result.append(_source_files().file_backend(path, request, run_differing=run_differing))
+    return result
+
+
+def _source_files() -> Any:
+    """Return what reads generated files."""
+    return applications.extension("lab.source-files", "--source")
+
+
+def _fail_above(kernels: list[ComparedKernel], most: float | None, said: str) -> None:
+    """Exit with 1 if a back end is further from the reference than allowed, where a limit is stated."""
+    if most is None:
+        return
+    beyond = [(each.kernel, row) for each in kernels for row in each.rows if not row.max_abs_rad <= most]
+    if beyond:
+        several = len(kernels) > 1
+        angles = ", ".join(
+            f"{f'{kernel} on ' if several else ''}{row.backend} {row.max_abs_rad:.3g} rad"
+            for kernel, row in beyond
+        )
+        typer.echo(f"strapgen: {said}: {angles}", err=True)
+        raise typer.Exit(1)
+
+
+def _backends(text: str | None, reference: str, files: list[Path] | None) -> list[str]:
+    from strapgen.ir import checks
+    from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
+
+    one("--reference", reference)
+    # A file alone is compared with the reference.
+    names = [] if files and text is None else backends("--backend", text, DEFAULT_BACKENDS)
+    checks.choice("reference", reference, BACKENDS)
+    return names
+
+
+def _check_fixed(fixed: FixedOptions, backends: set[str], pulse: str | None) -> None:
+    """Refuse options of fixed point that no back end of the run uses, and two scales of a gyro."""
+    from strapgen.run.backends import BACKENDS
+
+    fixed.check_pulse(pulse)
+    fixed_point = [name for name, entry in BACKENDS.items() if entry.fixed]
+    if not backends & {*fixed_point}:
+        for name in fixed.stated:
+            raise InputError(f"{name} is for fixed-point back ends, and none is named")
+    any_word = [name for name in fixed_point if BACKENDS[name].word is None]
+    if fixed.word is not None and not backends & {*any_word}:
+        raise InputError(
+            f"--word is for the back end {', '.join(any_word)}, which is not named; the others have their own"
+        )

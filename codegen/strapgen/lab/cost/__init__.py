@@ -1,0 +1,1 @@
+"""Cost of generated code on microcontrollers: cross compilers and simulators."""

@@ -1,0 +1,237 @@
+"""Measures what generated C costs on a microcontroller: instructions, memory, and instructions executed in a call."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from strapgen import catalogue, fixedpoint
+from strapgen.ir import checks
+from strapgen.ir.exceptions import CompilerError, InputError
+from strapgen.ir.signals import Signal
+from strapgen.ir.sources import Sources
+from strapgen.lab.cost import emulation
+from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.run import generated_sources
+from strapgen.storage import drafts
+from strapgen.targets import TARGETS
+
+#: Flags of the compiler beside those of the processor.
+FLAGS = ("-std=c99", "-O2", "-ffreestanding", "-ffp-contract=off")
+_MULTIPLICATION = re.compile(r"f?mul\w*|ml[as]|[su]ml?a?[ls]?\w*l|[su]mul\w*|smm\w*")
+#: The processor on which the whole catalogue is measured, and the kernels that are measured on every other.
+REFERENCE, EVERYWHERE = "cortex-m3", ("euler-rk4-2", "dcm-rk4-2")
+#: Part of its range that an argument of a measured call has.
+_PART = 3
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a kernel costs on a processor.
+
+    Parameters
+    ----------
+    kernel, cpu : str
+    instructions : int
+        Instructions of the object code.
+    executed : int or None
+        Instructions from the entry of the function to its return, for input inside its range; None without emulator.
+    multiplications : int
+        Those of the instructions that multiply.
+    code_bytes, constant_bytes : int
+    stack_bytes : int
+        Stack of the function and of the deepest of the file's own functions that it calls, in bytes.
+    compiler : str
+        Compiler and version.
+    """
+
+    kernel: str
+    cpu: str
+    instructions: int
+    executed: int | None
+    multiplications: int
+    code_bytes: int
+    constant_bytes: int
+    stack_bytes: int
+    compiler: str
+
+
+def processors(cross: str | None = None, cpus: Sequence[str] = ()) -> list[str]:
+    """Return the names of the processors that are asked for, or of all whose compiler is installed.
+
+    Parameters
+    ----------
+    cross : str, optional
+        A cross compiler; by default all.
+    cpus : sequence of str, optional
+        Names from `PROCESSORS`; by default all.
+
+    Raises
+    ------
+    InputError
+        If a processor is not known, another compiler compiles for it, or its compiler is not installed.
+    """
+    for cpu in cpus:
+        checks.choice("cpu", cpu, PROCESSORS)
+    if cross is not None:
+        checks.choice("cross compiler", cross, dict.fromkeys(p.compiler for p in PROCESSORS.values()))
+    names = [name for name in cpus or PROCESSORS if cross in (None, PROCESSORS[name].compiler)]
+    if cpus and len(names) < len(cpus):
+        other = next(name for name in cpus if name not in names)
+        raise InputError(f"{cross} does not compile for {other}; {PROCESSORS[other].compiler} does")
+    present = [name for name in names if shutil.which(PROCESSORS[name].compiler)]
+    if not present or (cpus and present != names):
+        needed = ", ".join(dict.fromkeys(PROCESSORS[name].compiler for name in names))
+        raise InputError(f"no cross compiler for {', '.join(names)}: install {needed}")
+    return present
+
+
+def cost(sources: Sources, cpu: str) -> Cost:
+    """Compile the files of a step for a processor and measure them.
+
+    Parameters
+    ----------
+    sources : Sources
+        Of a target in C.
+    cpu : str
+        A key of `PROCESSORS`.
+
+    Returns
+    -------
+    Cost
+
+    Raises
+    ------
+    InputError
+        If the sources are not in C.
+    CompilerError
+        If the cross compiler or the emulator fails.
+    """
+    if not TARGETS[sources.target].compiled:
+        raise InputError(f"sources for {sources.target} are not in C, which cost measures")
+    processor = PROCESSORS[cpu]
+    with drafts.temporary_folder() as folder:
+        for file, text in sources.step_files.items():
+            (folder / file).write_text(text)
+        source = folder / next(file for file in sources.step_files if file.endswith(".c"))
+        flags = [*FLAGS, *_library(processor.compiler)]
+        _run(
+            [processor.compiler, *processor.flags, *flags, "-fstack-usage", "-c", source.name],
+            folder,
+        )
+        binary = f"{source.stem}.o"
+        listing = _run([processor.tool("objdump"), "-d", "--no-show-raw-insn", binary], folder)
+        mnemonics = re.findall(r"^\s+[0-9a-f]+:\s+([a-z][\w.]*)", listing, flags=re.MULTILINE)
+        sizes = _run([processor.tool("size"), "-A", binary], folder)
+        return Cost(
+            sources.kernel,
+            cpu,
+            len(mnemonics),
+            emulation.executed(processor, flags, folder / binary, sources.function.name, *_call(sources)),
+            sum(bool(_MULTIPLICATION.fullmatch(word.partition(".")[0])) for word in mnemonics),
+            _section_bytes(sizes, ".text"),
+            _section_bytes(sizes, ".rodata"),
+            _stack(folder / f"{source.stem}.su", sources.function.name),
+            _version(processor.compiler),
+        )
+
+
+def catalogue_costs(cpus: Sequence[str]) -> Iterator[Cost]:
+    """Measure the standard catalogue in 32-bit fixed point, as it stands in ``generated/c_fixed``.
+
+    Parameters
+    ----------
+    cpus : sequence of str
+        Keys of `PROCESSORS`: `REFERENCE` for all kernels, any other for those of `EVERYWHERE`.
+
+    Yields
+    ------
+    Cost
+    """
+    for cpu in sorted(cpus, key=lambda name: name != REFERENCE):
+        for choice in catalogue.standard():
+            if cpu != REFERENCE and choice.kernel not in EVERYWHERE:
+                continue
+            if fixedpoint.can_lower(generated_sources.program(choice)):
+                yield cost(generated_sources.sources(choice, "c-fixed"), cpu)
+
+
+@cache
+def _library(compiler: str) -> list[str]:
+    """Return the flags that find the headers of a C library, if there is one for the compiler."""
+    command = [compiler, "-print-file-name=picolibc.specs"]
+    place = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+    return ["--specs=picolibc.specs"] if Path(place).is_absolute() else []
+
+
+def _run(command: Sequence[str], folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        errors = [line for line in done.stderr.splitlines() if "error" in line] or [done.stderr.strip()]
+        raise CompilerError(f"{command[0]} failed: {errors[0]}")
+    return done.stdout
+
+
+@cache
+def _version(compiler: str) -> str:
+    match = re.match(r".*\) (\S+)", _run([compiler, "--version"], Path()))
+    return f"{compiler} {match[1]}" if match else compiler
+
+
+def _section_bytes(sizes: str, section: str) -> int:
+    """Return the bytes of a section and of its parts."""
+    rows = re.findall(rf"^{re.escape(section)}(?:\.\S*)?\s+(\d+)", sizes, flags=re.MULTILINE)
+    return sum(map(int, rows))
+
+
+def _stack(usage: Path, function: str) -> int:
+    """Return the stack of a function and the deepest of the others in its file, which it calls."""
+    rows = [line.split("\t") for line in usage.read_text().splitlines()]
+    depths = {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
+    depth = depths.pop(function)
+    return depth + max(depths.values(), default=0)
+
+
+def _call(sources: Sources) -> tuple[str, str]:
+    """Return declarations of arguments inside their ranges, and a call with them, as C text."""
+    lines = [f'#include "{sources.function.name}.h"']
+    names = []
+    fixed = {} if sources.fixed is None else {a.signal.name: a for a in sources.fixed.inputs}
+    word = 0 if sources.fixed is None else sources.fixed.settings.word
+    kind = f"int{word}_t" if word else TARGETS[sources.target].number
+    for number, signal in enumerate(sources.function.inputs):
+        if fixed:
+            argument = fixed[signal.name]
+            unit = float(argument.unit)
+            scaled = [round(value / unit) for value in _values(signal, argument.high * unit)]
+            values: Sequence[float] = [min(argument.high, integer) for integer in scaled]
+        else:
+            values = _values(signal, 0.01 * _PART if signal.bound is None else float(signal.bound))
+        text = ", ".join(map(str, values))
+        memory = f"int{fixed[signal.name].format.word}_t" if fixed else kind
+        lines.append(f"{memory} argument_{number}[{signal.size}] = {{{text}}};")
+        names.append(f"argument_{number}" + ("" if signal.shape or fixed else "[0]"))
+    if sources.fixed is not None and sources.fixed.residuals:
+        fresh = ", ".join(f"{feedback.fresh}u" for feedback in sources.fixed.residuals)
+        lines.append(f"uint{word}_t feedback[{len(sources.fixed.residuals)}] = {{{fresh}}};")
+        names.append("feedback")
+    for number, signal in enumerate(sources.function.outputs):
+        lines.append(f"{kind} result_{number}[{signal.size}];")
+        names.append(f"result_{number}")
+    call = f"{sources.function.name}({', '.join(names)})"
+    return "\n".join(lines), f"if ({call} != 0) refuse()" if fixed else call
+
+
+def _values(signal: Signal, largest: float) -> list[float]:
+    """Return numbers that a signal may have: an attitude, or a part of the largest one with changing signs."""
+    if signal.constraint == "unit":
+        return [1 / math.sqrt(signal.size)] * signal.size
+    if signal.constraint == "rotation":
+        return [float(place % 4 == 0) for place in range(signal.size)]
+    return [largest / _PART * (-1) ** place / (1 + place % 3) for place in range(signal.size)]

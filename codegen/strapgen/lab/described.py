@@ -1,0 +1,29 @@
+"""Algorithms that other applications describe: `simulate` and `compare` hand them over to these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from strapgen import applications
+
+
+class DescribedAlgorithms(NamedTuple):
+    """What runs algorithms of a kind: the functions take what the commands ``simulate`` and ``compare`` read.
+
+    Parameters
+    ----------
+    covers : callable
+        Tells whether a name stands for one.
+    simulate, compare : callable
+        Run one, and deliver the result.
+    """
+
+    covers: Callable[[object], bool]
+    simulate: Callable[..., None]
+    compare: Callable[..., None]
+
+
+def described(name: Any) -> DescribedAlgorithms | None:
+    """Return what runs an algorithm that another application describes; None for any other."""
+    return next((kind for kind in applications.extensions("lab.described") if kind.covers(name)), None)

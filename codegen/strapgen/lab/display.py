@@ -1,0 +1,96 @@
+"""How the objects of the lab show themselves: in a notebook, as data frames, as plots."""
+
+from __future__ import annotations
+
+import base64
+import math
+from typing import Any
+
+import numpy as np
+
+from strapgen.ir.exceptions import MissingExtraError
+from strapgen.lab.compare import comparison_report
+from strapgen.lab.compare.comparison import Comparisons
+from strapgen.lab.converge import convergence_report
+from strapgen.lab.converge.convergence import Convergence
+from strapgen.lab.recordings.recording import History
+from strapgen.lab.simulate import runs_plot, runs_report
+from strapgen.lab.simulate.runs import Run
+from strapgen.lab.simulate.runs_report import AXES, SKEW_PLANES
+from strapgen.results import figures
+from strapgen.results.display.frames import MATRIX, VECTOR, Variables, table, variables
+from strapgen.results.display.objects import figure, html
+from strapgen.results.table import TextTable
+
+
+@html.register
+def _(run: Run) -> str | None:
+    table = runs_report.largest_table(run).as_html(f"mean drift {math.degrees(run.mean_drift):.3g} deg")
+    try:
+        content = figures.image(runs_plot.run_figure(run, ""), "run.png")
+    except MissingExtraError:
+        return table
+    picture = base64.b64encode(content).decode()
+    return (
+        f'{table}\n<img alt="errors of the run" style="max-width:100%" src="data:image/png;base64,{picture}">'
+    )
+
+
+@html.register
+def _(rows: Comparisons) -> str | None:
+    return comparison_report.comparison_table(rows).as_html()
+
+
+@html.register
+def _(ladder: Convergence) -> str | None:
+    return convergence_report.ladder_table(ladder).as_html(f"{ladder.kernel} on {ladder.backend}")
+
+
+@table.register
+def _(run: Run) -> TextTable:
+    return runs_report.run_table(run)
+
+
+@table.register
+def _(history: History) -> TextTable:
+    return runs_report.history_table(history, runs_report.history_elements(history))
+
+
+@table.register
+def _(rows: Comparisons) -> TextTable:
+    return comparison_report.figures_table(rows)
+
+
+@table.register
+def _(ladder: Convergence) -> TextTable:
+    return convergence_report.ladder_table(ladder)
+
+
+@variables.register
+def _(run: Run) -> tuple[Variables, dict[str, Any]]:
+    arrays: Variables = {
+        "scale": (VECTOR, run.scale, "1"),
+        "skew_deg": (("time_s", "plane"), np.degrees(run.skew), "deg"),
+        "drift_deg": (VECTOR, np.degrees(run.drift), "deg"),
+        "computed": (MATRIX, run.computed, "1"),
+        "true": (MATRIX, run.true, "1"),
+        "error": (MATRIX, run.error, "1"),
+    }
+    return arrays, {"axis": list(AXES), "plane": list(SKEW_PLANES), "row": [1, 2, 3], "column": [1, 2, 3]}
+
+
+@variables.register
+def _(history: History) -> tuple[Variables, dict[str, Any]]:
+    states = history.states.reshape(len(history.time), -1)
+    names = runs_report.history_elements(history)
+    return {"attitude": (("time_s", "element"), states, "1")}, {"element": list(names)}
+
+
+@figure.register
+def _(run: Run, title: str) -> Any:
+    return runs_plot.run_figure(run, title)
+
+
+@figure.register
+def _(history: History, title: str) -> Any:
+    return runs_plot.history_figure(history, runs_report.history_elements(history), title)

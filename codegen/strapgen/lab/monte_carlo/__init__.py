@@ -1,0 +1,1 @@
+"""Monte Carlo of sensor errors and quantization."""

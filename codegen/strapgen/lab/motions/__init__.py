@@ -1,0 +1,1 @@
+"""Motions with known attitude, and specific forces along them."""

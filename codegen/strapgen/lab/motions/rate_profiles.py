@@ -1,0 +1,373 @@
+"""Body rates whose angle is in closed form but whose attitude is not: sums of cosines, and slews with their onsets.
+
+A profile has the rate at an instant and the angle, the integral of the rate on each axis by itself, from which
+increments follow as differences.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.reference_attitudes import KNOT
+
+Array = NDArray[np.float64]
+
+#: Number of slews, the first of them, and the time from one to the next in s.
+_SLEWS, _FIRST, _PERIOD = 8, 3.0037, 7.0
+#: The first of the slews whose rate is linear at both ends, in s: no sample of 0.01 s begins there.
+_FIRST_RAMP = 0.01 * (300 + 5 / 16)
+#: Duration of a slew in s, from the middle of one onset to the middle of the other.
+_SLEW = 1.2
+#: Highest and lowest frequency of the random rate in Hz, and the number of its cosines on an axis.
+_HIGHEST, _LOWEST, _COSINES = 50 / 3, 0.2, 30
+#: Numbers whose roots set the frequencies, and those whose roots set the phases, of the axes x, y and z.
+_FREQUENCY_ROOTS, _PHASE_ROOTS = (2, 3, 5), (7, 11, 13)
+#: Substeps of the reference attitude in `KNOT`, and those in an onset that follows the hyperbolic tangent: a reference
+#: with twice as many differs by less than 5e-13 rad after 60 s.
+_SUBSTEPS, _ONSET_SUBSTEPS = 16, 64
+#: Shortest onset in s; the longest is a slew.
+_SHORTEST = 1e-4
+#: Frequencies of the lines of a vibration in Hz.
+_LINES = np.linspace(2, 30, 40)
+#: Lowest bandwidth of a gyro in Hz.
+_LOWEST_BANDWIDTH = 1e-3
+
+
+class RateProfile(Protocol):
+    """A body rate whose integral is in closed form."""
+
+    @property
+    def substeps(self) -> int:
+        """Number of substeps in `KNOT` that its reference attitude takes."""
+
+    def rate(self, time: Any) -> Array:
+        """Return the rate in rad/s at some times in s, (..., 3)."""
+
+    def angle(self, time: Any) -> Array:
+        """Return an integral of the rate that the gyro measures, in rad, up to some times, (..., 3)."""
+
+
+@dataclass(frozen=True)
+class CosineSum:
+    """A sum of cosines on each axis: amplitude cos(frequency t + phase).
+
+    Parameters
+    ----------
+    amplitudes : array, (3, K)
+        In rad/s for a rate.
+    frequencies : array, (3, K)
+        In rad/s, above 0.
+    phases : array, (3, K)
+        In rad.
+    substeps : int, optional
+        See `RateProfile`.
+
+    Examples
+    --------
+    >>> wave = CosineSum(np.ones((3, 1)), np.full((3, 1), 2.0), np.zeros((3, 1)))
+    >>> wave.rate(0.0), wave.angle(np.pi / 4)
+    (array([1., 1., 1.]), array([0.5, 0.5, 0.5]))
+    """
+
+    amplitudes: Array
+    frequencies: Array
+    phases: Array
+    substeps: int = _SUBSTEPS
+
+    def rate(self, time: Any) -> Array:
+        """Return the sum at some times, (..., 3)."""
+        return self._waves(time, np.cos, self.amplitudes)
+
+    def angle(self, time: Any) -> Array:
+        """Return the integral of the sum up to some times, (..., 3); its mean is zero."""
+        return self._waves(time, np.sin, self.amplitudes / self.frequencies)
+
+    def _waves(self, time: Any, wave: Callable[[Array], Array], amplitudes: Array) -> Array:
+        times = np.asarray(time, float)[..., None]
+        moving = np.flatnonzero(amplitudes.any(axis=1))
+        sums = np.zeros((*times.shape[:-1], len(moving)))
+        for amplitude, frequency, phase in zip(
+            amplitudes[moving].T, self.frequencies[moving].T, self.phases[moving].T, strict=True
+        ):  # one after the other, so that the arrays stay small
+            sums += amplitude * wave(times * frequency + phase)
+        if len(moving) == len(amplitudes):
+            return sums
+        total = np.zeros((*times.shape[:-1], 3))
+        total[..., moving] = sums
+        return total
+
+    def filtered(self, cutoff: float) -> CosineSum:
+        """Return the sum as a Butterworth filter of second order passes it on, long after it began.
+
+        Parameters
+        ----------
+        cutoff : float
+            Frequency in rad/s at which half of the power is lost: the filter is 1/(1 + sqrt(2) s/w + (s/w)^2).
+
+        Returns
+        -------
+        CosineSum
+        """
+        s = 1j * self.frequencies / cutoff
+        response = 1 / (1 + math.sqrt(2) * s + s * s)
+        return CosineSum(
+            self.amplitudes * np.abs(response), self.frequencies, self.phases + np.angle(response)
+        )
+
+
+@dataclass(frozen=True)
+class ThroughGyro:
+    """A sum of cosines that a gyro of limited bandwidth measures.
+
+    Parameters
+    ----------
+    motion, measured : CosineSum
+        The body rate, and what the gyro passes on of it.
+    """
+
+    motion: CosineSum
+    measured: CosineSum
+
+    @property
+    def substeps(self) -> int:
+        """See `RateProfile`."""
+        return self.motion.substeps
+
+    def rate(self, time: Any) -> Array:
+        """Return the body rate at some times, (..., 3)."""
+        return self.motion.rate(time)
+
+    def angle(self, time: Any) -> Array:
+        """Return the integral of the measured rate up to some times, (..., 3)."""
+        return self.measured.angle(time)
+
+
+@dataclass(frozen=True)
+class Slews:
+    """Eight slews of 1.2 s about different axes, on top of a sum of cosines.
+
+    Parameters
+    ----------
+    background : CosineSum
+    axes : array, (8, 3)
+        Rate of each slew in rad/s.
+    starts : array, (8,)
+        Start of each slew in s: the middle of an onset by the hyperbolic tangent, the beginning of a ramp.
+    onset : float
+        Duration of an onset in s.
+    shape, integral : callable
+        The rate of an onset as a fraction of its final one, from the time x since its start in units of `onset`; and
+        the integral of that, less max(x, 0).
+    substeps : int
+        See `RateProfile`.
+    """
+
+    background: CosineSum
+    axes: Array
+    starts: Array
+    onset: float
+    shape: Callable[[Array], Array]
+    integral: Callable[[Array], Array]
+    substeps: int
+
+    def rate(self, time: Any) -> Array:
+        """Return the body rate at some times, (..., 3)."""
+        begin, end = self._times(time)
+        return self.background.rate(time) + (self.shape(begin) - self.shape(end)) @ self.axes
+
+    def angle(self, time: Any) -> Array:
+        """Return the integral of the body rate up to some times, (..., 3)."""
+        begin, end = self._times(time)
+        sharp = np.clip(begin * self.onset, 0, _SLEW)  # the integral of a slew that begins and ends at once
+        soft = self.onset * (self.integral(begin) - self.integral(end))
+        return self.background.angle(time) + (sharp + soft) @ self.axes
+
+    def _times(self, time: Any) -> tuple[Array, Array]:
+        """Return the times since both onsets of each slew, in units of an onset, (..., 8)."""
+        since = np.asarray(time, float)[..., None] - self.starts
+        return since / self.onset, (since - _SLEW) / self.onset
+
+
+def _soft_integral(x: Array) -> Array:
+    """Return the integral of (1 + tanh x)/2, less max(x, 0): log(1 + exp(-2|x|))/2."""
+    result: Array = np.log1p(np.exp(-2 * np.abs(x))) / 2
+    return result
+
+
+def _ramp_integral(x: Array) -> Array:
+    """Return the integral of a ramp from 0 to 1, less max(x, 0)."""
+    inside = np.clip(x, 0, 1)
+    return inside * inside / 2 - inside
+
+
+def random_rate(rate: float) -> CosineSum:
+    """Return a rate that looks random, without power above 50/3 Hz.
+
+    Parameters
+    ----------
+    rate : float
+        Root mean square on each axis in rad/s.
+
+    Returns
+    -------
+    CosineSum
+        Thirty cosines on each axis, of frequencies 0.2 Hz to 50/3 Hz and phases that are the fractional parts of
+        multiples of roots.
+    """
+    return random_sum(rate, _FREQUENCY_ROOTS, _PHASE_ROOTS)
+
+
+def random_sum(
+    size: float, frequency_roots: tuple[int, int, int], phase_roots: tuple[int, int, int]
+) -> CosineSum:
+    """Return a vector that looks random, without power above 50/3 Hz, see `random_rate`.
+
+    Parameters
+    ----------
+    size : float
+        Root mean square on each axis.
+    frequency_roots, phase_roots : tuple of int
+        For each axis the number whose root sets its frequencies, and the one whose root sets its phases.
+    """
+    number = np.arange(1, _COSINES + 1)
+    frequencies = _LOWEST + (_HIGHEST - _LOWEST) * _fractions(frequency_roots, number)
+    amplitudes = np.full(frequencies.shape, size * math.sqrt(2 / _COSINES))
+    return CosineSum(amplitudes, 2 * np.pi * frequencies, 2 * np.pi * _fractions(phase_roots, number))
+
+
+def vibration_rate(angle: float, gyro: float) -> CosineSum | ThroughGyro:
+    """Return the rate of a vibration of forty lines from 2 Hz to 30 Hz, of which y is a quarter period behind x.
+
+    Parameters
+    ----------
+    angle : float
+        Root mean square of the angle on each axis in rad, the same in every line.
+    gyro : float
+        Bandwidth of the gyro in Hz, a Butterworth filter of second order; infinite for one that passes on everything.
+
+    Returns
+    -------
+    CosineSum or ThroughGyro
+        The phases of x and z have nothing to do with each other.
+
+    Raises
+    ------
+    InputError
+        If the bandwidth is below 0.001 Hz.
+    """
+    if gyro < _LOWEST_BANDWIDTH:
+        raise InputError(f"gyro_hz is {gyro:g}; at least {_LOWEST_BANDWIDTH:g} is needed")
+    frequencies = np.broadcast_to(2 * np.pi * _LINES, (3, _LINES.size))
+    phases = 2 * np.pi * _fractions(_PHASE_ROOTS, np.arange(1, _LINES.size + 1))
+    phases[1] = phases[0] - np.pi / 2
+    motion = CosineSum(frequencies * (angle * math.sqrt(2 / _LINES.size)), frequencies, phases)
+    return ThroughGyro(motion, motion.filtered(2 * math.pi * gyro)) if gyro < math.inf else motion
+
+
+def slew(onset: float, rate: float) -> Slews:
+    """Return slews whose rate follows the hyperbolic tangent at both ends.
+
+    Parameters
+    ----------
+    onset : float
+        Time in s in which the hyperbolic tangent goes from 0 to tanh 1.
+    rate : float
+        In rad/s.
+
+    Returns
+    -------
+    Slews
+
+    Raises
+    ------
+    InputError
+        If the onset is shorter than 0.1 ms or longer than the slew.
+    """
+    _check_onset(onset)
+    axes, sway = _directions(), _sway()
+    substeps = max(_SUBSTEPS, math.ceil(_ONSET_SUBSTEPS * KNOT / onset))
+    starts = _FIRST + _PERIOD * np.arange(_SLEWS, dtype=np.float64)
+    return Slews(sway, rate * axes, starts, onset, lambda x: (1 + np.tanh(x)) / 2, _soft_integral, substeps)
+
+
+def ramps(onset: float, rate: float) -> Slews:
+    """Return slews whose rate is linear at both ends.
+
+    Parameters
+    ----------
+    onset : float
+        Duration of a ramp in s.
+    rate : float
+        In rad/s.
+
+    Returns
+    -------
+    Slews
+
+    Raises
+    ------
+    InputError
+        If the onset is shorter than 0.1 ms or longer than the slew, or ends between the substeps of the reference
+        attitude.
+    """
+    _check_onset(onset)
+    substeps = onset / KNOT * _SUBSTEPS
+    if abs(substeps - round(substeps)) > 1e-9:
+        unit = f"{KNOT:g}/{_SUBSTEPS} s"
+        raise InputError(
+            f"onset_s is {onset:g}; a multiple of {unit} is needed, the reference attitude's substep"
+        )
+    axes, sway = _directions(), _sway()
+    starts = _FIRST_RAMP + _PERIOD * np.arange(_SLEWS, dtype=np.float64)
+    return Slews(sway, rate * axes, starts, onset, lambda x: np.clip(x, 0, 1), _ramp_integral, _SUBSTEPS)
+
+
+def _check_onset(onset: float) -> None:
+    if not _SHORTEST <= onset <= _SLEW:
+        raise InputError(f"onset_s is {onset:g}; {_SHORTEST:g} to {_SLEW:g} is needed")
+
+
+def _directions() -> Array:
+    """Return the axes of the slews, (8, 3)."""
+    axes = np.sin(np.multiply.outer(np.arange(_SLEWS), (1.7, 2.3, 2.9)) + np.array([0.3, 1.1, 2.0]))
+    directions: Array = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    return directions
+
+
+def _sway() -> CosineSum:
+    """Return the slow rate on top of which the slews are: (20 sin 1.3 t, 30 sin(0.9 t + 0.5), 25 sin(0.7 t + 1))."""
+    return CosineSum(
+        np.radians([[20.0], [30.0], [25.0]]),
+        np.array([[1.3], [0.9], [0.7]]),
+        np.array([[0.0], [0.5], [1.0]]) - np.pi / 2,
+    )
+
+
+def _fractions(roots: tuple[int, ...], number: NDArray[np.int_]) -> Array:
+    """Return the fractional parts of multiples of square roots, (3, K)."""
+    fractions: Array = np.outer(np.sqrt(roots), number) % 1
+    return fractions
+
+
+#: Motions without kernels, which only runs know, and the unit of each of their parameters.
+RUN_MOTIONS = {
+    "cone": {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
+    "random": {"rate": "rad/s"},
+    "slew": {"onset": "s", "rate": "rad/s"},
+    "ramps": {"onset": "s", "rate": "rad/s"},
+    "vibration": {"angle": "rad", "gyro": "Hz"},
+}
+#: The profiles by the name of their motion, as functions of its parameters in SI units.
+PROFILES: dict[str, Callable[..., RateProfile]] = {
+    "random": random_rate,
+    "slew": slew,
+    "ramps": ramps,
+    "vibration": vibration_rate,
+}

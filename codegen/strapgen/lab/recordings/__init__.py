@@ -1,0 +1,1 @@
+"""Recorded rates and increments: reading, and attitude along them."""

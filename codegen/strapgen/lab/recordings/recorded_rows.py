@@ -1,0 +1,250 @@
+"""Reads rows of numbers from a recorded file: a block at a time by numpy, row by row what it does not take."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from array import array
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain, islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.suggestions import counted
+from strapgen.ir.units import TIMES
+from strapgen.lab.recordings import delimited
+from strapgen.lab.recordings.recorded_columns import Columns
+from strapgen.lab.recordings.recorded_header import ColumnLayout
+
+Array = NDArray[np.float64]
+
+#: What separates cells, the first of which a line holds.
+_SEPARATORS = ("\t", ";", ",")
+#: What a line begins with that is a comment.
+_COMMENTS = ("#", "%", "//")
+#: From this interval on times in no stated unit may be in ms, us, ns or numbers of packets, in s.
+_LONG_INTERVAL = 0.5
+#: Rows that are put together.
+_BATCH = 1 << 13
+
+
+class LineNumbers:
+    """The number of the line of every row: the rows from which on it is another distance away."""
+
+    def __init__(self) -> None:
+        self._rows, self._lines = array("q"), array("q")
+
+    def add(self, row: int, lines: Sequence[int]) -> None:
+        """Note the line numbers of rows from a first one on."""
+        for number, line in enumerate(lines, row):
+            if not self._rows or line - number != self._lines[-1] - self._rows[-1]:
+                self._rows.append(number)
+                self._lines.append(line)
+            elif isinstance(lines, range):  # one after the other
+                break
+
+    def __getitem__(self, row: int) -> int:
+        place = bisect_right(self._rows, row) - 1
+        return self._lines[place] + row - self._rows[place]
+
+
+@dataclass(frozen=True)
+class RecordedRows:
+    """The rows of a file.
+
+    Parameters
+    ----------
+    time : array, (N,)
+        The first column.
+    values : array, (N, columns)
+        The others; a long recording is on the disk, see `recorded_columns`.
+    lines : LineNumbers
+        The number of the line of each row.
+    """
+
+    time: Array
+    values: Array
+    lines: LineNumbers
+
+
+#: Returns where the columns stand, from the cells of the header and the number of cells of a row.
+Find = Callable[[Sequence[str] | None, int], ColumnLayout]
+
+
+def read_rows(
+    path: Path, find: Find, sample_hz: float | str | Fraction | None = None
+) -> tuple[RecordedRows, ColumnLayout]:
+    """Read columns of numbers.
+
+    Cells are separated by commas, semicolons, tabs or blanks. Lines before the header that begin with #, % or // are
+    comments; the last of them is the header if it names the columns.
+
+    Parameters
+    ----------
+    path : Path
+    find : callable
+        Returns the layout of the file.
+    sample_hz : number, optional
+        Sampling rate in Hz of a file without times.
+
+    Returns
+    -------
+    tuple of RecordedRows and ColumnLayout
+        Times in s; values as they stand.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is beyond bounds, a value is no finite number, a row has other columns than the
+        header, or the unit of the times is open.
+    """
+    reading = _Reading(path, find)
+    time, values, lines = Columns(1), Columns(3), LineNumbers()
+    for numbers, of_lines in reading.batches():
+        layout = reading.layout
+        if not time.rows and not values.rows:
+            values = Columns(len(layout.places) - layout.has_time)
+        lines.add(values.rows, of_lines)
+        if layout.has_time:
+            time.append(numbers[:, :1] * float(TIMES[layout.time_unit or "s"]))
+        values.append(numbers[:, int(layout.has_time) :])
+    if values.rows < 2:
+        raise InputError(f"{path} holds {counted(values.rows, 'row')} of numbers; at least 2 are needed")
+    layout = reading.layout
+    if sample_hz is not None:
+        step = 1 / float(checks.number("sample_hz", sample_hz, positive=True))
+        stamps = step * np.arange(values.rows, dtype=np.float64)
+    else:
+        stamps = time.array()[:, 0]
+    if layout.has_time and layout.time_unit is None:
+        _require_plausible(path, stamps)
+    return RecordedRows(stamps, values.array(), lines), layout
+
+
+def _require_plausible(path: Path, time: Array) -> None:
+    """Refuse times without a unit whose intervals are no gyro's in s."""
+    with np.errstate(over="ignore"):  # times that are too far apart are refused as such
+        median = float(np.median(np.abs(np.diff(time[: 1 << 12]))))
+    if _LONG_INTERVAL <= median < np.inf:
+        raise InputError(
+            f"{path}: the time states no unit and grows by {median:g} from row to row; --time-unit s, ms, us or ns "
+            "says what it is, or --sample-hz the sampling rate"
+        )
+
+
+class _Reading:
+    """The state of reading one file."""
+
+    def __init__(self, path: Path, find: Find) -> None:
+        self.path = path
+        self.find = find
+        self.layout = ColumnLayout((), 0)
+        self.separator: str | None = ","
+        self._is_begun = False
+
+    def batches(self) -> Iterator[tuple[Array, Sequence[int]]]:
+        """Yield rows of numbers, and the numbers of their lines."""
+        blocks = delimited.blocks(self.path)
+        first = 1
+        for block in blocks:
+            lines, number = self._begin(block, first) if not self._is_begun else (block, first)
+            numbers = self._plain(lines) if self._is_begun else None
+            if numbers is not None:
+                yield numbers, range(number, number + len(lines))
+            elif any('"' in line for line in lines):  # a cell in quotation marks may go on in the next block
+                yield from self._row_by_row(chain(lines, chain.from_iterable(blocks)), number)
+                return
+            else:
+                yield from self._row_by_row(iter(lines), number)
+            first += len(block)
+
+    def _begin(self, block: list[str], first: int) -> tuple[list[str], int]:
+        """Take comments and the header from a block; return the lines of data, and the number of the first."""
+        comment: str | None = None
+        for place, line in enumerate(block):
+            text = line.strip()
+            if not text:
+                continue
+            if text.startswith(_COMMENTS):
+                comment = text
+                continue
+            self.separator = next((mark for mark in _SEPARATORS if mark in text), None)
+            cells = self._cells(line)
+            self._is_begun = True
+            where = f"{self.path}, line {first + place}"
+            if not any(map(_resembles_number, cells)):
+                self._find(cells, len(cells), where)
+                return block[place + 1 :], first + place + 1
+            header = None if comment is None else self._cells(comment.lstrip("#%/ "))
+            self._find(header if header and len(header) == len(cells) else None, len(cells), where)
+            return block[place:], first + place
+        return [], first + len(block)
+
+    def _find(self, header: list[str] | None, width: int, where: str) -> None:
+        try:
+            self.layout = self.find(header, width)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+
+    def _cells(self, line: str) -> list[str]:
+        if self.separator is None:
+            return line.split()
+        cells = next(csv.reader([line], delimiter=self.separator), [])
+        return cells[:-1] if len(cells) > 1 and not cells[-1].strip() else cells
+
+    def _plain(self, block: list[str]) -> Array | None:
+        """Return a block in which every line is a row of plain numbers; None for any other."""
+        text = "".join(block)
+        if '"' in text or "_" in text or not text.isascii() or not block:
+            return None
+        mark, width = self.separator, self.layout.width
+        if any((len(line.split()) if mark is None else line.count(mark) + 1) != width for line in block):
+            return None
+        try:
+            numbers = np.loadtxt(block, delimiter=mark, usecols=self.layout.places, ndmin=2, comments=None)
+        except ValueError:
+            return None
+        return numbers if len(numbers) == len(block) and np.isfinite(numbers).all() else None
+
+    def _row_by_row(self, lines: Iterator[str], first: int) -> Iterator[tuple[Array, Sequence[int]]]:
+        if self.separator is None:
+            lines = (",".join(line.split()) + "\n" for line in lines)
+        rows = delimited.rows(self.path, lines, first, self.separator or ",")
+        while batch := list(islice(rows, _BATCH)):
+            numbers = [self._numbers(line, row) for line, row in batch]
+            yield np.array(numbers), [line for line, _ in batch]
+
+    def _numbers(self, line: int, row: list[str]) -> list[float]:
+        """Return the numbers of a row, which has as many cells as the header."""
+        width, where = self.layout.width, f"{self.path}, line {line}"
+        extra = row[width:]
+        if len(row) < width or any(cell.strip() for cell in extra):
+            comma = "; is the comma a decimal one?" if self.separator == "," and len(row) > width else ""
+            raise InputError(f"{where}: {counted(len(row), 'column')}; {width} are needed{comma}")
+        return [self._number(where, row, place) for place in self.layout.places]
+
+    def _number(self, where: str, row: list[str], place: int) -> float:
+        cell = row[place].strip()
+        if self.separator != "," and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell):
+            cell = cell.replace(",", ".")
+        number = checks.double(cell)
+        if not math.isfinite(number):
+            raise InputError(f"{where}: column {place + 1} is {cell!r}; a finite number is needed")
+        return number
+
+
+def _resembles_number(cell: str) -> bool:
+    """Return whether a cell is data: 1_0 is refused as a number, not skipped as a header."""
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True

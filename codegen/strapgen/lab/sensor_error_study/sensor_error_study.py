@@ -1,0 +1,221 @@
+"""Runs an algorithm many times on sensors with errors, and holds the scatter against its prediction in closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.velocity_increments import velocity_increments
+from strapgen.lab.sensor_errors import sensor_covariance
+from strapgen.lab.sensor_errors.instruments import InstrumentErrors
+from strapgen.lab.sensor_errors.sensor_covariance import Path
+from strapgen.lab.sensor_errors.sensors import MeasurementUnit, steady
+from strapgen.lab.simulate.runs import attitude, drift_between
+from strapgen.run.backends import Backend
+from strapgen.run.increments import windows
+
+Array = NDArray[np.float64]
+
+#: Records of a run, and most numbers of the increments of runs that are propagated together.
+_RECORDS, _TOGETHER = 50, 3_000_000
+#: Fewest runs that tell a standard deviation.
+FEWEST_RUNS = 10
+#: The quantile of the normal distribution at the ends of an interval of 95 %.
+_QUANTILE = 1.959963984540054
+#: All causes together.
+ALL = "all"
+
+
+@dataclass(frozen=True, eq=False)
+class SensorScatter:
+    """The error of the attitude that sensors cause, over many runs.
+
+    Parameters
+    ----------
+    cause : str
+        Which errors the sensors have: "all", or one of `CAUSES` alone.
+    runs : int
+        1 where all are the same.
+    time : array, (N,)
+        Times of the records in s, from after the start to the end.
+    mean, deviation : array, (N, 3)
+        Mean and standard deviation over the runs in rad, reference axes; what leads is positive.
+    low, high : array, (N, 3)
+        Interval of 95 % of the standard deviation.
+    predicted_mean, predicted : array, (N, 3)
+        Mean and standard deviation in closed form, to first order.
+    """
+
+    cause: str
+    runs: int
+    time: Array
+    mean: Array
+    deviation: Array
+    low: Array
+    high: Array
+    predicted_mean: Array
+    predicted: Array
+
+    @property
+    def mean_margin(self) -> Array:
+        """Half the width of the interval of 95 % of the mean, (N, 3)."""
+        if self.runs < 2:
+            return np.zeros_like(self.mean)
+        return student_quantile(self.runs - 1) * self.deviation / math.sqrt(self.runs)
+
+
+def student_quantile(degrees: int) -> float:
+    """Return the upper end of Student's distribution of so many degrees of freedom that leaves 2.5 % above.
+
+    It is the expansion by Fisher and Cornish, to 0.1 % from five degrees of freedom on.
+
+    Examples
+    --------
+    >>> round(student_quantile(9), 3), round(student_quantile(99), 3)
+    (2.262, 1.984)
+    """
+    z = _QUANTILE
+    terms = (
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+    )
+    return float(z + sum(term / degrees ** (k + 1) for k, term in enumerate(terms)))
+
+
+def deviation_interval(degrees: int) -> tuple[float, float]:
+    """Return the ends of the interval of 95 % of a standard deviation, as factors of the one that was measured.
+
+    The quantiles of chi-square are those of Wilson and Hilferty, to 0.5 % from nine degrees of freedom on.
+
+    Examples
+    --------
+    >>> [round(end, 2) for end in deviation_interval(99)]
+    [0.88, 1.16]
+    """
+    spread = 2 / (9 * degrees)
+    low, high = ((1 - spread + sign * _QUANTILE * math.sqrt(spread)) ** -1.5 for sign in (1, -1))
+    return low, high
+
+
+class SensorStudy:
+    """Runs of an algorithm on sensors with errors.
+
+    Parameters
+    ----------
+    backend : Backend
+        The algorithm; its step takes increments.
+    path : Path
+        The motion, the step and the records.
+    errors : InstrumentErrors
+
+    Raises
+    ------
+    InputError
+        If the sensors have no errors, or some that depend on a specific force that is zero.
+    """
+
+    def __init__(self, backend: Backend, path: Path, errors: InstrumentErrors) -> None:
+        if not any(errors.causes):
+            raise InputError("the sensors have no errors, so that all runs are the same")
+        if errors.needs_acceleration and not any(path.force):
+            raise InputError("the errors of the gyros depend on acceleration; a specific force is needed")
+        backend.need_increments()
+        self._backend, self._path, self._errors = backend, path, errors
+        count, beside = path.steps * backend.increments, (backend.previous, backend.ahead)
+        self._before = beside[0]
+        interval = path.step / backend.increments
+        self._interval = float(interval)
+        self._angle = path.motion.samples(interval, -beside[0], count + beside[1])
+        self._velocity = np.zeros_like(self._angle)
+        if any(path.force):
+            forward = velocity_increments(path.motion.attitude, path.force, interval, count + beside[1])
+            self._velocity[beside[0] :] = forward
+        self._reference = self._attitudes(self._angle[None])[0]
+
+    def rows(self, runs: int) -> Iterator[SensorScatter]:
+        """Yield the scatter of all causes together, and of each alone if there are several.
+
+        Parameters
+        ----------
+        runs : int
+            Runs of causes with random numbers.
+        """
+        causes = [*self._errors.causes]
+        spread = sensor_covariance.covariances(self._path, self._errors)
+        for cause in [ALL, *(causes if len(causes) > 1 else [])]:
+            alone = self._errors if cause == ALL else self._errors.only(cause)
+            of_cause = spread.values() if cause == ALL else [spread[cause]]
+            predicted = sum(np.diagonal(each, axis1=1, axis2=2) for each in of_cause)
+            yield self._scatter(cause, alone, runs, np.sqrt(predicted))
+
+    def _scatter(self, cause: str, errors: InstrumentErrors, runs: int, predicted: Array) -> SensorScatter:
+        same = {*sensor_covariance.STEADY} - ({*sensor_covariance.DRAWN} if errors.drawn else set())
+        count = 1 if {*errors.causes} <= same else runs
+        drifts = self._drifts(cause, errors, count)
+        mean = drifts.mean(axis=0)
+        deviation = drifts.std(axis=0, ddof=1) if count > 1 else np.zeros_like(mean)
+        low, high = deviation_interval(count - 1) if count > 1 else (1.0, 1.0)
+        path = self._path
+        time = np.arange(1, path.records + 1) * float(path.step * path.steps) / path.records
+        expected = sensor_covariance.error_mean(path, errors)
+        return SensorScatter(
+            cause, count, time, mean, deviation, low * deviation, high * deviation, expected, predicted
+        )
+
+    def _drifts(self, cause: str, errors: InstrumentErrors, count: int) -> Array:
+        """Return the errors of the attitude of all runs, (runs, records, 3) in rad.
+
+        Pulses alone would be no noise where the body turns by whole ones: they are what they add to white noise.
+        """
+        noise = self._errors.only("noise")
+        if cause == "pulses" and any(noise.causes):
+            both = self._errors.only("noise", "pulses")
+            pairs = zip(self._runs(both, count), self._runs(noise, count), strict=True)
+            return np.concatenate([one - other for one, other in pairs])
+        return np.concatenate([*self._runs(errors, count)])
+
+    def _runs(self, errors: InstrumentErrors, count: int) -> Iterator[Array]:
+        """Yield the errors of the attitude of some runs at a time, (runs, records, 3) in rad."""
+        together = max(1, _TOGETHER // self._angle.size)
+        for first in range(0, count, together):
+            rows = [self._measured(errors, run) for run in range(first, min(count, first + together))]
+            computed = self._attitudes(np.stack(rows))
+            # The drift is positive where the computed frame lags.
+            yield -drift_between(computed, self._reference)
+
+    def _measured(self, errors: InstrumentErrors, run: int) -> Array:
+        """Return the increments of a run; those from before it have the steady errors alone."""
+        unit, before = MeasurementUnit(errors, self._interval, run), self._before
+        row, _ = unit(self._angle[before:], self._velocity[before:])
+        if not before:
+            return row
+        history = MeasurementUnit(steady(unit.errors), self._interval)
+        return np.concatenate([history(self._angle[:before], self._velocity[:before])[0], row])
+
+    def _attitudes(self, rows: Array) -> Array:
+        """Return the attitudes of runs at the records, (runs, records, 3, 3)."""
+        backend, beside = self._backend, self._backend.previous + self._backend.ahead
+        cut: Any = np.stack([windows(row, backend.increments, beside) for row in rows])
+        states = backend.propagate(cut, self._path.steps // self._path.records)
+        return attitude(backend, states)[:, 1:]
+
+
+def records_of(steps: int) -> int:
+    """Return the number of records of a run: the largest up to 50 that divides its steps."""
+    return max(count for count in range(1, _RECORDS + 1) if steps % count == 0)
+
+
+def reach(path: Path, errors: InstrumentErrors) -> float:
+    """Return twice the largest magnitude of an element of the first run's increments in rad: what all runs may need."""
+    interval = path.step / path.choice.increments_per_step
+    angle = path.motion.samples(interval, 0, path.steps * path.choice.increments_per_step)
+    velocity = velocity_increments(path.motion.attitude, path.force, interval, len(angle))
+    row, _ = MeasurementUnit(errors, float(interval))(angle, velocity)
+    return 2 * float(np.abs(row).max())

@@ -1,0 +1,250 @@
+"""The errors of an inertial measurement unit as numbers in SI units: what a file of sensor errors says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir.notebook_display import short_repr
+
+Array = NDArray[np.float64]
+
+
+def zeros() -> Array:
+    """Return three zeros."""
+    return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class TriadErrors:
+    """Errors of three gyros, or of three accelerometers; u stands for rad, or for m/s.
+
+    Parameters
+    ----------
+    bias : array, (3,)
+        In u/s.
+    scale_plus, scale_minus : array, (3,)
+        Errors of the scale factors for increments above zero and below.
+    misalignment : array, (3, 3)
+        Angles in rad; row i, column j is what axis i senses of axis j. The diagonal is zero.
+    terms : mapping of str to float
+        Further coefficients of the kernel ``imu-errors`` by name, for instance "B_xx", in its units.
+    noise : array, (3,)
+        White noise of the rate (or the acceleration) in u/sqrt(s).
+    random_walk : array, (3,)
+        Random walk of the bias in u/s/sqrt(s).
+    pulse : array, (3,)
+        Quantum of the angle (or velocity) in u; 0 for none.
+    bandwidth_hz : array, (3,)
+        Natural frequency of the response, of second order, in Hz; infinite for none.
+    damping : array, (3,)
+        Damping ratio of the response.
+    delay : array, (3,)
+        In s.
+    """
+
+    bias: Array = field(default_factory=zeros)
+    scale_plus: Array = field(default_factory=zeros)
+    scale_minus: Array = field(default_factory=zeros)
+    misalignment: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    terms: Mapping[str, float] = field(default_factory=dict)
+    noise: Array = field(default_factory=zeros)
+    random_walk: Array = field(default_factory=zeros)
+    pulse: Array = field(default_factory=zeros)
+    bandwidth_hz: Array = field(default_factory=lambda: np.full(3, np.inf))
+    damping: Array = field(default_factory=lambda: np.full(3, 0.5**0.5))
+    delay: Array = field(default_factory=zeros)
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Errors of the samples, which all sensors share.
+
+    Parameters
+    ----------
+    jitter : float
+        Standard deviation of the instant of a sample in s.
+    lost : float
+        Probability that a sample is lost.
+    lost_as : str
+        What stands in the place of a lost sample: "late" for zero, with the increment in the next one, "repeat" for the
+        sample before, or "zero".
+    """
+
+    jitter: float = 0.0
+    lost: float = 0.0
+    lost_as: str = "late"
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, eq=False)
+class WarmUp:
+    """A rate that begins at switch-on, ``rate (1 - exp(-t/tau))``.
+
+    Parameters
+    ----------
+    rate : array, (3,)
+        Steady value in rad/s.
+    tau : array, (3,)
+        Time constant in s.
+    """
+
+    rate: Array = field(default_factory=zeros)
+    tau: Array = field(default_factory=lambda: np.ones(3))
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, eq=False)
+class Heating:
+    """Scale factors of torqued gyros that change with the heat of their torquers, see ``torquer-heating-errors``.
+
+    Parameters
+    ----------
+    gain : array, (3,)
+        Steady deviations of the scale factors in (rad/s)^-2.
+    tau : float
+        Time constant in s.
+    unbalance : float
+        Mass unbalance of the gyros in rad/s per m/s^2.
+    """
+
+    gain: Array = field(default_factory=zeros)
+    tau: float = 150.0
+    unbalance: float = 0.0
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, eq=False)
+class OutputNoise:
+    """Noise of an output whose sum stays bounded: ``b[n] = A b[n-1] + (1 - A)(w[n] - w[n-1])`` with white w.
+
+    Parameters
+    ----------
+    decay : float
+        A, from 0 to below 1.
+    rms : array, (3,)
+        Standard deviation of w in rad.
+    """
+
+    decay: float = 0.0
+    rms: Array = field(default_factory=zeros)
+
+    __repr__ = short_repr
+
+
+#: Causes of errors by name, in the order of the signal: what of `InstrumentErrors` each of them has.
+CAUSES: dict[str, tuple[str, ...]] = {
+    "bandwidth": ("bandwidth_hz", "damping"),
+    "delay": ("delay",),
+    "jitter": ("jitter",),
+    "bias": ("bias",),
+    "scale": ("scale_plus", "scale_minus"),
+    "misalignment": ("misalignment",),
+    "terms": ("terms",),
+    "warm-up": ("warm_up",),
+    "heating": ("heating",),
+    "noise": ("noise",),
+    "random walk": ("random_walk",),
+    "output noise": ("output_noise",),
+    "pulses": ("pulse",),
+    "lost samples": ("lost", "lost_as"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentErrors:
+    """All errors of an inertial measurement unit.
+
+    Parameters
+    ----------
+    title : str
+    gyro, accelerometer : TriadErrors
+    sampling : Sampling
+    warm_up : WarmUp
+    heating : Heating
+    output_noise : OutputNoise
+    drawn : bool
+        Whether bias, scale factors, misalignments and terms are standard deviations, from which every run draws its
+        values; otherwise they are the values.
+    seed : int
+        Of the random numbers.
+    """
+
+    title: str = ""
+    gyro: TriadErrors = TriadErrors()
+    accelerometer: TriadErrors = TriadErrors()
+    sampling: Sampling = Sampling()
+    warm_up: WarmUp = WarmUp()
+    heating: Heating = Heating()
+    output_noise: OutputNoise = OutputNoise()
+    drawn: bool = False
+    seed: int = 1
+
+    __repr__ = short_repr
+
+    def without(self, *causes: str) -> InstrumentErrors:
+        """Return the errors without some causes, names of `CAUSES`; the random numbers of the others stay the same.
+
+        Examples
+        --------
+        >>> noisy = InstrumentErrors(gyro=TriadErrors(bias=np.ones(3), noise=np.ones(3)))
+        >>> list(noisy.causes), list(noisy.without("noise").causes)
+        (['bias', 'noise'], ['bias'])
+        """
+        errors = self
+        for cause in causes:
+            for name in CAUSES[cause]:
+                errors = errors._reset(name)
+        return errors
+
+    def only(self, *causes: str) -> InstrumentErrors:
+        """Return the errors of some causes alone."""
+        return self.without(*(cause for cause in CAUSES if cause not in causes))
+
+    def _reset(self, name: str) -> InstrumentErrors:
+        """Return the errors with one number of all parts as in a perfect unit."""
+        if name in ("warm_up", "heating", "output_noise"):
+            return replace(self, **{name: getattr(_PERFECT, name)})
+        if name in Sampling.__dataclass_fields__:
+            return replace(self, sampling=replace(self.sampling, **{name: getattr(Sampling(), name)}))
+        perfect = getattr(TriadErrors(), name)
+        triads = {part: replace(getattr(self, part), **{name: perfect}) for part in ("gyro", "accelerometer")}
+        return replace(self, **triads)
+
+    @property
+    def causes(self) -> Iterator[str]:
+        """The causes of errors that are there."""
+        return (cause for cause in CAUSES if self._has(cause))
+
+    def _has(self, cause: str) -> bool:
+        triads = (self.gyro, self.accelerometer)
+        one_number = {
+            "jitter": self.sampling.jitter > 0,
+            "lost samples": self.sampling.lost > 0,
+            "warm-up": bool(self.warm_up.rate.any()),
+            "heating": bool(self.heating.gain.any()),
+            "output noise": bool(self.output_noise.rms.any()),
+            "bandwidth": any(np.isfinite(triad.bandwidth_hz).any() for triad in triads),
+            "terms": any(value for triad in triads for value in triad.terms.values()),
+        }
+        if cause in one_number:
+            return one_number[cause]
+        return any(getattr(triad, name).any() for triad in triads for name in CAUSES[cause])
+
+    @property
+    def needs_acceleration(self) -> bool:
+        """Whether errors of the gyros depend on the specific force."""
+        return any(value for name, value in self.gyro.terms.items() if name[0] in "BE") or (
+            bool(self.heating.gain.any()) and self.heating.unbalance > 0
+        )
+
+
+_PERFECT = InstrumentErrors()

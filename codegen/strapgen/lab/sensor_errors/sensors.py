@@ -1,0 +1,314 @@
+"""`MeasurementUnit` turns true increments into those of sensors with errors, part by part from the start of a run on.
+
+The deterministic errors are kernels of the catalogue at the true values: ``imu-errors``, ``pulse-errors`` and
+``gyro-pulse-errors`` for scale factors by sign, and ``torquer-heating-errors``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import short_repr
+from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
+from strapgen.lab.sensor_errors.response import Lag, SampleTimes, bounded_noise
+from strapgen.lab.sensor_errors.streams import Streams
+from strapgen.run.backends import evaluator
+
+Array = NDArray[np.float64]
+
+#: Labels of the elements of a full matrix of coefficients.
+_PLACES = [f"{row}{column}" for row in "xyz" for column in "xyz"]
+#: Causes that leave the errors of an increment a function of this increment alone.
+_STEADY = ("bias", "scale", "misalignment", "terms")
+#: Most pulses that can be counted, since a double represents every whole number up to here.
+_MOST_PULSES = 2.0**53
+
+
+class MeasurementUnit:
+    """The sensors of one run.
+
+    Parameters
+    ----------
+    errors : InstrumentErrors
+    interval : float
+        From sample to sample in s.
+    run : int, optional
+        Number of the run: each has random numbers of its own.
+
+    Examples
+    --------
+    >>> unit = MeasurementUnit(InstrumentErrors(gyro=TriadErrors(bias=np.array([1e-3, 0, 0]))), 0.01)
+    >>> unit(np.full((2, 3), 0.5))[0][:, 0] - 0.5
+    array([1.e-05, 1.e-05])
+    """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.errors.title or 'sensors with errors'}, a sample every {self._interval:g} s"
+
+    def __init__(self, errors: InstrumentErrors, interval: float, run: int = 0) -> None:
+        self._interval = interval
+        self._streams = Streams(errors.seed, run)
+        self.errors = _drawn(errors, self._streams) if errors.drawn else errors
+        self._causes = {*self.errors.causes}
+        gyro, accelerometer = self.errors.gyro, self.errors.accelerometer
+        self._gyro = _Triad(gyro, self.errors, "gyro", interval, self._streams)
+        self._accelerometer = _Triad(accelerometer, self.errors, "accelerometer", interval, self._streams)
+        self._heating = _Heating(self.errors, interval) if "heating" in self._causes else None
+        self._loss = _Loss(self.errors, self._streams) if "lost samples" in self._causes else None
+        self._samples = 0
+        self._bounded = (
+            [(bounded_noise(self.errors.output_noise.decay), np.zeros(2))] * 3
+            if "output noise" in self._causes
+            else []
+        )
+
+    def __call__(self, angle: Array, velocity: Array | None = None) -> tuple[Array, Array]:
+        """Return what the sensors measure.
+
+        Parameters
+        ----------
+        angle : array, (n, 3)
+            True angle increments after those of the call before, in rad, body axes.
+        velocity : array, (n, 3), optional
+            True velocity increments in m/s, body axes; by default they are zero.
+
+        Returns
+        -------
+        angle, velocity : array, (n, 3)
+        """
+        velocity = np.zeros_like(angle) if velocity is None else velocity
+        if not self._causes or not len(angle):
+            return angle, velocity
+        times = None if not {"delay", "jitter"} & self._causes else self._instants(len(angle))
+        angle, velocity = self._gyro.sampled(angle, times), self._accelerometer.sampled(velocity, times)
+        angle, velocity = self._by_kernels(angle, velocity)
+        if "warm-up" in self._causes:
+            angle = angle + self._warming(len(angle))
+        if self._heating is not None:
+            angle, velocity = self._heating(angle, velocity)
+        if "scale" in self._causes:
+            angle, velocity = self._gyro.scaled(angle), self._accelerometer.scaled(velocity)
+        angle, velocity = self._gyro.noisy(angle), self._accelerometer.noisy(velocity)
+        if "output noise" in self._causes:
+            angle = angle + self._output_noise(len(angle))
+        angle, velocity = self._gyro.counted(angle), self._accelerometer.counted(velocity)
+        if self._loss is not None:
+            angle, velocity = self._loss(angle, velocity)
+        self._samples += len(angle)
+        return angle, velocity
+
+    def _instants(self, count: int) -> Array:
+        """Return how far the instants of samples are from their times, in standard deviations, (n, 1)."""
+        if not self.errors.sampling.jitter:
+            return np.zeros((count, 1))
+        return self._streams.normal("jitter", count, 1)
+
+    def _by_kernels(self, angle: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return increments with biases, misalignments and terms."""
+        if not {"bias", "misalignment", "terms"} & self._causes:
+            return angle, velocity
+        gyro, accelerometer = self.errors.gyro, self.errors.accelerometer
+        values = {
+            **{f"D0_{axis}": bias for axis, bias in zip("xyz", gyro.bias, strict=True)},
+            **dict(zip((f"K_{place}" for place in _PLACES), gyro.misalignment.flat, strict=True)),
+            **{f"A0_{axis}": bias for axis, bias in zip("xyz", accelerometer.bias, strict=True)},
+            **dict(zip((f"M_{place}" for place in _PLACES), accelerometer.misalignment.flat, strict=True)),
+            **gyro.terms,
+            **accelerometer.terms,
+        }
+        errors = evaluator("imu-errors")
+        coefficients = [
+            np.array([values.get(name, 0.0) for name in signal.elements])
+            for signal in errors.function.inputs[4:]
+        ]
+        measured: tuple[Array, Array] = errors(
+            angle, velocity, self._interval, 1 / self._interval, *coefficients
+        )
+        return measured
+
+    def _warming(self, count: int) -> Array:
+        """Return the integrals of the warm-up rate over the next intervals."""
+        warm, begin = self.errors.warm_up, self._samples
+        time = np.arange(begin, begin + count)[:, None] * self._interval
+        # The integral of exp(-t/tau) over an interval is tau (1 - exp(-T/tau)) exp(-t/tau).
+        faded = -warm.tau * np.expm1(-self._interval / warm.tau) * np.exp(-time / warm.tau)
+        increments: Array = warm.rate * (self._interval - faded)
+        return increments
+
+    def _output_noise(self, count: int) -> Array:
+        white = self.errors.output_noise.rms * self._streams.normal("output noise", count)
+        noise = np.empty_like(white)
+        for axis, (recursion, state) in enumerate(self._bounded):
+            noise[:, axis], state = recursion.run(white[:, axis], state)
+            self._bounded[axis] = recursion, state
+        return noise
+
+
+def steady(errors: InstrumentErrors) -> InstrumentErrors:
+    """Return the errors that make of an increment something that depends on this increment alone."""
+    return errors.only(*_STEADY)
+
+
+class _Triad:
+    """Three gyros or accelerometers: their response, their noise and their pulses."""
+
+    def __init__(
+        self, triad: TriadErrors, errors: InstrumentErrors, name: str, interval: float, streams: Streams
+    ) -> None:
+        self._triad, self._name, self._interval, self._streams = triad, name, interval, streams
+        self._lag = (
+            Lag(triad.bandwidth_hz, triad.damping, interval)
+            if np.isfinite(triad.bandwidth_hz).any()
+            else None
+        )
+        self._times = SampleTimes(triad.delay, errors.sampling.jitter, interval)
+        self._drift = np.zeros((1, 3))
+        self._angle: Array | None = None
+        self._pulses = np.zeros((1, 3))
+
+    def sampled(self, row: Array, departures: Array | None) -> Array:
+        """Return increments of the limited bandwidth, at the instants of the samples."""
+        row = row if self._lag is None else self._lag(row)
+        if departures is None or not (self._triad.delay.any() or departures.any()):
+            return row
+        return self._times(row, departures)
+
+    def scaled(self, row: Array) -> Array:
+        """Return increments with the scale factors of their signs."""
+        plus, minus = self._triad.scale_plus, self._triad.scale_minus
+        if not (plus.any() or minus.any()):
+            return row
+        gyro = self._name == "gyro"
+        values = (0.0, 0.0) if gyro else (0.0, 0.0, 0.0)  # no bias, no offset, no error but by sign
+        kernel = evaluator("gyro-pulse-errors" if gyro else "pulse-errors")
+        return np.asarray(kernel(row, self._interval, *values, plus, minus))
+
+    def noisy(self, row: Array) -> Array:
+        """Return increments with white noise and with the random walk of the bias."""
+        triad, count, root = self._triad, len(row), self._interval**0.5
+        if triad.noise.any():
+            row = row + triad.noise * root * self._streams.normal(f"{self._name} noise", count)
+        if triad.random_walk.any():
+            # The walk w has steps K sqrt(T) n; its integral over one is T (w + K sqrt(T) (n/2 + m/sqrt(12))).
+            along = self._streams.normal(f"{self._name} walk", count)
+            beside = self._streams.normal(f"{self._name} walk inside", count)
+            strength = triad.random_walk * root
+            drift = np.cumsum(np.concatenate([self._drift, strength * along]), axis=0)
+            self._drift = drift[-1:]
+            row = row + self._interval * (drift[:-1] + strength * (along / 2 + beside / 12**0.5))
+        return row
+
+    def counted(self, row: Array) -> Array:
+        """Return increments in whole pulses; what is left of one goes into the next, and the first begins anywhere."""
+        pulse = self._triad.pulse
+        if not pulse.any():
+            return row
+        size = np.where(pulse > 0, pulse, 1.0)
+        if self._angle is None:
+            self._angle = (self._streams.uniform(f"{self._name} pulses", 1) - 0.5) * size
+        angle = np.cumsum(np.concatenate([self._angle, row]), axis=0)
+        counts = np.rint(angle[1:] / size)
+        if not np.abs(counts).max() < _MOST_PULSES:
+            raise InputError(
+                f"the pulse of the {self._name} is too small: a run has more than can be counted"
+            )
+        before, self._angle, self._pulses = self._pulses, angle[-1:], counts[-1:]
+        return np.where(pulse > 0, np.diff(counts, axis=0, prepend=before) * size, row)
+
+
+class _Heating:
+    """Gyros of the layout at 45 degrees whose torquers heat up, one sample after the other."""
+
+    def __init__(self, errors: InstrumentErrors, interval: float) -> None:
+        heating = errors.heating
+        self._torques, self._separate = evaluator("torques-45"), evaluator("separate-45")
+        self._step = evaluator("torquer-heating-errors")
+        # Without an unbalance the torques hold no acceleration, and the accelerometers are others.
+        self._alone = not heating.unbalance
+        self._unbalance = heating.unbalance or 1.0
+        self._constants = (-np.expm1(-interval / heating.tau), heating.gain, 1 / interval)
+        self._deviation = np.zeros(3)
+
+    def __call__(self, angle: Array, velocity: Array) -> tuple[Array, Array]:
+        sensed = np.zeros_like(velocity) if self._alone else velocity
+        torques = self._torques(angle, sensed, self._unbalance)
+        indicated = np.empty_like(torques)
+        for number, torque in enumerate(torques):
+            self._deviation, indicated[number] = self._step(self._deviation, torque, *self._constants)
+        rate, acceleration = self._separate(indicated, 1 / self._unbalance)
+        return rate, velocity if self._alone else acceleration
+
+
+class _Loss:
+    """Samples that do not arrive, gyros and accelerometers together."""
+
+    def __init__(self, errors: InstrumentErrors, streams: Streams) -> None:
+        self._sampling, self._streams = errors.sampling, streams
+        self._late = np.zeros(6)
+        self._last: Array | None = None
+
+    def __call__(self, angle: Array, velocity: Array) -> tuple[Array, Array]:
+        row = np.concatenate([angle, velocity], axis=1)
+        last = row[0] if self._last is None else self._last
+        lost = self._streams.uniform("lost samples", len(row), 1)[:, 0] < self._sampling.lost
+        result = np.where(lost[:, None], 0.0, row)
+        places = np.arange(len(row))
+        before = np.maximum.accumulate(np.where(lost, -1, places))  # the last that arrived; -1 for none
+        if self._sampling.lost_as == "repeat":
+            result = np.where((before < 0)[:, None], last, row[before])
+        elif self._sampling.lost_as == "late":
+            self._add_late(row, lost, result)
+        self._last = result[-1]
+        return result[:, :3], result[:, 3:]
+
+    def _add_late(self, row: Array, lost: NDArray[np.bool_], result: Array) -> None:
+        """Add what was lost to the next sample that arrives."""
+        if not lost[0]:
+            result[0] += self._late
+            self._late = np.zeros(6)
+        for place in np.flatnonzero(lost):
+            self._late = self._late + row[place]
+            if place + 1 < len(row) and not lost[place + 1]:
+                result[place + 1] += self._late
+                self._late = np.zeros(6)
+
+
+def _drawn(errors: InstrumentErrors, streams: Streams) -> InstrumentErrors:
+    """Return errors whose constants are drawn from the normal distributions that were stated."""
+
+    def drawn(name: str, values: Array) -> Array:
+        if not values.any():
+            return values
+        return values * streams.normal(name, 1, values.size).reshape(values.shape)
+
+    def triad(part: TriadErrors, name: str) -> TriadErrors:
+        plus, minus = part.scale_plus, part.scale_minus
+        drawn_plus = drawn(f"{name} scale", plus)
+        other = drawn(f"{name} scale of the other sign", minus) if (plus != minus).any() else minus
+        return replace(
+            part,
+            bias=drawn(f"{name} bias", part.bias),
+            scale_plus=drawn_plus,
+            scale_minus=np.where(plus == minus, drawn_plus, other),
+            misalignment=drawn(f"{name} misalignment", part.misalignment),
+            terms=_drawn_terms(part.terms, streams),
+        )
+
+    return replace(
+        errors,
+        drawn=False,
+        gyro=triad(errors.gyro, "gyro"),
+        accelerometer=triad(errors.accelerometer, "accelerometer"),
+    )
+
+
+def _drawn_terms(terms: Mapping[str, float], streams: Streams) -> dict[str, Any]:
+    return {name: value * float(streams.normal(name, 1, 1)[0, 0]) for name, value in terms.items()}

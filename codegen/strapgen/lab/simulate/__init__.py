@@ -1,0 +1,1 @@
+"""Runs of an algorithm along a motion, on any back end."""

@@ -1,0 +1,103 @@
+"""Options of a run on a motion or a recording: its start, its intervals, and where its result goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from strapgen.cli.options import option
+from strapgen.cli.output import Output, format_option, plot_option
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+_Text = str | None
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of the attitude at the start, and of the times between orthonormalizations and between records."""
+
+    panel: ClassVar[str] = "Run"
+
+    orthonormalize: Annotated[
+        _Text,
+        option(
+            "--orthonormalize",
+            metavar="S",
+            help="Time from one orthonormalization to the next in s.  [default: never]",
+        ),
+    ] = None
+    scheme: Annotated[
+        _Text,
+        option(
+            "--scheme",
+            metavar="NAME",
+            help="Kernel that orthonormalizes; strapgen list kernels shows all.  [default: the thesis's scheme]",
+        ),
+    ] = None
+    record: Annotated[
+        _Text,
+        option(
+            "--record",
+            metavar="S",
+            help="Time from one record to the next in s; it must divide the duration.  [default: every step]",
+        ),
+    ] = None
+    initial: Annotated[
+        _Text,
+        option(
+            "--initial-deg",
+            metavar="R,P,H",
+            help="Roll, pitch and heading at the start of a motion in deg.  [default: zero rotation]",
+        ),
+    ] = None
+
+    def start(self) -> Any:
+        """Return the matrix at the start of a run, (3, 3); None for zero rotation."""
+        if self.initial is None:
+            return None
+        import numpy as np
+
+        from strapgen.run.backends import evaluator
+
+        angles = [checks.number("initial-deg", part) for part in self.initial.split(",")]
+        if len(angles) != 3:
+            raise InputError(
+                f"--initial-deg is {self.initial!r}; three numbers with commas between are needed"
+            )
+        return evaluator("dcm-from-euler-angles")(np.radians([float(angle) for angle in angles]))
+
+
+@dataclass(frozen=True)
+class RunOutput(Output):
+    """Where the result of a run goes; without --format, the attitude along a recording is CSV."""
+
+    plot: Annotated[Path | None, plot_option("the plots")] = None
+    format: Annotated[_Text, format_option(Output.formats, "  [default: text; csv for recorded data]")] = None
+    title: Annotated[
+        _Text, option("--title", metavar="TEXT", help="Title of the text, and of the plots.")
+    ] = None
+    print_every: Annotated[
+        _Text,
+        option(
+            "--print",
+            metavar="S",
+            help="Time in s from one print of the matrices to the next in the text.  [default: at the end alone]",
+        ),
+    ] = None
+    matrices: Annotated[
+        bool, option("--matrices", help="Add the computed and the true matrices to the JSON output.")
+    ] = False
+
+    def check_motion(self, motion: _Text) -> None:
+        """Check the options that go with a motion, and with one format."""
+        stated = {"--matrices": self.matrices, "--print": self.print_every is not None}
+        for name in (name for name, value in stated.items() if value and motion is None):
+            raise InputError(f"{name} goes with --motion")
+        if self.matrices and self.format != "json":
+            raise InputError("--matrices goes with --format json; --format csv has the matrices")
+        if self.print_every is not None and self.format not in (None, "text"):
+            raise InputError(f"--print goes with text, not with --format {self.format}")
+        if self.title is not None and not self.title.isprintable():
+            raise InputError(f"--title is {self.title!r}; one line of text is needed")

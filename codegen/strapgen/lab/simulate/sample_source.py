@@ -1,0 +1,400 @@
+"""Options that say where the increments of a run come from: a motion, a recording of increments or one of rates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import typer
+
+from strapgen.cli.options import option
+from strapgen.cli.progress import say_unused, waiting
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.sensor_errors.sensor_options import SensorFile, force_of, read_errors, with_errors
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from strapgen.lab.motions.motions import Motion
+    from strapgen.lab.recordings.recording import Recording
+    from strapgen.lab.sensor_errors.instruments import InstrumentErrors
+
+_Text = str | None
+
+#: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
+MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
+RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
+#: What --motion takes beside these names.
+MOTION_FILE = ", or a Python file of your own"
+MotionSettings = Annotated[
+    list[str] | None,
+    option(
+        "--set",
+        metavar="KEY=VALUE...",
+        help="Parameters of the motion; strapgen list motions shows their names.",
+        panel="Input",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Increments of a run, and the truth where it is known.
+
+    Parameters
+    ----------
+    increments : array, (N, K, 3)
+        In rad.
+    truth : array, (1 + N, 3, 3), or None
+    step : float
+        In s.
+    title : str
+        Where they come from, in words for a reader.
+    """
+
+    increments: NDArray[Any]
+    truth: NDArray[Any] | None
+    step: float
+    title: str
+
+
+@dataclass(frozen=True)
+class SampleSource:
+    """Options that say where a run takes its increments from."""
+
+    panel: ClassVar[str] = "Input"
+
+    motion: Annotated[
+        _Text, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.")
+    ] = None
+    settings: MotionSettings = None
+    step: Annotated[_Text, option("--step", metavar="S", help="Step length in s.")] = None
+    duration: Annotated[_Text, option("--duration", metavar="S", help="Duration of each run in s.")] = None
+    increments_csv: Annotated[
+        Path | None,
+        option(
+            "--increments-csv",
+            metavar="FILE",
+            help="CSV file of increments, in place of a motion: columns t in s, and dx, dy, dz in rad.",
+        ),
+    ] = None
+    rates_csv: Annotated[
+        Path | None,
+        option(
+            "--rates-csv",
+            metavar="FILE",
+            help="CSV file of rates, in place of a motion; its header names the time, three rates and their units.",
+        ),
+    ] = None
+    rate_unit: Annotated[
+        _Text,
+        option(
+            "--rate-unit",
+            metavar="UNIT",
+            help="Unit of the rates in --rates-csv where the header has none: rad/s, deg/s, dps or mdps.",
+        ),
+    ] = None
+    columns: Annotated[
+        _Text,
+        option(
+            "--columns",
+            metavar="NAME,...",
+            help="Names or numbers of the columns in --rates-csv where the header leaves them open: the time and three "
+            "rates, or with --sample-hz the rates.",
+        ),
+    ] = None
+    time_unit: Annotated[
+        _Text,
+        option(
+            "--time-unit",
+            metavar="UNIT",
+            help="Unit of the times in --rates-csv where the header has none: s, ms, us or ns.",
+        ),
+    ] = None
+    sample_hz: Annotated[
+        _Text,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Samples of the gyro in a second, in place of times in --rates-csv.",
+        ),
+    ] = None
+    bridge_gaps: Annotated[
+        bool,
+        option(
+            "--bridge-gaps",
+            help="With --resample-hz, take the rate in --rates-csv as linear across gaps too, and say where.",
+        ),
+    ] = False
+    drop_repeated: Annotated[
+        bool,
+        option(
+            "--drop-repeated",
+            help="Leave out rows of --rates-csv with the time of the row before, and say so.",
+        ),
+    ] = False
+    resample_hz: Annotated[
+        _Text,
+        option(
+            "--resample-hz",
+            metavar="HZ",
+            help="Integrate unevenly timed rates over an even grid of this frequency in Hz.",
+        ),
+    ] = None
+    pulse_arcsec: Annotated[
+        _Text,
+        option(
+            "--pulse-arcsec",
+            metavar="ARCSEC",
+            help="Angle of a gyro pulse in arc seconds; increments become whole pulses, the rest goes into the next.",
+        ),
+    ] = None
+
+    specific_force: Annotated[
+        _Text,
+        option(
+            "--specific-force",
+            metavar="X,Y,Z",
+            help="Specific force in m/s^2, constant in reference axes: on a described system, or on sensors with "
+            "--errors.  [default: 0,0,0]",
+        ),
+    ] = None
+    errors: SensorFile = None
+
+    @property
+    def stated(self) -> bool:
+        """Whether any of the options is stated."""
+        return any(getattr(self, field.name) not in (None, False) for field in fields(self))
+
+    def check(self, of_system: bool = False) -> None:
+        """Check that there is one source of increments, with the options that go with it and no others.
+
+        Parameters
+        ----------
+        of_system : bool, optional
+            Whether a described system runs, which states its rate itself.
+        """
+        felt = of_system or self.errors is not None
+        if self.specific_force is not None and not (felt and self.motion is not None):
+            raise InputError("--specific-force goes with a described system or --errors, and with --motion")
+        from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+
+        check_motion(self.motion, RUN_MOTIONS)
+        sources = {
+            "--motion": self.motion,
+            "--increments-csv": self.increments_csv,
+            "--rates-csv": self.rates_csv,
+        }
+        chosen = [name for name, value in sources.items() if value is not None]
+        if len(chosen) != 1:
+            raise InputError(f"one of {', '.join(sources)} is needed; {' and '.join(chosen) or 'none'} given")
+        times = {"--step": self.step, "--duration": self.duration}
+        if self.motion is None:
+            _refuse({"--set": self.settings, **times}, "--motion", chosen[0])
+        elif missing := [
+            name for name, value in times.items() if value is None and not (of_system and name == "--step")
+        ]:
+            raise InputError(f"--motion needs {missing[0]} in s")
+        if self.rates_csv is None:
+            names = (
+                "rate_unit",
+                "resample_hz",
+                "columns",
+                "time_unit",
+                "sample_hz",
+                "bridge_gaps",
+                "drop_repeated",
+            )
+            rates = {f"--{name.replace('_', '-')}": getattr(self, name) or None for name in names}
+            _refuse(rates, "--rates-csv", chosen[0])
+
+    @property
+    def file(self) -> Path:
+        """The file of recorded data."""
+        return self.increments_csv or self.rates_csv or Path()
+
+    @property
+    def pulse(self) -> float | None:
+        """The angle of a gyro pulse in rad."""
+        from strapgen.ir import checks
+
+        if self.pulse_arcsec is None:
+            return None
+        return math.radians(float(checks.number("pulse_arcsec", self.pulse_arcsec, positive=True)) / 3600)
+
+    def profile(self, start: Any = None) -> Motion:
+        """Return the motion with its parameters, as sensors measure it if they have errors.
+
+        A motion of a file is checked over the duration of the run.
+
+        Parameters
+        ----------
+        start : array, (3, 3), optional
+            Attitude at the start, body to reference; by default there is no rotation.
+        """
+        from strapgen.lab.motions.users_motions import any_motion
+
+        true = any_motion(self.motion or "", self.duration or "", pairs(self.settings or []))
+        errors = self.sensor_errors()
+        if errors is None:
+            return true
+        from strapgen.lab.sensor_errors.measured_motions import measured
+
+        force = None if self.specific_force is None else force_of(self.specific_force)
+        return measured(true, errors, force=force, start=start)
+
+    def sensor_errors(self) -> InstrumentErrors | None:
+        """Return the errors of the sensors; None without a file."""
+        errors = read_errors(self.errors)
+        if errors is not None and self.pulse_arcsec is not None and errors.gyro.pulse.any():
+            raise InputError("--pulse-arcsec and the pulse in --errors are both there; one of them is needed")
+        return errors
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a report says of the sensors: nothing, unless they have errors."""
+        return {} if self.errors is None else {"errors": self.errors}
+
+    def described(self, name: str, noun: str = "") -> str:
+        """Return the name of the motion with its parameters, for a title."""
+        words = ", ".join(self.settings or [])
+        return f"{name}{noun} ({words})" if words else f"{name}{noun}"
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """The files that the options name."""
+        of_motion = Path(self.motion) if self.motion is not None and is_file(self.motion) else None
+        return self.increments_csv, self.rates_csv, of_motion, Path(self.errors) if self.errors else None
+
+    def times(self) -> tuple[Fraction, Fraction]:
+        """Return the step and the duration of a run on a motion in s."""
+        from strapgen.ir import checks
+
+        return (
+            checks.number("step", self.step or "", positive=True),
+            checks.number("duration", self.duration or "", positive=True),
+        )
+
+    def recording(self) -> Recording:
+        """Read the recorded data."""
+        from strapgen.lab.recordings import recording
+
+        errors = self.sensor_errors()
+        with waiting(f"reading {self.file.name}"):
+            data = (
+                recording.read_rates(
+                    self.rates_csv or "",
+                    self.rate_unit,
+                    self.resample_hz,
+                    columns=self.columns,
+                    time_unit=self.time_unit,
+                    sample_hz=self.sample_hz,
+                    bridge_gaps=self.bridge_gaps,
+                    drop_repeated=self.drop_repeated,
+                )
+                if self.increments_csv is None
+                else recording.read_increments(self.increments_csv)
+            )
+        for remark in data.remarks:
+            typer.echo(f"strapgen: {self.file}: {remark}", err=True)
+        return with_errors(data, errors)
+
+    def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
+        """Return the increments that the options describe.
+
+        Parameters
+        ----------
+        samples : int
+            Increments of a step.
+        previous, ahead : int
+            Increments from before the step and from after it that it takes as well.
+
+        Returns
+        -------
+        Inputs
+
+        Raises
+        ------
+        InputError
+            If the motion or the file cannot be used, or does not fill a step.
+        """
+        from strapgen.run.increments import pulses
+
+        pulse = self.pulse
+        read = (self._recorded if self.motion is None else self._computed)(samples, previous, ahead)
+        if pulse is None:
+            return read
+        return Inputs(pulses(read.increments, pulse, previous + ahead), read.truth, read.step, read.title)
+
+    def _computed(self, samples: int, previous: int, ahead: int) -> Inputs:
+        import numpy as np
+
+        from strapgen.ir import checks
+
+        profile = self.profile()
+        step, duration = self.times()
+        steps = checks.multiple("duration", duration, "step", step)
+        increments, length = profile.increments(step, steps, samples, previous, ahead), float(step)
+        truth = profile.attitude(np.arange(1 + steps) * length)
+        return Inputs(
+            increments,
+            truth,
+            length,
+            f"{self.described(self.motion or '', ' motion')}, {steps} steps of {self.step} s",
+        )
+
+    def _recorded(self, samples: int, previous: int, ahead: int) -> Inputs:
+        from strapgen.run.increments import windows
+
+        data = self.recording()
+        beside = previous + ahead
+        steps = max(0, len(data.increments) - beside) // samples
+        if steps < 1:
+            raise InputError(
+                f"the recording holds {len(data.increments)} increments; a step needs {samples + beside}"
+            )
+        say_unused(self.file, len(data.increments) - beside - steps * samples, samples)
+        increments = windows(data.increments[: beside + steps * samples], samples, beside)
+        length = data.interval * samples
+        return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
+
+
+def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"{name} goes with {owner}, not with {chosen}")
+
+
+def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> None:
+    """Check that a motion, if one is named, is of the catalogue or a file.
+
+    Parameters
+    ----------
+    name : str or None
+    further : mapping, optional
+        Motions that are allowed beside those with a closed form.
+    """
+    from strapgen.ir import checks
+
+    if name is not None and not is_file(name):
+        from strapgen.catalogue import MOTIONS
+
+        checks.choice("motion", name, {**MOTIONS, **(further or {})})
+
+
+def pairs(settings: list[str], option: str = "--set") -> dict[str, str]:
+    """Read settings of the form key=value."""
+    values: dict[str, str] = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals or not key:
+            raise InputError(f"{option} {setting!r} is no setting; key=value is needed")
+        if key in values:
+            raise InputError(f"{option} {key} is given twice")
+        values[key] = value
+    return values

@@ -1,0 +1,204 @@
+"""The command ``strapgen simulate`` runs one algorithm on a motion or a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
+
+from strapgen import applications
+from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm, one
+from strapgen.cli.progress import say_unused
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.described import described
+from strapgen.lab.simulate.run_options import RunOptions, RunOutput
+from strapgen.lab.simulate.sample_source import SampleSource
+
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+    from strapgen.run.backends import Backend
+
+_Text = str | None
+
+
+@grouped
+def simulate(
+    algorithm: RunAlgorithm,
+    *,
+    method: Annotated[MethodOptions, Shown(only=(*STEP_OPTIONS, "rates"))],
+    backend: OneBackend = "numpy",
+    source: SampleSource,
+    intervals: RunOptions,
+    fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
+    output: RunOutput,
+) -> None:
+    """Run an algorithm on a motion, or on recorded gyro data.
+
+    The true attitude of a motion is known, so that you see the drift, scale and skew of the computed attitude; along a
+    recording you see the attitude itself.
+
+    With --errors the algorithm takes what sensors with errors measure, and the truth stays that of the motion.
+
+    A file of a motion of your own has functions increments and attitude, which are checked against each other. With
+    --rates the step takes the rate itself, so that you see what its extraction from increments costs.
+
+    Recorded times must be evenly spaced unless you give --resample-hz. The rate is then taken as linear from one sample
+    to the next, across intervals of up to ten times the median.
+
+    Fixed-point formats are chosen for the increments of the run, or for --max-rate-deg-s if you give it.
+
+    Example: strapgen simulate euler --method rk4 --increments 2 --backend c --motion coning --set a_deg_s=10 b_deg_s=10
+    g_deg_s=10 --step 0.125 --duration 180 --orthonormalize 5 --record 5
+
+    A described system, a built-in one or a file, runs at the rate that it states, or at that of --step; the navigation
+    frame rests.
+
+    Example: strapgen simulate dcm --backend c --rates-csv gyro.csv --rate-unit deg/s --resample-hz 100
+    --out out/attitude.csv
+    """
+    if (others := described(algorithm)) is not None:
+        return others.simulate(algorithm, method, backend, source, intervals, fixed, output)
+    choice = method.choose(algorithm)
+    from strapgen.run.backends import BACKENDS
+
+    one("--backend", backend)
+    checks.choice("backend", backend, BACKENDS)
+    output.check(algorithm, *method.files, *source.files)
+    source.check()
+    output.check_motion(source.motion)
+    if source.motion is None:
+        stated = {"--rates": method.rates, "--initial-deg": intervals.initial is not None}
+        for name in (name for name, value in stated.items() if value):
+            raise InputError(f"{name} goes with --motion")
+    fixed.check_backend(backend)
+    fixed.check_pulse(source.pulse_arcsec)
+
+    import numpy as np
+
+    from strapgen.run import backends
+
+    def build(seconds: float, largest: Callable[[], float]) -> Backend:
+        settings = fixed.settings_for_run(backend, choice.increments_per_step, seconds, largest)
+        return backends.backend(
+            choice, backend=backend, orthonormalization=intervals.scheme, settings=settings
+        )
+
+    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+        if source.motion is None:
+            _on_recording(build, choice, source, intervals, output)
+        else:
+            _on_motion(build, choice, source, intervals, output)
+
+
+#: Most records that are written: the text of one takes some hundred bytes.
+_MOST_RECORDS = 2_000_000
+
+
+def _refuse_many(steps: float, step: float, record: _Text) -> None:
+    """Refuse a run of more records than can be written, before it begins."""
+    interval = 0.0 if record is None else float(checks.number("record", record, positive=True))
+    records = steps / max(1.0, interval / step)
+    if _MOST_RECORDS < records <= checks.MOST:  # more steps than that are refused as such
+        raise InputError(
+            f"{records:.0f} records are too many, up to {_MOST_RECORDS} are written; --record S thins them"
+        )
+
+
+_Build = Callable[[float, Callable[[], float]], "Backend"]
+
+
+def _on_motion(
+    build: _Build,
+    choice: Choice,
+    source: SampleSource,
+    intervals: RunOptions,
+    output: RunOutput,
+) -> None:
+    """Simulate, and deliver the run."""
+    from strapgen.cli.progress import waiting
+    from strapgen.lab.simulate import runs
+    from strapgen.lab.simulate.runs_plot import run_image
+    from strapgen.lab.simulate.runs_report import RunLayout, run_report, step_facts
+
+    pulse, step, duration = source.pulse, source.step or "", source.duration or ""
+    length = float(checks.number("step", step, positive=True))
+    _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
+    every = _prints(output.print_every, intervals.record or step)
+    start = intervals.start()
+    profile = source.profile(start)
+    samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
+
+    def largest() -> float:
+        if choice.increments is None:
+            from strapgen import catalogue
+
+            nodes = [float(node) for node in catalogue.nodes(choice)]
+            return runs.largest_turn(profile, step, duration, nodes)
+        return runs.largest_increment(profile, step, duration, samples, pulse, beside)
+
+    backend = build(length, largest)
+    pulse = pulse or backend.count
+    with waiting(f"running {backend.kernel}"):
+        run = runs.simulate(
+            backend, profile, step, duration, intervals.orthonormalize, intervals.record, pulse, start
+        )
+    facts = step_facts(backend, choice) | {
+        "motion": profile.name,
+        "step_s": float(checks.number("step", step)),
+        "duration_s": float(checks.number("duration", duration)),
+    }
+    facts |= {} if intervals.initial is None else {"initial_deg": intervals.initial}
+    facts |= source.facts
+    title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
+    shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
+    output.report(run_report(run, facts, shown), lambda path: run_image(run, output.title or title, path))
+
+
+def _prints(every: _Text, record: str) -> int | None:
+    """Return how many records lie between two prints of the matrices."""
+    if every is None:
+        return None
+    interval = checks.number("print", every, positive=True)
+    return checks.multiple(
+        "print", interval, "record interval", checks.number("record", record, positive=True)
+    )
+
+
+def _on_recording(
+    build: _Build, choice: Choice, source: SampleSource, intervals: RunOptions, output: RunOutput
+) -> None:
+    """Propagate recorded data, and deliver the attitude."""
+    from strapgen.cli.progress import waiting
+    from strapgen.lab.recordings import recording
+    from strapgen.lab.simulate.runs_plot import history_image
+    from strapgen.lab.simulate.runs_report import history_report, step_facts
+
+    pulse = source.pulse
+    data = source.recording()
+    length = data.interval * choice.increments_per_step
+    _refuse_many(len(data.increments) / choice.increments_per_step, length, intervals.record)
+    backend = build(length, lambda: data.largest + (pulse or 0.0))
+    pulse = pulse or backend.count
+    with waiting(f"running {backend.kernel}"):
+        options = (intervals.orthonormalize, intervals.record, pulse)
+        whole = (
+            one for one in applications.extensions("lab.whole-recordings") if one.covers(choice, backend.name)
+        )
+        if (runner := next(whole, None)) is not None:
+            history = runner.propagate_whole(choice, backend.name, data, *options)
+        else:
+            history = recording.propagate(backend, data, *options)
+    say_unused(source.file, history.unused, choice.increments_per_step)
+    title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
+    facts = step_facts(backend, choice) | {"source": str(source.file)} | source.facts
+    replace(output, format=output.format or "csv").report(
+        history_report(
+            history,
+            backend.elements,
+            ({"title": output.title} if output.title else {}) | facts,
+        ),
+        lambda path: history_image(history, backend.elements, output.title or title, path),
+    )

@@ -1,0 +1,1 @@
+"""What studies share: workers, clusters, results that a later run takes up."""

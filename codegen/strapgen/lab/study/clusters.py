@@ -1,0 +1,273 @@
+"""Runs independent cases on the workers of a Dask cluster, on this machine or on others.
+
+A worker gets what a case is, and the files of the user's that it names, with their digest; never what is compiled. It
+generates and builds once, in a cache of its own. It refuses a case of another version of the code.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import threading
+import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol, cast
+
+from strapgen.ir.exceptions import InputError, MissingExtraError, StrapgenError
+from strapgen.storage import cache
+
+#: Cases that a worker has before it at any time, so that many cases do not fill the scheduler.
+_AHEAD = 4
+#: Times a case is given out again after its worker died.
+_AGAIN = 20
+#: Seconds in which a scheduler must answer.
+_PATIENCE_S = 20
+#: Most workers on this machine.
+_MOST_WORKERS = 256
+#: Arithmetic in many digits has its precision in common: a process runs one case at a time.
+_one_at_a_time = threading.Lock()
+#: Folders with files of the user's, by their digest.
+_folders: dict[str, TemporaryDirectory[str]] = {}
+
+
+class Movable(Protocol):
+    """A case that names files of the user's."""
+
+    def moved(self, begin: Path, end: Path) -> Any:
+        """Return the case with its files in the folder `end`, in place of the folder `begin`."""
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Files of the user's that cases name.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder that holds them all.
+    contents : dict of str to bytes
+        What they hold, by their paths in it.
+    """
+
+    folder: Path
+    contents: dict[str, bytes]
+
+    @classmethod
+    def of(cls, paths: Iterable[str | Path]) -> Bundle | None:
+        """Return files with the folder that holds them all; None if there are none.
+
+        Raises
+        ------
+        InputError
+            If one cannot be read.
+        """
+        files = [Path(path).resolve() for path in paths]
+        if not files:
+            return None
+        folder = Path(os.path.commonpath([file.parent for file in files]))
+        contents = {}
+        for file in files:
+            try:
+                contents[file.relative_to(folder).as_posix()] = file.read_bytes()
+            except OSError as error:
+                raise InputError(f"{file} cannot be read ({error.strerror})") from None
+        return cls(folder, contents)
+
+
+def moved(path: str, begin: Path, end: Path) -> str:
+    """Return the path of a file that was in one folder and is in another."""
+    return str(end / Path(path).resolve().relative_to(begin))
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Where the workers are.
+
+    Parameters
+    ----------
+    scheduler : str
+        Address of a Dask scheduler, as "tcp://10.0.0.7:8786"; empty for workers on this machine.
+    workers : int
+        Number of workers on this machine.
+    """
+
+    scheduler: str = ""
+    workers: int = 0
+
+    @classmethod
+    def of(cls, scheduler: str | None, cluster: str | None) -> Cluster | None:
+        """Return the cluster that two options state; None if neither does.
+
+        Parameters
+        ----------
+        scheduler : str or None
+            The address of a scheduler.
+        cluster : str or None
+            "local:N" for N workers on this machine.
+
+        Raises
+        ------
+        InputError
+            If both are stated, or one has another form.
+
+        Examples
+        --------
+        >>> Cluster.of(None, "local:2")
+        Cluster(scheduler='', workers=2)
+        """
+        if scheduler is not None and cluster is not None:
+            raise InputError("--scheduler and --cluster are both given; one is needed")
+        if scheduler is not None:
+            if not re.fullmatch(r"(tcp|tls|ws|wss)://[^\s/]+:[0-9]{1,5}", scheduler):
+                raise InputError(
+                    f"scheduler is {scheduler!r}; an address such as tcp://10.0.0.7:8786 is needed"
+                )
+            return cls(scheduler)
+        if cluster is None:
+            return None
+        match = re.fullmatch(r"local:([0-9]{1,3})", cluster)
+        if not match or not 1 <= int(match[1]) <= _MOST_WORKERS:
+            raise InputError(f"cluster is {cluster!r}; local:N with N from 1 to {_MOST_WORKERS} is needed")
+        return cls(workers=int(match[1]))
+
+
+def on_cluster(
+    work: Callable[[Any], Any],
+    cases: Mapping[str, Any],
+    cluster: Cluster,
+    files: Bundle | None = None,
+) -> Iterator[tuple[str, Any]]:
+    """Run cases on a cluster, and yield each result when its case ends.
+
+    Parameters
+    ----------
+    work : callable
+        ``work(case)`` returns the result of a case; a function of a module of this package.
+    cases : mapping of str to object
+        What each case needs, by its name.
+    cluster : Cluster
+    files : Bundle, optional
+        Files that the cases name; the cases are then `Movable`.
+
+    Yields
+    ------
+    name : str
+    result : object
+
+    Raises
+    ------
+    MissingExtraError
+        If Dask is not installed.
+    StrapgenError
+        If the scheduler does not answer or is gone, a worker has another version of the code, or a case kills every
+        worker. What `work` raises is raised here.
+    """
+    distributed = _distributed()
+    run = uuid.uuid4().hex  # results of an earlier run are not taken for those of this one
+    lost = (OSError, TimeoutError, distributed.comm.CommClosedError, distributed.CancelledError)
+    # Workers that this process starts have its own code.
+    digest, waiting = cache.generator_digest() if cluster.scheduler else "", iter(cases)
+    with _client(distributed, cluster) as client:
+        finished = distributed.as_completed(loop=client.loop)
+        names: dict[Any, tuple[str, int]] = {}
+
+        def give(name: str, times: int) -> None:
+            key = f"{run}-{name}-{times}"
+            future = client.submit(_remote, work, cases[name], digest, files, key=key, pure=False)
+            names[future] = name, times
+            finished.add(future)
+
+        try:
+            workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+            for name in islice(waiting, workers * _AHEAD):
+                give(name, 0)
+            for future in finished:
+                name, times = names.pop(future)
+                try:
+                    result = future.result()
+                except distributed.KilledWorker:
+                    if times >= _AGAIN:
+                        raise StrapgenError(f"case {name} ends every worker; it needs more memory") from None
+                    give(name, times + 1)
+                    continue
+                yield name, result
+                for following in islice(waiting, 1):
+                    give(following, 0)
+        except lost:
+            where = f"the scheduler at {cluster.scheduler}" if cluster.scheduler else "the scheduler"
+            raise StrapgenError(f"{where} is gone; its results so far are not lost") from None
+
+
+def _distributed() -> Any:
+    """Return the module of Dask."""
+    try:
+        import distributed
+    except ImportError:
+        raise MissingExtraError("clusters need Dask: pip install 'strapgen[cluster]'") from None
+    return distributed
+
+
+@contextmanager
+def _client(distributed: Any, cluster: Cluster) -> Iterator[Any]:
+    """Connect to a scheduler, or start one with workers on this machine."""
+    import dask
+
+    for name in ("distributed", "tornado.application"):  # what they would say, one line says here
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    quiet = {"distributed.comm.timeouts.connect": f"{_PATIENCE_S}s"}
+    with dask.config.set(quiet):
+        started = None
+        try:
+            if not cluster.scheduler:
+                started = distributed.LocalCluster(
+                    n_workers=cluster.workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+                )
+            client = distributed.Client(
+                started or cluster.scheduler, timeout=_PATIENCE_S, set_as_default=False
+            )
+        except (OSError, TimeoutError, ValueError) as error:
+            if started is not None:
+                started.close()
+            where = cluster.scheduler or "this machine"
+            raise StrapgenError(f"no scheduler answers at {where} ({type(error).__name__})") from None
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE_S)
+        except TimeoutError:
+            client.close(timeout=2)
+            raise StrapgenError(f"the scheduler at {cluster.scheduler} has no workers") from None
+        try:
+            yield client
+        finally:
+            client.close(timeout=2)
+            if started is not None:
+                started.close(timeout=10)
+
+
+def _remote(work: Callable[[Any], Any], case: Any, digest: str, files: Bundle | None) -> Any:
+    """Run a case in a worker."""
+    if digest and cache.generator_digest() != digest:
+        raise StrapgenError(
+            "a worker has another version of strapgen; the same one is needed on all machines"
+        )
+    with _one_at_a_time:
+        return work(
+            case if files is None else cast("Movable", case).moved(files.folder, _placed(files.contents))
+        )
+
+
+def _placed(contents: Mapping[str, bytes]) -> Path:
+    """Return the folder that holds files in this process, as long as it lives."""
+    digest = cache.digest([text for pair in sorted(contents.items()) for text in pair])
+    if digest not in _folders:
+        _folders[digest] = TemporaryDirectory(prefix="strapgen-")
+        for name, content in contents.items():
+            path = Path(_folders[digest].name) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+    return Path(_folders[digest].name)

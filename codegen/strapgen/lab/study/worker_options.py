@@ -1,0 +1,62 @@
+"""Options that say where the cases of a study run: in processes on this machine, or on a cluster."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from strapgen.cli.options import option, whole
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.lab.study.clusters import Cluster
+
+#: Most processes of a study on this machine.
+_MOST = 1024
+
+
+@dataclass(frozen=True)
+class WorkerOptions:
+    """Where the cases of a study run."""
+
+    panel: ClassVar[str] = "Run"
+
+    jobs: Annotated[
+        str | None,
+        option(
+            "--jobs",
+            metavar="N",
+            help="Number of processes that run side by side.  [default: one for each processor]",
+        ),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Dask scheduler whose workers run the cases, as tcp://10.0.0.7:8786.",
+        ),
+    ] = None
+    cluster: Annotated[
+        str | None,
+        option(
+            "--cluster",
+            metavar="CLUSTER",
+            help="local:N runs the cases on a Dask cluster of N workers on this machine.",
+        ),
+    ] = None
+
+    def count(self) -> int | None:
+        """Return the number of processes, checked; None where none is stated."""
+        count = whole("jobs", self.jobs)
+        return None if count is None else checks.count("jobs", count, largest=_MOST)
+
+    def workers(self) -> Cluster | None:
+        """Return the cluster, checked; None where none is stated."""
+        from strapgen.lab.study.clusters import Cluster
+
+        cluster = Cluster.of(self.scheduler, self.cluster)
+        if cluster is not None and self.jobs is not None:
+            raise InputError("--jobs goes with processes on this machine, not with --scheduler or --cluster")
+        return cluster

@@ -1,0 +1,1 @@
+"""Drift of fixed point over the length of a word."""

@@ -1,0 +1,1 @@
+"""Navigation: two speeds, described systems, instruments, loops, redundancy, calibration."""

@@ -1,0 +1,1 @@
+"""Calibration of a measurement unit."""

@@ -1,0 +1,35 @@
+"""How the objects of navigation show themselves: as data frames, as plots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from strapgen.lab.simulate.runs_report import ANGLES, AXES
+from strapgen.navigation.courses import course_plot, course_report
+from strapgen.navigation.courses.courses import Course
+from strapgen.results.display.frames import VECTOR, Variables, table, variables
+from strapgen.results.display.objects import figure
+from strapgen.results.table import TextTable
+
+
+@table.register
+def _(course: Course) -> TextTable:
+    return course_report.course_table(course)
+
+
+@variables.register
+def _(course: Course) -> tuple[Variables, dict[str, Any]]:
+    states = course.states.reshape(len(course.time), -1)
+    arrays: Variables = {
+        "attitude": (("time_s", "element"), states, "1"),
+        "angles_deg": (("time_s", "angle"), np.degrees(course.angles), "deg"),
+        "velocity_change_m_s": (VECTOR, course.velocity_changes, "m/s"),
+    }
+    return arrays, {"element": list(course.elements), "angle": list(ANGLES), "axis": list(AXES)}
+
+
+@figure.register
+def _(course: Course, title: str) -> Any:
+    return course_plot.course_figure(course, title)

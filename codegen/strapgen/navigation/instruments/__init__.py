@@ -1,0 +1,1 @@
+"""Errors of instruments and their compensation."""

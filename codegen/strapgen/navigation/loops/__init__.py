@@ -1,0 +1,1 @@
+"""Levelling, heading and vertical loops."""

@@ -1,0 +1,187 @@
+"""The schedule of the loops of an attitude and heading reference: its modes, their time constants, and its switches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+#: References that each loop can have.
+REFERENCES = {
+    "level": ("zero", "air-data"),
+    "erection": ("zero",),
+    "heading": ("magnetic", "open"),
+    "vertical": ("air-data", "zero"),
+}
+#: When a mode holds: in its turn, without air data for some time, or when it is selected.
+CONDITIONS = ("sequence", "no-air-data", "selected")
+KNOT = Fraction(1852, 3600)
+
+
+@dataclass(frozen=True)
+class LoopSetting:
+    """What a mode makes of a loop.
+
+    Parameters
+    ----------
+    loop : str
+        "level", "erection", "heading" or "vertical".
+    reference : str
+        One of `REFERENCES`; "open" has no time constant.
+    time_constant_s : Fraction or None
+    order : int or None
+        None for the usual one.
+    """
+
+    loop: str
+    reference: str
+    time_constant_s: Fraction | None
+    order: int | None = None
+
+    def __post_init__(self) -> None:
+        checks.choice("loop", self.loop, REFERENCES)
+        checks.choice(f"reference of the {self.loop} loop", self.reference, REFERENCES[self.loop])
+        if self.reference == "open":
+            if self.time_constant_s is not None or self.order is not None:
+                raise InputError(f"the {self.loop} loop is open; tau_s and order have no place there")
+        elif self.time_constant_s is None or self.time_constant_s <= 0:
+            raise InputError(f"the {self.loop} loop has no tau_s above 0")
+
+
+@dataclass(frozen=True)
+class LoopMode:
+    """A mode of the schedule.
+
+    Parameters
+    ----------
+    name : str
+    loops : tuple of LoopSetting
+        Levelling or erection, heading and vertical.
+    duration_s : Fraction or None
+        None for a mode without an end.
+    when : str
+        One of `CONDITIONS`.
+    after_s : Fraction
+        Time without air data after which the mode holds.
+    """
+
+    name: str
+    loops: tuple[LoopSetting, ...]
+    duration_s: Fraction | None = None
+    when: str = "sequence"
+    after_s: Fraction = Fraction(0)
+
+    def loop(self, name: str) -> LoopSetting:
+        """Return the setting of the loop "level", which may be that of erection, "heading" or "vertical"."""
+        return self.loops[("level", "heading", "vertical").index(name)]
+
+
+@dataclass(frozen=True)
+class LoopSchedule:
+    """The modes of a reference system, and its switches.
+
+    Parameters
+    ----------
+    title : str
+    modes : tuple of LoopMode
+        Those in sequence first; only the last of them may have no end.
+    cycle_s : Fraction
+    gravity, radius : Fraction
+        In m/s^2 and m.
+    heading_cutout_deg_s : Fraction or None
+        Rate about down above which the heading loop is open; None for no cut-out.
+    air_data_on_m_s, air_data_off_m_s : Fraction
+        True airspeed above which it becomes the reference of levelling, and below which it ceases to be.
+    """
+
+    title: str
+    modes: tuple[LoopMode, ...]
+    cycle_s: Fraction
+    gravity: Fraction
+    radius: Fraction
+    heading_cutout_deg_s: Fraction | None = None
+    air_data_on_m_s: Fraction = 110 * KNOT
+    air_data_off_m_s: Fraction = 100 * KNOT
+
+    def __post_init__(self) -> None:
+        if not self.sequence:
+            raise InputError("the schedule has no mode in sequence")
+        for mode in self.sequence[:-1]:
+            if mode.duration_s is None:
+                raise InputError(
+                    f"mode {mode.name} has no duration_s; only the last in sequence may have none"
+                )
+        if len({mode.name for mode in self.modes}) < len(self.modes):
+            raise InputError("two modes of the schedule have the same name")
+        if self.air_data_off_m_s > self.air_data_on_m_s:
+            raise InputError(
+                f"air_data_off_m_s is {float(self.air_data_off_m_s):g}; at most air_data_on_m_s, "
+                f"{float(self.air_data_on_m_s):g}, is allowed"
+            )
+
+    @property
+    def sequence(self) -> tuple[LoopMode, ...]:
+        """The modes that follow each other."""
+        return tuple(mode for mode in self.modes if mode.when == "sequence")
+
+    def timed(self, last_s: Fraction) -> tuple[LoopMode, ...]:
+        """Return the modes in sequence, the last of which ends after a time if it has no end; zero leaves it out."""
+        modes = list(self.sequence)
+        if modes[-1].duration_s is None:
+            modes[-1:] = [replace(modes[-1], duration_s=last_s)] if last_s else []
+        return tuple(modes)
+
+    def mode(
+        self, time_s: Fraction, without_air_data_s: Fraction = Fraction(0), selected: str = ""
+    ) -> LoopMode:
+        """Return the mode that holds.
+
+        Parameters
+        ----------
+        time_s : Fraction
+            Since the start.
+        without_air_data_s : Fraction
+            Since the last valid air data.
+        selected : str
+            Name of a mode that the crew has selected, "" for none.
+
+        Raises
+        ------
+        InputError
+            If the selected mode is none that can be selected.
+        """
+        if selected:
+            names = {mode.name: mode for mode in self.modes if mode.when == "selected"}
+            return names[checks.choice("selected mode", selected, names)]
+        for mode in self.sequence:
+            if mode.duration_s is not None and time_s < mode.duration_s:
+                return mode
+            time_s -= mode.duration_s or Fraction(0)
+        lost = [
+            mode for mode in self.modes if mode.when == "no-air-data" and without_air_data_s > mode.after_s
+        ]
+        return lost[-1] if lost else self.sequence[-1]
+
+    def heading_is_open(self, mode: LoopMode, rate_deg_s: float) -> bool:
+        """Whether the heading loop is open: in a mode that has it so, and at a rate above the cut-out."""
+        limit = self.heading_cutout_deg_s
+        return mode.loop("heading").reference == "open" or (limit is not None and abs(rate_deg_s) > limit)
+
+    def air_data_engaged(self, engaged: bool, airspeed_m_s: float) -> bool:
+        """Return whether true airspeed is the reference of levelling, with hysteresis.
+
+        Parameters
+        ----------
+        engaged : bool
+            What it was in the cycle before.
+        airspeed_m_s : float
+        """
+        return airspeed_m_s > (self.air_data_off_m_s if engaged else self.air_data_on_m_s)
+
+
+def total_s(modes: Iterable[LoopMode]) -> Fraction:
+    """Return the duration of modes with an end in s."""
+    return sum((mode.duration_s or Fraction(0) for mode in modes), Fraction(0))

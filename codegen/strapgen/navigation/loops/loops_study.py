@@ -1,0 +1,384 @@
+"""Runs the loops of an attitude and heading reference through their schedule, beside the matrix exponential."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir.exceptions import InputError
+from strapgen.navigation.loops import loop_gains
+from strapgen.navigation.loops.loop_gains import closed_loop
+from strapgen.navigation.loops.loop_schedule import LoopMode, LoopSchedule, LoopSetting
+from strapgen.run import backends
+
+Array = NDArray[np.float64]
+#: The loops of every mode; erection takes the place of levelling.
+LOOPS = ("level", "heading", "vertical")
+#: Units of the states in which results are told, and the factor to them.
+_DEG, _DEG_H = math.degrees(1), math.degrees(3600)
+UNITS = {
+    "level": {"velocity": ("m/s", 1.0), "tilt": ("deg", _DEG), "bias": ("deg/h", _DEG_H)},
+    "heading": {"heading": ("deg", _DEG), "bias": ("deg/h", _DEG_H)},
+    "vertical": {"height": ("m", 1.0), "climb": ("m/s", 1.0), "bias": ("m/s^2", 1.0)},
+}
+#: Records of a mode for a picture, and most cycles of a run.
+_RECORDS, _LONGEST = 150, 1_000_000
+_TERMS = 24
+#: What an error has to be smaller than; a larger heading error would be taken for that on the other side.
+_LARGEST = {"heading_deg": 180.0}
+
+
+@dataclass(frozen=True)
+class LoopErrors:
+    """What disturbs the loops of a study, each error by itself.
+
+    Parameters
+    ----------
+    rate_deg_h : float
+        Earth rate and gyro bias, about a level axis and about down.
+    tilt_deg, heading_deg : float
+        Errors of the attitude at the start.
+    velocity_m_s : float
+        Error of the reference velocity.
+    acceleration_mg : float
+        Bias of the vertical accelerometer, in thousandths of g.
+    height_m : float
+        Reference height.
+    """
+
+    rate_deg_h: float = 10.0
+    tilt_deg: float = 0.5
+    velocity_m_s: float = 5.0
+    heading_deg: float = 1.0
+    acceleration_mg: float = 1.0
+    height_m: float = 10.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, largest = getattr(self, field.name), _LARGEST.get(field.name, 1e6)
+            if not abs(value) < largest:
+                raise InputError(f"{field.name} is {value:g}; a magnitude below {largest:g} is needed")
+
+    def cases(self, loop: str, gravity: float) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
+        """Return the cases of a loop: constant inputs and states at the start, in SI units, by the name of the case."""
+        rate = math.radians(self.rate_deg_h) / 3600
+        if loop == "level":
+            return {
+                f"rate {self.rate_deg_h:g} deg/h": ({"drift": rate}, {}),
+                f"tilt {self.tilt_deg:g} deg": ({}, {"phi": math.radians(self.tilt_deg)}),
+                f"reference {self.velocity_m_s:g} m/s": ({"Vr": self.velocity_m_s}, {}),
+            }
+        if loop == "heading":
+            return {
+                f"rate {self.rate_deg_h:g} deg/h": ({"drift": rate}, {}),
+                f"heading {self.heading_deg:g} deg": ({}, {"psi": math.radians(self.heading_deg)}),
+            }
+        return {
+            f"bias {self.acceleration_mg:g} mg": ({"force": self.acceleration_mg * 1e-3 * gravity}, {}),
+            f"reference {self.height_m:g} m": ({"hr": self.height_m}, {}),
+        }
+
+
+@dataclass(frozen=True)
+class LoopCourse:
+    """A loop through the schedule.
+
+    Parameters
+    ----------
+    loop : str
+    cases : tuple of str
+    times : array, (K,)
+        In s.
+    run, exact : array, (K, cases, states)
+        States by the kernel and by the matrix exponential, in SI units.
+    ends : tuple of int
+        Records at which the modes end.
+    """
+
+    loop: str
+    cases: tuple[str, ...]
+    times: Array
+    run: Array
+    exact: Array
+    ends: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class LoopDesign:
+    """A loop in a mode: gains, and the slowest pole of a cycle as a time constant.
+
+    Parameters
+    ----------
+    mode, loop : str
+    setting : LoopSetting
+    gains : tuple of Fraction
+    slowest_s : float or None
+        None for an open loop.
+    """
+
+    mode: str
+    loop: str
+    setting: LoopSetting
+    gains: tuple[Fraction, ...]
+    slowest_s: float | None
+
+
+def mode_gains(schedule: LoopSchedule, setting: LoopSetting) -> tuple[Fraction, ...]:
+    """Return the gains of a loop, exactly; zeros where it is open."""
+    if setting.time_constant_s is None:
+        return (Fraction(0),) * len(closed_loop(setting.loop).gains)
+    return loop_gains.gains(
+        setting.loop, setting.time_constant_s, setting.order, schedule.gravity, schedule.radius
+    )
+
+
+def designs(schedule: LoopSchedule) -> list[LoopDesign]:
+    """Return all loops of all modes with their gains.
+
+    Raises
+    ------
+    InputError
+        If one is unstable at the cycle of the schedule, or has an order that it cannot have.
+    """
+    rows = []
+    for mode in schedule.modes:
+        for setting in mode.loops:
+            values, slowest = mode_gains(schedule, setting), None
+            if setting.time_constant_s is not None:
+                known = (schedule.cycle_s, schedule.gravity, schedule.radius)
+                try:
+                    loop_gains.check_stable(setting.loop, values, *known)
+                except InputError as error:
+                    raise InputError(f"mode {mode.name}: {error}") from None
+                pole = abs(loop_gains.poles_of_a_cycle(setting.loop, values, *known)[0])
+                slowest = -float(schedule.cycle_s) / math.log(pole) if pole else 0.0
+            rows.append(LoopDesign(mode.name, setting.loop, setting, values, slowest))
+    return rows
+
+
+def cycles_of_modes(schedule: LoopSchedule, modes: tuple[LoopMode, ...]) -> list[int]:
+    """Return the cycles of each mode.
+
+    Raises
+    ------
+    InputError
+        If a mode has no whole number of cycles, or the run is too long.
+    """
+    counts = []
+    for mode in modes:
+        count = (mode.duration_s or Fraction(0)) / schedule.cycle_s
+        if count.denominator != 1:
+            raise InputError(
+                f"mode {mode.name}: duration_s is no whole number of cycles of {float(schedule.cycle_s):g} s"
+            )
+        counts.append(int(count))
+    if not 0 < sum(counts) <= _LONGEST:
+        raise InputError(f"the run has {sum(counts)} cycles; 1 to {_LONGEST} are possible")
+    return counts
+
+
+def run_loops(
+    schedule: LoopSchedule, modes: tuple[LoopMode, ...], errors: LoopErrors, backend: str = "numpy"
+) -> Iterator[LoopCourse]:
+    """Yield every loop through modes one after the other.
+
+    Parameters
+    ----------
+    schedule : LoopSchedule
+    modes : tuple of LoopMode
+        All with a duration.
+    errors : LoopErrors
+    backend : str
+        One in floating point.
+
+    Yields
+    ------
+    LoopCourse
+    """
+    for loop in LOOPS:
+        yield _course(schedule, modes, loop, errors, backend)
+
+
+def _course(
+    schedule: LoopSchedule, modes: tuple[LoopMode, ...], loop: str, errors: LoopErrors, backend: str
+) -> LoopCourse:
+    """Run the cases of a loop side by side."""
+    cases = errors.cases(loop, float(schedule.gravity))
+    full = closed_loop(loop)
+    inputs = np.array([[drive.get(name, 0.0) for name in full.inputs] for drive, _ in cases.values()])
+    start = np.array([[begin.get(name, 0.0) for name in full.states] for _, begin in cases.values()])
+    cycle = float(schedule.cycle_s)
+    plant = _PLANTS[loop](schedule, inputs, backend)
+    run, exact, cycles, ends = [start], [start], [0], []
+    for mode, count in zip(modes, cycles_of_modes(schedule, modes), strict=True):
+        setting = mode.loop(loop)
+        spacing = max(1, count // _RECORDS)
+        matrices = _matrices(schedule, setting, loop)
+        gains = [float(value) for value in mode_gains(schedule, setting)]
+        if mode is modes[0]:
+            plant.begin(start, setting.loop, gains)
+        for first in range(0, count, spacing):
+            part = min(spacing, count - first)
+            run.append(plant.run(setting.loop, gains, part))
+            exact.append(_advance(matrices, exact[-1], inputs, part * cycle))
+            cycles.append(cycles[-1] + part)
+        ends.append(len(cycles) - 1)
+    times = np.array([float(count * schedule.cycle_s) for count in cycles])
+    return LoopCourse(loop, tuple(cases), times, np.array(run), np.array(exact), tuple(ends))
+
+
+def _matrices(schedule: LoopSchedule, setting: LoopSetting, loop: str) -> tuple[Array, Array]:
+    """Return A and D of x' = A x + D d for all states of a loop, those that a mode holds among them."""
+    full, part = closed_loop(loop), closed_loop(setting.loop)
+    known = dict(zip(part.gains, mode_gains(schedule, setting), strict=True))
+    known |= {loop_gains.g: schedule.gravity, loop_gains.R: schedule.radius}
+    count = len(full.states)
+    A, D = np.zeros((count, count)), np.zeros((count, len(full.inputs)))
+    for array, matrix in ((A, part.continuous), (D, part.disturbance)):
+        numbers = np.array(matrix.subs(known).tolist(), float)
+        array[: numbers.shape[0], : numbers.shape[1]] = numbers
+    return A, D
+
+
+def _advance(matrices: tuple[Array, Array], states: Array, inputs: Array, time: float) -> Array:
+    """Return states after a time under constant inputs, by the matrix exponential."""
+    A, D = matrices
+    count, driven = D.shape
+    block = np.zeros((count + driven, count + driven))
+    block[:count, :count], block[:count, count:] = A, D
+    power = exponential(block * time)
+    return np.asarray(states @ power[:count, :count].T + inputs @ power[:count, count:].T)
+
+
+def exponential(matrix: Array) -> Array:
+    """Return the exponential of a matrix, by its series and repeated squaring.
+
+    Examples
+    --------
+    >>> exponential(np.array([[0.0, 1.0], [0.0, 0.0]])).tolist()
+    [[1.0, 1.0], [0.0, 1.0]]
+    """
+    halvings = max(0, math.ceil(math.log2(max(np.abs(matrix).sum(axis=1).max(), 1e-300))) + 1)
+    small, term = matrix / 2.0**halvings, np.eye(len(matrix))
+    total = term
+    for number in range(1, _TERMS):
+        term = term @ small / number
+        total = total + term
+    for _ in range(halvings):
+        total = total @ total
+    return np.asarray(total)
+
+
+def _unchecked(name: str, backend: str, inputs: Array) -> Callable[..., Any]:
+    """Return a kernel for as many runs as `inputs` has rows, without the checks of arrays, most of a call."""
+    kernel, batch = backends.evaluator(name, backend), (len(inputs),)
+
+    def call(*values: Any) -> tuple[Array, ...]:
+        return kernel.evaluate([np.asarray(value, float) for value in values], batch)
+
+    return call
+
+
+class _LevelPlant:
+    """The channel of V_y and phi_x, with the kernel of levelling or of erection."""
+
+    def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
+        self._kernels = {name: _unchecked(name, backend, inputs) for name in ("level-loop", "erection")}
+        self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
+        self._curvature = 1 / float(schedule.radius)
+        self._drift, self._force, reference = inputs.T
+        zero = np.zeros_like(reference)
+        self._reference = np.stack([zero, reference], axis=1)
+
+    def begin(self, states: Array, loop: str, gains: list[float]) -> None:
+        """Take the states at the start, and the rate that they command."""
+        zero = np.zeros(len(states))
+        self._velocity, self._bias = (np.stack([zero, zero], axis=1) for _ in range(2))
+        self._velocity[:, 1], self._tilt, self._bias[:, 0] = states.T
+        self._command(loop, gains, np.zeros((len(states), 3)), 0.0)
+
+    def _command(self, loop: str, gains: list[float], change: Array, cycle: float) -> None:
+        """Call the kernel of a mode."""
+        level, erect = self._kernels.values()
+        if loop == "erection":
+            self._velocity, self._rate = erect(self._velocity, change, *gains, cycle)
+        else:
+            self._velocity, self._bias, self._rate = level(
+                self._velocity, self._bias, change, self._reference, self._curvature, *gains, cycle
+            )
+
+    def run(self, loop: str, gains: list[float], count: int) -> Array:
+        """Run cycles, and return the states after them."""
+        T, change = self._cycle, np.zeros((len(self._tilt), 3))
+        for _ in range(count):
+            tilt = self._tilt + T * (self._drift - self._rate[:, 0])
+            change[:, 1] = T * (self._gravity * (self._tilt + tilt) / 2 + self._force)
+            self._tilt = tilt
+            self._command(loop, gains, change, T)
+        return np.stack([self._velocity[:, 1], self._tilt, self._bias[:, 0]], axis=1)
+
+
+class _HeadingPlant:
+    """The heading, which the commanded rate turns."""
+
+    def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
+        self._kernel = _unchecked("heading-loop", backend, inputs)
+        self._cycle = float(schedule.cycle_s)
+        self._drift, self._reference = inputs.T
+
+    def begin(self, states: Array, _: str, gains: list[float]) -> None:
+        """Take the states at the start, and the rate that they command."""
+        self._heading, self._bias = states.T
+        _bias, self._rate = self._kernel(self._heading, self._reference, self._bias, *gains, 0.0)
+
+    def run(self, _: str, gains: list[float], count: int) -> Array:
+        """Run cycles, and return the states after them."""
+        for _cycle in range(count):
+            self._heading = self._heading + self._cycle * (self._drift - self._rate)
+            self._bias, self._rate = self._kernel(
+                self._heading, self._reference, self._bias, *gains, self._cycle
+            )
+        return np.stack([self._heading, self._bias], axis=1)
+
+
+class _VerticalPlant:
+    """The vertical channel, whose states are all in the kernel."""
+
+    def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
+        self._kernel = _unchecked("vertical-loop", backend, inputs)
+        self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
+        self._gradient = 2 * self._gravity / float(schedule.radius)
+        force, self._reference = inputs.T
+        zero = np.zeros_like(force)
+        self._change = np.stack([zero, zero, -self._cycle * (self._gravity + force)], axis=1)
+
+    def begin(self, states: Array, _loop: str, _gains: list[float]) -> None:
+        """Take the states at the start."""
+        self._states = tuple(states.T)
+
+    def run(self, _: str, gains: list[float], count: int) -> Array:
+        """Run cycles, and return the states after them."""
+        known = (self._change, self._reference, self._gravity, self._gradient, *gains, self._cycle)
+        for _cycle in range(count):
+            self._states = self._kernel(*self._states, *known)
+        return np.stack(self._states, axis=1)
+
+
+_PLANTS: Mapping[str, type[_LevelPlant] | type[_HeadingPlant] | type[_VerticalPlant]] = {
+    "level": _LevelPlant,
+    "heading": _HeadingPlant,
+    "vertical": _VerticalPlant,
+}
+
+
+@cache
+def factors(loop: str) -> Array:
+    """Return the factors from SI units to those of `UNITS`, (states,)."""
+    return np.array([factor for _, factor in UNITS[loop].values()])

@@ -1,0 +1,1 @@
+"""Output functions and their filters."""

@@ -1,0 +1,1 @@
+"""Rate-table tests: largest rates that an algorithm follows."""

@@ -1,0 +1,1 @@
+"""Redundant gyros: geometry, parity equations, failures."""

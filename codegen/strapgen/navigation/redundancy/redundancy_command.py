@@ -1,0 +1,88 @@
+"""The command ``strapgen redundancy`` derives what redundant sensors on any axes give, and writes its code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option
+from strapgen.cli.output import Format, check_format
+from strapgen.cli.progress import track, waiting
+from strapgen.cli.source_options import SourceOptions
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.navigation.redundancy.parity_equations import SensorSet
+
+
+@grouped
+def redundancy(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="TOML file with axes = [[1, 0, 0], ...], a row a sensor.", show_default=False
+        ),
+    ],
+    *,
+    target: Annotated[
+        str,
+        option(
+            "--target",
+            metavar="NAME",
+            help="Kind of code: c, c-float, c-fixed, numpy or fixed-model.",
+            panel="Algorithm",
+        ),
+    ] = "c",
+    fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry"))],
+    out: Annotated[
+        Path | None,
+        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
+    ] = None,
+    output: Annotated[SourceOptions, Shown(only=("force",))],
+    format: Format = "text",
+) -> None:
+    """Derive what redundant sensors tell of their failures.
+
+    Components of an axis are exact: whole numbers, decimals, or texts such as "2/3" and "sqrt(3)/2". You see the
+    parity equations, the noise of every triad, and how many failures are isolated. With --out you get the code of all:
+    parity, selection, triads, and the tables as CSV.
+
+    Example: strapgen redundancy examples/hexad.toml --target c-fixed --out out/hexad
+    """
+    check_format(format)
+    if output.force and out is None:
+        raise InputError("--force goes with --out, the folder of the files")
+    from strapgen.navigation.redundancy.failure_tables import failure_tables
+    from strapgen.navigation.redundancy.geometry_file import read
+    from strapgen.navigation.redundancy.geometry_report import geometry_report, tables_csv
+    from strapgen.targets import BUILT_IN
+
+    checks.choice("target", target, BUILT_IN)
+    settings = fixed.settings(1)
+    sensors = read(file)
+    with waiting("scanning the parity space"):
+        tables = failure_tables(sensors.geometry)
+    written: list[Path] = []
+    if out is not None:
+        files = _sources(sensors, target, settings)
+        files[f"{sensors.name}_tables.csv"] = tables_csv(sensors, tables)
+        written = SourceOptions(out=out, force=output.force).write(files)
+    typer.echo(geometry_report(sensors, tables, list(map(str, written))).written(format).rstrip("\n"))
+
+
+def _sources(sensors: SensorSet, target: str, settings: Settings | None) -> dict[str, str]:
+    """Return the files of all kernels of a set of sensors."""
+    from strapgen import pipeline
+    from strapgen.navigation.redundancy.geometry_file import kernels
+    from strapgen.run.kernel_sources import sources_of_program
+
+    files: dict[str, str] = {}
+    for kernel in track(kernels(sensors), "generating", 4 + len(sensors.geometry.triads)):
+        files |= sources_of_program(pipeline.lower(kernel), target, settings).step_files
+    return files

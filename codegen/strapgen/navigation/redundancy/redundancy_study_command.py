@@ -1,0 +1,79 @@
+"""The command ``strapgen study redundancy`` counts what redundancy management makes of failing sensors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from strapgen.cli.option_groups import grouped
+from strapgen.cli.options import option
+from strapgen.cli.output import Output
+from strapgen.cli.progress import track
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.simulate.sample_source import pairs
+
+
+@grouped
+def study_redundancy(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="FILE", help="TOML file with axes.  [default: the hexad of 1984]", show_default=False
+        ),
+    ] = None,
+    *,
+    trials: Annotated[
+        str, option("--trials", metavar="N", help="Trials for every size of a failure.", panel="Run")
+    ] = "2000",
+    seed: Annotated[
+        str, option("--seed", metavar="N", help="Seed of the random numbers.", panel="Run")
+    ] = "1",
+    backend: Annotated[
+        str,
+        option("--backend", metavar="NAME", help="Back end: numpy, c or c-float.", panel="Run"),
+    ] = "numpy",
+    settings: Annotated[
+        list[str] | None,
+        option(
+            "--set",
+            metavar="KEY=VALUE...",
+            help="Errors and trip levels: cycle_s, rate_deg_s, load_g, noise_arcsec, pulse_arcsec, bias_deg_h, "
+            "scale_ppm, bending_arcmin_g, trip_sigmas, trip_rate.",
+            panel="Input",
+        ),
+    ] = None,
+    output: Output,
+) -> None:
+    """Count detected, isolated and missed failures of redundant gyros by Monte Carlo.
+
+    Sensors with quantization, noise, bias, scale factor errors and bending fail one after the other, by steps of many
+    sizes. You see how often an equation fails, which sensor is isolated, and whether the triad is sound: by the rule of
+    the kernel and by the tables.
+
+    Example: strapgen study redundancy --trials 500 --plot out/redundancy.png
+    """
+    output.check(file)
+    count = checks.count("trials", checks.whole("trials", trials), largest=1_000_000)
+    number = checks.count("seed", checks.whole("seed", seed), smallest=0)
+    checks.choice("backend", backend, ("numpy", "c", "c-float"))
+    from strapgen.navigation.redundancy.geometry_file import read
+    from strapgen.navigation.redundancy.parity_equations import HEXAD_SET
+    from strapgen.navigation.redundancy.redundancy_study import SensorErrors, redundancy_study, study_steps
+    from strapgen.navigation.redundancy.redundancy_study_report import redundancy_image, redundancy_report
+
+    stated = pairs(settings or [])
+    for key in stated:
+        checks.choice("--set", key, SensorErrors.__dataclass_fields__)
+    try:
+        errors = SensorErrors(**{key: float(checks.number(key, value)) for key, value in stated.items()})
+    except OverflowError:
+        raise InputError("--set has a number that is too large") from None
+    sensors = HEXAD_SET if file is None else read(file)
+    steps = redundancy_study(sensors, errors, count, number, backend)
+    rows = list(track(steps, "running", len(study_steps(sensors.geometry))))
+    output.report(
+        redundancy_report(sensors, errors, rows), lambda path: redundancy_image(sensors, rows, path)
+    )

@@ -1,0 +1,276 @@
+"""Works out what a described system needs: operations a second at each rate, and bytes of memory and constants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from strapgen.ir.program import Constant, Node, Operation, Program
+from strapgen.navigation.systems.fitting import Fitted
+from strapgen.navigation.systems.system import Rate
+from strapgen.targets import TARGETS
+
+#: Bytes of a number in floating point, by its type in C.
+_FLOATING = {"double": 8, "float": 4}
+#: Bytes of the counter of cycles, and of the number of the stage that refused its input.
+_COUNTER = 4
+
+
+@dataclass(frozen=True)
+class StageBudget:
+    """What a stage needs for a call.
+
+    Parameters
+    ----------
+    name, kernel : str
+    operations : mapping of str to int
+        Operations of a call by kind.
+    constants : int
+        Different numbers in the code, other than 0, 1 and -1, and in fixed point other than powers of two, which
+        are shifts.
+    executed, code_bytes, stack_bytes : int or None
+        Instructions of a call, bytes of object code and of stack on a processor; None where it was not measured.
+    """
+
+    name: str
+    kernel: str
+    operations: Mapping[str, int]
+    constants: int
+    executed: int | None = None
+    code_bytes: int | None = None
+    stack_bytes: int | None = None
+
+
+@dataclass(frozen=True)
+class RateBudget:
+    """What the stages of one rate need in a second.
+
+    Parameters
+    ----------
+    every : int
+        Cycles of the fastest rate from one time to the next.
+    hz : Fraction
+    stages : tuple of StageBudget
+    """
+
+    every: int
+    hz: Fraction
+    stages: tuple[StageBudget, ...]
+
+    @property
+    def operations(self) -> dict[str, int]:
+        """Operations of one time by kind, without those that do not occur."""
+        return _added(stage.operations for stage in self.stages)
+
+    @property
+    def per_second(self) -> Fraction:
+        """Operations in a second, of all kinds."""
+        return sum(self.operations.values()) * self.hz
+
+    @property
+    def executed_per_second(self) -> Fraction | None:
+        """Instructions in a second; None where they were not measured."""
+        counts = [stage.executed for stage in self.stages]
+        return None if None in counts else sum(filter(None, counts)) * self.hz
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a system needs.
+
+    Parameters
+    ----------
+    rates : tuple of RateBudget
+        From the fastest.
+    cell_bytes, feedback_bytes, counter_bytes, padding_bytes : int
+        Memory between calls: values, error feedback, counters, and what a compiler puts between members so that each
+        lies at a multiple of its size.
+    constant_bytes : int
+        Bytes of the different constants of all stages, and of initial values that are not zero.
+    cpu : str
+        Processor on which instructions were counted; "" if they were not.
+    """
+
+    rates: tuple[RateBudget, ...]
+    cell_bytes: int
+    feedback_bytes: int
+    counter_bytes: int
+    padding_bytes: int
+    constant_bytes: int
+    cpu: str = ""
+
+    @property
+    def memory_bytes(self) -> int:
+        """Size of the struct of the memory."""
+        return self.cell_bytes + self.feedback_bytes + self.counter_bytes + self.padding_bytes
+
+    @property
+    def per_second(self) -> Fraction:
+        """Operations of all rates in a second."""
+        return sum((rate.per_second for rate in self.rates), Fraction(0))
+
+    @property
+    def executed_per_second(self) -> Fraction | None:
+        """Instructions of all rates in a second; None where they were not measured."""
+        counts = [rate.executed_per_second for rate in self.rates]
+        return None if None in counts else sum(filter(None, counts), Fraction(0))
+
+
+def budget(
+    fit: Fitted, measured: Mapping[str, tuple[int | None, int, int]] | None = None, cpu: str = ""
+) -> Budget:
+    """Return what a system needs whose stages are generated.
+
+    The copies of values between calls are not counted, nor are rescalings.
+
+    Parameters
+    ----------
+    fit : Fitted
+    measured : mapping of str to tuple, optional
+        Instructions, bytes of object code and bytes of stack of each stage on a processor, by its name.
+    cpu : str, optional
+        Name of the processor.
+    """
+    sizes = list(_sizes(fit))
+    cells = sum(count * size for kind, count, size in sizes if kind == "cell")
+    feedback = sum(count * size for kind, count, size in sizes if kind == "feedback")
+    counters = sum(count * size for kind, count, size in sizes if kind == "counter")
+    whole = _aligned([(count, size) for _, count, size in sizes])
+    system = fit.description.system
+    constants = sum(
+        _bytes(fit, stage.name) * len(_constants(fit.description.programs[stage.name], _is_fixed(fit)))
+        for stage in system.stages
+    )
+    initial = sum(
+        count * size
+        for (kind, count, size), cell in zip(sizes, system.cells, strict=False)
+        if kind == "cell" and any(cell.initial)
+    )
+    rates = tuple(_rate(fit, rate, measured or {}) for rate in system.rates)
+    return Budget(
+        rates, cells, feedback, counters, whole - cells - feedback - counters, constants + initial, cpu
+    )
+
+
+def lines(needs: Budget) -> list[str]:
+    """Return a budget in lines of text, for the head of generated files."""
+    result = ["Budget of the stages' calls, without copies between them:"]
+    for rate in needs.rates:
+        if not rate.stages:
+            continue
+        names = ", ".join(stage.name for stage in rate.stages)
+        counts = ", ".join(f"{count} {kind}" for kind, count in rate.operations.items())
+        result.append(
+            f"every {rate.every} ({float(rate.hz):g} Hz; {names}): {counts or 'no operations'}; "
+            f"{_thousands(rate.per_second)} operations a second"
+            + (
+                f"; {_thousands(rate.executed_per_second)} instructions a second"
+                if rate.executed_per_second
+                else ""
+            )
+            + "."
+        )
+    result.append(f"All rates: {_thousands(needs.per_second)} operations a second.")
+    if needs.executed_per_second is not None and needs.cpu:
+        code = sum(stage.code_bytes or 0 for rate in needs.rates for stage in rate.stages)
+        stack = max(stage.stack_bytes or 0 for rate in needs.rates for stage in rate.stages)
+        result.append(
+            f"On {needs.cpu}: {_thousands(needs.executed_per_second)} instructions a second, {code} bytes of object "
+            f"code, at most {stack} bytes of stack in a stage."
+        )
+    parts = [f"{needs.cell_bytes} of values"]
+    parts += [f"{needs.feedback_bytes} of error feedback"] if needs.feedback_bytes else []
+    parts += [f"{needs.counter_bytes} of counters"]
+    parts += [f"{needs.padding_bytes} of padding"] if needs.padding_bytes else []
+    result.append(
+        f"Memory: {needs.memory_bytes} bytes, {', '.join(parts)}; constants and initial values: "
+        f"{needs.constant_bytes} bytes."
+    )
+    return result
+
+
+def _thousands(number: Fraction | None) -> str:
+    """Return a number as digits in groups of three; parts of one are rounded."""
+    return "-" if number is None else f"{round(number):,}".replace(",", " ")
+
+
+def _rate(fit: Fitted, rate: Rate, measured: Mapping[str, tuple[int | None, int, int]]) -> RateBudget:
+    stages = []
+    for stage in rate.stages:
+        counts = {kind: count for kind, count in fit.sources[stage.name].operations.items() if count}
+        constants = len(_constants(fit.description.programs[stage.name], _is_fixed(fit)))
+        seen = measured.get(stage.name, (None, None, None))
+        stages.append(StageBudget(stage.name, stage.kernel, counts, constants, *seen))
+    return RateBudget(rate.every, fit.description.system.sample_hz / rate.every, tuple(stages))
+
+
+def _added(counts: Iterator[Mapping[str, int]]) -> dict[str, int]:
+    total: dict[str, int] = {}
+    for entry in counts:
+        for kind, count in entry.items():
+            total[kind] = total.get(kind, 0) + count
+    return total
+
+
+def _is_fixed(fit: Fitted) -> bool:
+    return TARGETS[fit.target].fixed
+
+
+def _bytes(fit: Fitted, stage: str) -> int:
+    """Return the bytes of a number inside a stage."""
+    interface = fit.sources[stage].fixed
+    if interface is None:
+        return _FLOATING.get(TARGETS[fit.target].number, 8)
+    return -(-interface.settings.word // 8)
+
+
+def _sizes(fit: Fitted) -> Iterator[tuple[str, int, int]]:
+    """Return kind, count and size of each member of the memory, in its order."""
+    system = fit.description.system
+    for cell in system.cells:
+        argument = fit.arguments.get(cell.name)
+        size = (
+            _FLOATING.get(TARGETS[fit.target].number, 8)
+            if argument is None
+            else -(-argument.format.word // 8)
+        )
+        yield "cell", cell.signal.size, size
+    for stage in system.stages:
+        interface = fit.sources[stage.name].fixed
+        if interface is not None and interface.residuals:
+            yield "feedback", len(interface.residuals), _bytes(fit, stage.name)
+    yield "counter", 2 if _is_fixed(fit) else 1, _COUNTER
+
+
+def _aligned(members: list[tuple[int, int]]) -> int:
+    """Return the size of a struct whose members lie at multiples of the size of their numbers."""
+    place = 0
+    for count, size in members:
+        place = -(-place // size) * size + count * size
+    widest = max(size for _, size in members)
+    return -(-place // widest) * widest
+
+
+def _constants(program: Program, shifts: bool) -> set[Constant]:
+    """Return the different numbers in the code of a program; with shifts, without powers of two."""
+    numbers = {abs(node.value) for assignment in program.body for node in _leaves(assignment.value)}
+    numbers |= {abs(n.value) for result in program.outputs for n in result.nodes if isinstance(n, Constant)}
+    return {
+        Constant(number) for number in numbers if number not in (0, 1) and not (shifts and _is_power(number))
+    }
+
+
+def _leaves(node: Node) -> Iterator[Constant]:
+    """Return the constants of a tree."""
+    if isinstance(node, Constant):
+        yield node
+    elif isinstance(node, Operation):
+        for argument in node.arguments:
+            yield from _leaves(argument)
+
+
+def _is_power(number: Fraction) -> bool:
+    """Return whether a number is a power of two."""
+    top, bottom = number.numerator, number.denominator
+    return top & (top - 1) == 0 and bottom & (bottom - 1) == 0

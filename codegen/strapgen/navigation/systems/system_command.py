@@ -1,0 +1,204 @@
+"""The command ``strapgen system`` checks a described system, shows it, draws it and writes its code."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import option
+from strapgen.cli.output import Format, WithRuns, check_format, print_json
+from strapgen.cli.source_options import SourceOptions
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.ir.sources import Sources
+    from strapgen.navigation.systems.budget import Budget
+    from strapgen.navigation.systems.fitting import Fitted
+    from strapgen.navigation.systems.system_bounds import SystemBounds
+
+
+@grouped
+def system(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="TOML file with the stages and their wires, or the name of a built-in system.",
+            show_default=False,
+        ),
+    ],
+    *,
+    target: Annotated[
+        str,
+        option(
+            "--target",
+            metavar="NAME",
+            help="Kind of code: c, c-float, c-fixed, numpy or fixed-model.",
+            panel="System",
+        ),
+    ] = "c",
+    sample_hz: Annotated[
+        str | None,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Cycles of the fastest rate in a second, in place of those in the file.",
+            panel="System",
+        ),
+    ] = None,
+    cpu: Annotated[
+        str | None,
+        option(
+            "--cpu",
+            metavar="NAME",
+            help="Count the instructions of every stage on this processor, as strapgen cost does; cortex-m3 is one.",
+            panel="System",
+        ),
+    ] = None,
+    fixed: Annotated[
+        FixedOptions,
+        Shown(
+            only=(
+                *("word", "lsb", "lsb_rad", "input_bits"),
+                *("rounding", "carry", "drift_allowance", "multiply", "digits"),
+            )
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
+    ] = None,
+    with_runs: WithRuns = False,
+    output: Annotated[SourceOptions, Shown(only=("check", "force"))],
+    draw: Annotated[
+        Path | None,
+        option("--draw", metavar="FILE", help="SVG file for a drawing of the wiring.", panel="Output"),
+    ] = None,
+    format: Format = "text",
+) -> None:
+    """Check a described system and generate its code.
+
+    Without --out you get a summary: rates, values with their units, frames, formats and error bounds, and the budget.
+
+    Example: strapgen system examples/strapdown.toml --target c-fixed --word 16 --out firmware
+
+    Example: strapgen system examples/strapdown.toml --draw out/strapdown.svg
+    """
+    check_format(format)
+    _check_options(file, out, draw, with_runs, output)
+    fit, needs, command = fitted_stages(file, target, sample_hz, cpu, fixed)
+    if with_runs and not _compiled(target):
+        raise InputError(
+            f"--with-runs goes with targets in C, not with {target}; its module runs many cycles"
+        )
+    from strapgen.navigation.systems.drawing.drawing import drawing
+    from strapgen.navigation.systems.system_bounds import bounds
+    from strapgen.navigation.systems.system_report import system_data, system_report
+    from strapgen.storage.files import write_files
+
+    errors = bounds(fit)
+    sources = unit(fit, needs, errors, command)
+    files = sources.files if with_runs else sources.step_files
+    place = SourceOptions(out=out, check=output.check, force=output.force)
+    if output.check:
+        place.show_difference(files, format)
+        return
+    picture = {} if draw is None else {draw.name: drawing(fit)}
+    written = place.write(files) if out is not None else []
+    written += [] if draw is None else write_files(draw.parent, picture)
+    if format == "json":
+        print_json({**system_data(fit, needs, errors), "files": [str(path) for path in written]})
+        return
+    if written:
+        typer.echo("\n".join([f"{sources.kernel} for {target}", *(f"  {path}" for path in written), ""]))
+    typer.echo(system_report(fit, needs, errors).text())
+
+
+def _check_options(
+    file: Path, out: Path | None, draw: Path | None, with_runs: bool, output: SourceOptions
+) -> None:
+    """Refuse options that do not go together, and a drawing that is no SVG or the file itself."""
+    checks.text("FILE", str(file))
+    stated = {"--with-runs": with_runs, "--check": output.check, "--force": output.force}
+    for name, is_stated in stated.items():
+        if is_stated and out is None:
+            raise InputError(f"{name} goes with --out, the folder of the files")
+    if draw is None:
+        return
+    if draw.suffix.lower() != ".svg":
+        raise InputError(f"--draw {draw} is no SVG file; a name that ends with .svg is needed")
+    if draw.resolve() == file.resolve():
+        raise InputError(f"--draw {draw} is the file that the command reads; another one is needed")
+    if output.check:
+        raise InputError("--check writes nothing; --draw does not go with it")
+
+
+def _compiled(target: str) -> bool:
+    from strapgen.targets import TARGETS
+
+    return TARGETS[target].compiled
+
+
+def unit(fit: Fitted, needs: Budget, errors: SystemBounds, command: str) -> Sources:
+    """Return the files of the whole, with bounds and budget in its head."""
+    from strapgen.navigation.systems import budget, system_generation
+    from strapgen.navigation.systems.system_report import bound_lines
+
+    return system_generation.unit(fit, command, [*bound_lines(fit, errors), *budget.lines(needs)])
+
+
+def fitted_stages(
+    file: Path, target: str, sample_hz: str | None, cpu: str | None, fixed: FixedOptions
+) -> tuple[Fitted, Budget, str]:
+    """Return the generated stages, what they need, and the command that makes the files again."""
+    from strapgen.ir.fixed_settings import Settings
+    from strapgen.lab.cost.cost import processors
+    from strapgen.navigation.systems import system_cost
+    from strapgen.navigation.systems.budget import budget
+    from strapgen.navigation.systems.fitting import fitted
+    from strapgen.navigation.systems.wiring import read_system
+    from strapgen.targets import BUILT_IN, system_targets
+
+    checks.choice("target", target, system_targets())
+    rate = None if sample_hz is None else checks.number("--sample-hz", sample_hz, positive=True)
+    description = read_system(file, rate)
+    timed = None if fixed.lsb is None else str(description.system.sample_hz)
+    settings = replace(fixed, sample_hz=timed).settings(1)
+    if BUILT_IN[target].fixed:
+        settings = settings or Settings()
+    elif settings is not None:
+        takers = [name for name in system_targets() if BUILT_IN[name].fixed]
+        raise InputError(
+            f"the options of fixed point go with --target {' or '.join(takers)}, not with {target}"
+        )
+    if cpu is not None:
+        if not BUILT_IN[target].compiled:
+            raise InputError(f"--cpu goes with targets in C, not with {target}")
+        processors(None, [cpu])  # known before the stages are generated
+    fit = fitted(description, target, settings)
+    needs = budget(fit) if cpu is None else system_cost.measured_budget(fit, cpu)
+    return fit, needs, _command(file, target, rate, cpu, settings)
+
+
+def _command(
+    file: Path, target: str, rate: Fraction | None, cpu: str | None, settings: Settings | None
+) -> str:
+    """Return the command line that makes the files again, without those of --with-runs."""
+    from strapgen.targets.contract import options
+
+    words = [f"strapgen system {shlex.quote(file.as_posix())} --target {target}"]
+    stated = "" if settings is None else options(settings)
+    words += [] if rate is None or "--sample-hz" in stated else [f"--sample-hz {rate}"]
+    words += [] if cpu is None else [f"--cpu {cpu}"]
+    words += [stated] if stated else []
+    return " ".join(words)

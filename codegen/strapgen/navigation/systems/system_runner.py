@@ -1,0 +1,290 @@
+"""Runs a described system on the generated functions of its stages, cycle by cycle or one rate on many memories."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.signals import CYCLE
+from strapgen.navigation.systems.fitting import Fitted
+from strapgen.navigation.systems.system import Push, Rate, SystemStage
+from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
+from strapgen.navigation.systems.system_memory import SystemMemory, SystemRun, rescaled
+from strapgen.run import compiler
+from strapgen.run.evaluators import Array, Evaluator
+from strapgen.run.exact import in_digits, rounded
+from strapgen.run.fixed_numbers import fresh_feedback, integers, numbers
+from strapgen.run.increments import pulses
+from strapgen.run.registry import BACKENDS, evaluator_class
+
+#: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
+_EXACT_BITS = 53
+#: Cycles, about, whose outputs are held at a time.
+BLOCK = 1 << 14
+
+
+class SystemRunner(ABC):
+    """A described system on a back end.
+
+    Parameters
+    ----------
+    fit : Fitted
+        Its generated stages.
+    backend : str
+        Name of the back end.
+    """
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"{self.system.name} on {self.backend}: {', '.join(self.fit.sources)}"
+
+    def __init__(self, fit: Fitted, backend: str) -> None:
+        self.fit = fit
+        self.backend = backend
+        self.system = fit.description.system
+        self.many_digits = BACKENDS[backend].many_digits
+
+    @cached_property
+    def evaluators(self) -> dict[str, Evaluator]:
+        """The generated functions of the stages by name; C is compiled in one call of the compiler."""
+        compiler.compile_together(self.fit.sources.values())
+        make = evaluator_class(BACKENDS[self.backend].target)
+        return {name: make(sources) for name, sources in self.fit.sources.items()}
+
+    def fresh(self, runs: int) -> dict[str, Array]:
+        """Return the error feedback with which runs begin, by stage, (runs, number of words)."""
+        interfaces = {name: sources.fixed for name, sources in self.fit.sources.items()}
+        return {
+            name: np.empty((runs, 0)) if interface is None else fresh_feedback(interface, runs)
+            for name, interface in interfaces.items()
+        }
+
+    def begin(self, runs: int = 1) -> SystemMemory:
+        """Return the memory with which a run begins."""
+        cells = {}
+        for cell in self.system.cells:
+            argument = self.fit.arguments.get(cell.name)
+            if argument is not None:
+                words = [argument.format.nearest(value) for value in cell.initial]
+                row: Array = np.array([words], object if argument.format.word > 32 else np.int64)
+            elif self.many_digits:
+                row = in_digits(np.array([[float(value) for value in cell.initial]]))
+            else:
+                row = np.array([[float(value) for value in cell.initial]], self._dtype)
+            cells[cell.name] = np.repeat(row, runs, axis=0)
+        return SystemMemory(cells, self.fresh(runs))
+
+    @cached_property
+    def rounding(self) -> SystemBounds:
+        """Error bounds of one pass."""
+        return bounds(self.fit)
+
+    @property
+    def _dtype(self) -> Any:
+        return next(iter(self.evaluators.values())).dtype
+
+    def set(self, memory: SystemMemory, cell: str, value: Any) -> None:
+        """Set a cell to a value in SI units, for instance an attitude at the start."""
+        held = self.system.cell(cell)
+        array = checks.real_array(cell, value, held.signal.shape, np.float64).reshape(-1, held.signal.size)
+        memory.cells[cell] = np.repeat(
+            self.stored(cell, array), len(memory.cells[cell]) // len(array), axis=0
+        )
+
+    def stored(self, name: str, values: Array) -> Array:
+        """Return numbers in SI units as the system stores them."""
+        argument = self.fit.arguments.get(name)
+        if argument is not None:
+            return integers(argument, values, self.system.name)
+        if self.many_digits:
+            return in_digits(values)
+        with np.errstate(over="ignore"):
+            return np.ascontiguousarray(values, self._dtype)
+
+    def in_si(self, name: str, values: Array) -> Array:
+        """Return stored values of a cell as numbers in SI units, (count, elements)."""
+        argument = self.fit.arguments.get(name)
+        if argument is not None:
+            return numbers(argument, values)
+        return np.asarray(rounded(values)) if self.many_digits else np.asarray(values, np.float64)
+
+    def samples(self, inputs: Mapping[str, Any]) -> dict[str, Array]:
+        """Return samples of the inputs as the system takes them, checked.
+
+        In fixed point an increment takes over the rounding error of the one before, as from a sensor that counts
+        pulses.
+
+        Parameters
+        ----------
+        inputs : mapping of str to array_like, (cycles, shape)
+
+        Raises
+        ------
+        InputError
+            If an input is missing or unknown, or has another shape or range.
+        """
+        names = [signal.name for signal in self.system.inputs]
+        for name in [*inputs, *names]:
+            if name not in names or name not in inputs:
+                raise InputError(
+                    f"inputs are {', '.join(sorted(inputs))}; the system has: {', '.join(names)}"
+                )
+        result, counts = {}, set()
+        for signal in self.system.inputs:
+            values = checks.real_array(signal.name, inputs[signal.name], signal.shape, np.float64)
+            values = values.reshape(-1, signal.size)
+            argument = self.fit.arguments.get(signal.name)
+            if argument is not None and signal.over == CYCLE and argument.format.word < _EXACT_BITS:
+                values = carried(values, argument.unit)
+            result[signal.name] = self.stored(signal.name, values)
+            counts.add(len(values))
+        if len(counts) > 1:
+            raise InputError(
+                f"the inputs have {' and '.join(map(str, sorted(counts)))} samples; one number is needed"
+            )
+        return result
+
+    def run(self, inputs: Mapping[str, Any], memory: SystemMemory | None = None) -> SystemRun:
+        """Run cycles of the fastest rate.
+
+        Parameters
+        ----------
+        inputs : mapping of str to array_like, (cycles, shape)
+            Samples of every input in SI units.
+        memory : SystemMemory, optional
+            What a run before has left; by default `begin`.
+
+        Returns
+        -------
+        SystemRun
+            The system's outputs after each of their cycles.
+
+        Raises
+        ------
+        InputError
+            If a sample is refused; the message names the stage.
+        """
+        samples = self.samples(inputs)
+        count = len(next(iter(samples.values())))
+        return self._block(samples, count, (memory or self.begin()).copy())
+
+    def blocks(self, inputs: Mapping[str, Any], memory: SystemMemory | None = None) -> Iterator[SystemRun]:
+        """Run cycles as `run` does, and yield the outputs of some thousands at a time, whole cycles of all rates.
+
+        Parameters
+        ----------
+        inputs, memory
+            As for `run`.
+        """
+        samples = self.samples(inputs)
+        count = len(next(iter(samples.values())))
+        after = (memory or self.begin()).copy()
+        size = -(-BLOCK // self.system.cycle) * self.system.cycle
+        for first in range(0, count, size):
+            part = {name: rows[first : first + size] for name, rows in samples.items()}
+            run = self._block(part, min(size, count - first), after)
+            after = run.memory
+            yield run
+
+    def _block(self, samples: Mapping[str, Array], count: int, memory: SystemMemory) -> SystemRun:
+        values, after = self._run(samples, count, memory)
+        shaped = {
+            name: self.in_si(name, rows).reshape(-1, *self.system.cell(name).signal.shape)
+            for name, rows in values.items()
+        }
+        return SystemRun(shaped, after)
+
+    @abstractmethod
+    def _run(
+        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
+    ) -> tuple[dict[str, Array], SystemMemory]:
+        """Run checked samples, and return the outputs after each of their cycles and the memory."""
+
+    def call(self, memory: SystemMemory, samples: Mapping[str, Array], rates: Sequence[Rate]) -> None:
+        """Run some rates once on every row of a memory, each with its samples.
+
+        Parameters
+        ----------
+        memory : SystemMemory
+            With one row a run; it is changed.
+        samples : mapping of str to array, (runs, elements)
+            As `samples` returns them.
+        rates : sequence of Rate
+        """
+        for rate in rates:
+            for step in rate.steps:
+                if isinstance(step, Push):
+                    self._push(memory, step, samples)
+                else:
+                    self._call_stage(memory, step, samples)
+            for name in rate.cleared:
+                memory.cells[name] = np.zeros_like(memory.cells[name])
+
+    def _push(self, memory: SystemMemory, push: Push, samples: Mapping[str, Array]) -> None:
+        """Add a sample to a cell that holds several."""
+        new = samples[push.source] if push.external else memory.cells[push.source]
+        new = self._moved(new, self.fit.arguments.get(push.source), self.fit.arguments.get(push.cell))
+        held = memory.cells[push.cell]
+        memory.cells[push.cell] = np.concatenate([held[:, new.shape[1] :], new], axis=1)
+
+    def _call_stage(self, memory: SystemMemory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
+        """Call a stage on every row."""
+        evaluator, fixed = self.evaluators[stage.name], self.fit.sources[stage.name].fixed
+        arguments: dict[str, Argument] = {}
+        if fixed is not None:
+            arguments = {a.signal.name: a for a in (*fixed.inputs, *fixed.outputs)}
+        rows = []
+        for wire in stage.wires:
+            held = samples[wire.source] if wire.external else memory.cells[wire.source]
+            rows.append(self._moved(held, self.fit.arguments.get(wire.source), arguments.get(wire.input)))
+        try:
+            outputs, memory.feedback[stage.name] = evaluator.run(rows, memory.feedback[stage.name])
+        except InputError as error:
+            raise InputError(f"stage {stage.name}: {error}") from None
+        for (name, cell), output in zip(stage.results, outputs, strict=True):
+            memory.cells[cell] = self._moved(output, arguments.get(name), self.fit.arguments.get(cell))
+
+    def _moved(self, values: Array, there: Argument | None, here: Argument | None) -> Array:
+        """Return integers in another format, rounded as the generated C rounds them."""
+        if there is None or here is None or there.format == here.format:
+            return values
+        return rescaled(values, there.format, here.format)
+
+
+class InterpretedSystem(SystemRunner):
+    """Calls one generated function for each stage, from Python."""
+
+    def _run(
+        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
+    ) -> tuple[dict[str, Array], SystemMemory]:
+        recorded: dict[str, list[Array]] = {name: [] for name in self.system.outputs}
+        every = {name: self.system.every(name) for name in self.system.outputs}
+        for k in range(count):
+            memory.cycle = (memory.cycle + 1) % self.system.cycle
+            due = [rate for rate in self.system.rates if memory.cycle % rate.every == 0]
+            self.call(memory, {name: rows[k : k + 1] for name, rows in samples.items()}, due)
+            for name, rows in recorded.items():
+                if memory.cycle % every[name] == 0:
+                    rows.append(memory.cells[name])
+        empty = {name: memory.cells[name][:0] for name in recorded}
+        return {
+            name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
+        }, memory
+
+
+def carried(values: Array, unit: Fraction) -> Array:
+    """Return increments of any number of elements, (cycles, elements), as differences of rounded sums."""
+    count, size = values.shape
+    padded = np.pad(values, ((0, 0), (0, -size % 3)))
+    triples = padded.reshape(count, -1, 1, 3).swapaxes(0, 1)
+    return pulses(triples, unit).swapaxes(0, 1).reshape(count, -1)[:, :size]

@@ -1,0 +1,260 @@
+"""Runs a described system on a motion or along a recording, and compares its attitude with the true one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.signals import Signal
+from strapgen.lab.motions.motions import Motion
+from strapgen.lab.recordings.recording import History, Recording
+from strapgen.lab.sensor_errors.measured_motions import both_increments
+from strapgen.lab.simulate.runs import Run
+from strapgen.navigation.systems.system import Cell, DescribedSystem
+from strapgen.navigation.systems.system_backends import SystemMemory, SystemRunner
+from strapgen.navigation.systems.system_inputs import cycles_of, samples
+from strapgen.run.backends import evaluator
+
+Array = NDArray[np.float64]
+#: From this departure of the rows' scalar products from those of orthogonal ones on, a matrix is no rotation.
+_NO_ROTATION = 0.5
+#: Largest denominator of the rate of a recording in Hz.
+_DENOMINATOR = 1000
+
+
+def rate_of(recording: Recording) -> Fraction:
+    """Return the samples of a recording in a second, as a number with a small denominator."""
+    return Fraction(1 / recording.interval).limit_denominator(_DENOMINATOR)
+
+
+def attitude_output(system: DescribedSystem) -> Cell:
+    """Return the first output that is the attitude of the body.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    for name in system.outputs:
+        cell = system.cell(name)
+        if cell.signal.constraint and cell.signal.frame.startswith("b to ") and cell.signal.size in (4, 9):
+            return cell
+    raise InputError(
+        f"system {system.name} has no attitude among its outputs ({', '.join(system.outputs)}); "
+        "Euler or Cayley-Klein parameters or direction cosines, frame b to n, are needed"
+    )
+
+
+def matrices(signal: Signal, values: Any) -> Array:
+    """Return attitudes of a signal as direction cosine matrices, (N, 3, 3)."""
+    rows = np.asarray(values, np.float64).reshape(-1, signal.size)
+    if signal.size == 9:
+        return rows.reshape(-1, 3, 3)
+    return np.asarray(evaluator(f"dcm-from-{_parameters(signal)}")(rows))
+
+
+def _parameters(signal: Signal) -> str:
+    """Return what four elements of an attitude are: the scalar stands first in Cayley-Klein parameters."""
+    return "cayley-klein" if signal.elements[0].endswith("_s") else "euler"
+
+
+def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Array]:
+    """Return the memory at the start of a run, and the attitude in it as a matrix, (3, 3).
+
+    Parameters
+    ----------
+    runner : SystemRunner
+    start : array, (3, 3), or None
+        Attitude to begin with in place of that of the description.
+
+    Raises
+    ------
+    InputError
+        If that is no rotation.
+    """
+    memory = runner.begin()
+    cell = attitude_output(runner.system)
+    if start is not None:
+        value = start if cell.signal.size == 9 else evaluator(f"{_parameters(cell.signal)}-from-dcm")(start)
+        runner.set(memory, cell.name, value)
+    begin = matrices(cell.signal, [float(value) for value in cell.initial])[0] if start is None else start
+    require_rotations(cell.name, np.asarray(begin)[None], np.zeros(1))
+    return memory, begin
+
+
+def require_rotations(name: str, values: Array, time: Array) -> None:
+    """Refuse attitudes that are no rotations, which have no drift.
+
+    Parameters
+    ----------
+    name : str
+        That of the attitude, for the message.
+    values : array, (N, 3, 3)
+    time : array, (N,)
+        In s.
+
+    Raises
+    ------
+    InputError
+        If the rows of one are far from orthogonal ones of length 1.
+    """
+    off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = np.flatnonzero(~(off < _NO_ROTATION))
+    if len(wrong):
+        place = int(wrong[0])
+        raise InputError(
+            f"the attitude {name} is no rotation at {time[place]:.6g} s: its rows are {off[place]:.3g} from orthogonal "
+            "ones of length 1"
+        )
+
+
+def simulate_system(
+    runner: SystemRunner,
+    motion: Motion,
+    duration: Fraction,
+    record: Fraction | None = None,
+    start: Array | None = None,
+    force: tuple[float, ...] = (0.0, 0.0, 0.0),
+) -> Run:
+    """Run a system on a motion with a known attitude.
+
+    The truth is the attitude of the motion, after `start` if that is stated, whatever the system begins with. The
+    navigation frame rests, so that a system that follows the rotation of the earth departs by that rotation.
+
+    Parameters
+    ----------
+    runner : SystemRunner
+    motion : Motion
+        The motion, which supplies exact increments.
+    duration : Fraction
+        In s; a whole number of cycles of the slowest rate.
+    record : Fraction, optional
+        Time from one record to the next in s, a multiple of the cycle of the attitude; by default that cycle.
+    start : array, (3, 3), optional
+        Attitude at the start; by default that of the description.
+    force : tuple of float, optional
+        Specific force in m/s^2, constant in reference axes.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        If the system has no attitude among its outputs, an input is no sensor, a time is no such multiple, or a stage
+        refuses a sample.
+    """
+    system, cell = runner.system, attitude_output(runner.system)
+    cycles, interval = cycles_of(system, duration), 1 / system.sample_hz
+    cycle = system.every(cell.name) * interval
+    thinning = 1 if record is None else checks.multiple("record", record, "cycle of the attitude", cycle)
+    memory, begin = begun(runner, start)
+
+    def attitude(time: Array) -> Array:
+        true = np.asarray(motion.attitude(time))
+        return true if start is None else start @ true
+
+    angle, velocity = both_increments(motion, attitude, force, interval, cycles)
+    records, seen = [], 0
+    for run in runner.blocks(samples(runner.fit.description, angle, velocity), memory):
+        values = run.values[cell.name]
+        records.append(values[(thinning - 1 - seen) % thinning :: thinning])
+        seen += len(values)
+    states = matrices(cell.signal, np.concatenate(records))
+    if not np.isfinite(states).all():
+        raise InputError(f"the attitude {cell.name} is not finite; the increments are too large")
+    computed = np.concatenate([begin[None], states])
+    time: Array = np.arange(len(computed), dtype=np.float64) * float(cycle * thinning)
+    require_rotations(cell.name, computed, time)
+    true = attitude(time)
+    return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
+
+
+def system_history(runner: SystemRunner, recording: Recording) -> History:
+    """Run a system along recorded increments of gyros, without specific force unless the recording has it.
+
+    Returns
+    -------
+    History
+        The attitude after each of its cycles.
+    """
+    course = system_course(runner, recording)
+    cell = attitude_output(runner.system)
+    step = runner.system.every(cell.name) * recording.interval
+    values = course.values[cell.name]
+    begin = np.array([[float(value) for value in cell.initial]]).reshape(1, *cell.signal.shape)
+    time: Array = recording.start + step * np.arange(1 + len(values), dtype=np.float64)
+    states = np.concatenate([begin, values])
+    return History(time, states, step, course.unused, cell.signal.elements)
+
+
+@dataclass(frozen=True)
+class SystemCourse:
+    """The outputs of a system along a recording.
+
+    Parameters
+    ----------
+    system : DescribedSystem
+    start, interval : float
+        Time at which the first sample begins, and from sample to sample, in s.
+    values : mapping of str to array, (times, shape)
+        Each output after each of its cycles.
+    unused : int
+        Samples at the end that fill no cycle of the slowest rate.
+    """
+
+    system: DescribedSystem
+    start: float
+    interval: float
+    values: dict[str, Array]
+    unused: int
+
+    def rows(self) -> tuple[Array, dict[str, Array]]:
+        """Return the ends of the cycles of the slowest output in s, and all outputs at these times."""
+        slowest = max(self.system.every(name) for name in self.values)
+        rows = {
+            name: values[slowest // self.system.every(name) - 1 :: slowest // self.system.every(name)]
+            for name, values in self.values.items()
+        }
+        count = len(next(iter(rows.values())))
+        return self.start + self.interval * slowest * np.arange(1.0, count + 1), rows
+
+
+def system_course(
+    runner: SystemRunner, recording: Recording, memory: SystemMemory | None = None
+) -> SystemCourse:
+    """Run a system along a recording, one increment of the sensors for each cycle of the samples.
+
+    Parameters
+    ----------
+    runner : SystemRunner
+        At the rate of the recording, see `rate_of`.
+    recording : Recording
+        If it has no velocity increments, they are zero.
+    memory : SystemMemory, optional
+        By default that of the description.
+
+    Raises
+    ------
+    InputError
+        If the recording is shorter than a cycle of the slowest rate, an input is no sensor, or a stage refuses a
+        sample.
+    """
+    cycles, unused = divmod(len(recording.increments), runner.system.cycle)
+    if not cycles:
+        raise InputError(
+            f"the recording holds {len(recording.increments)} increments; a cycle of the slowest rate needs "
+            f"{runner.system.cycle}"
+        )
+    count = cycles * runner.system.cycle
+    angle = np.asarray(recording.increments[:count])
+    velocity = np.asarray(getattr(recording, "velocity_increments", np.zeros_like(angle))[:count])
+    run = runner.run(samples(runner.fit.description, angle, velocity), memory)
+    return SystemCourse(runner.system, recording.start, recording.interval, dict(run.values), unused)

@@ -1,0 +1,161 @@
+"""Derives the three loops of a strapdown algorithm in two speeds: the fast, the slow and the navigation loop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from strapgen.catalogue.kernels.acceleration import (
+    NAVIGATION_VELOCITY,
+    VELOCITY_EQUATIONS,
+    compensated,
+    frame_correction,
+    rotated,
+)
+from strapgen.catalogue.kernels.coning_sculling import (
+    ANGLE_SUM,
+    CONING,
+    INCREMENT,
+    PREVIOUS,
+    SCULLING,
+    VELOCITY_INCREMENT,
+    VELOCITY_SUM,
+    FastLoop,
+    coned,
+    rotation_vector_of,
+    sculled,
+)
+from strapgen.catalogue.kernels.updates import (
+    NAVIGATION_ROTATION,
+    PREVIOUS_TURN,
+    ROTATION_VECTOR,
+    TURN,
+    rotation_sum,
+    transition,
+    turned_frame,
+)
+from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
+from strapgen.ir.recursion import Recursion
+from strapgen.ir.signals import Signal, after
+from strapgen.kernel.kernel import Kernel, KernelBuilder
+
+#: Equations of Savage that turn a state by a rotation vector, and with the navigation frame.
+_UPDATE = {"dcm": "(2) to (4)", "euler": "(9) to (14)"}
+_TURNED_FRAME = {"dcm": "(5), (6)", "euler": "(15)"}
+
+
+def fast(form: int) -> Kernel:
+    """Return the fast loop: coning and sculling from angle and velocity increments, equations (26) and (55) or (56).
+
+    Parameters
+    ----------
+    form : int
+        Form of the sculling integral: 1 or 2.
+
+    Returns
+    -------
+    Kernel
+        The states ``angle_sum``, ``coning``, ``previous_increment``, ``velocity_sum``, ``sculling`` and the inputs
+        ``increment``, ``velocity_increment``; angles in rad, velocities in m/s, all (3,).
+    """
+    loop = FastLoop()
+    beta, coning, past, u, eta, d, dv = map(
+        loop.build.input,
+        (ANGLE_SUM, CONING, PREVIOUS, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT),
+    )
+    loop.hand_on(ANGLE_SUM, beta + d)
+    loop.hand_on(CONING, coned(loop.build, coning, beta, past, d))
+    loop.hand_on(PREVIOUS, d)
+    loop.hand_on(VELOCITY_SUM, u + dv)
+    loop.hand_on(SCULLING, sculled(loop.build, form, eta, beta, u, d, dv))
+    equation = "(55)" if form == 1 else "(56)"
+    return loop.kernel(
+        f"two-speed-fast-{form}", f"Two speeds: fast loop with S{form}", f"equations (26) and {equation}"
+    )
+
+
+def slow(name: str, form: int) -> Kernel:
+    """Return the slow loop, which updates attitude, velocity in navigation axes and rotation of the frame.
+
+    Parameters
+    ----------
+    name : str
+        "dcm" or "euler".
+    form : int
+        Form of the sculling integral of the fast loop: 1 or 2.
+
+    Returns
+    -------
+    Kernel
+        The states ``state``, ``navigation_velocity``, ``navigation_rotation``, ``previous_turn``; the inputs
+        ``angle_sum``, ``coning``, ``velocity_sum``, ``sculling``, which are sums of the fast loop, and ``turn``, the
+        rate of the navigation frame times the slow cycle in rad.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, v, theta, before = map(
+        build.input, (kinematics.state, NAVIGATION_VELOCITY, NAVIGATION_ROTATION, PREVIOUS_TURN)
+    )
+    beta, coning, u, eta, turn = map(build.input, (ANGLE_SUM, CONING, VELOCITY_SUM, SCULLING, TURN))
+    phi = build.stage(ROTATION_VECTOR, rotation_vector_of(beta, coning))
+    step_transition = transition(build, kinematics, phi)
+    states = (
+        (kinematics.state, kinematics.next, kinematics.product(state, step_transition)),
+        (
+            NAVIGATION_VELOCITY,
+            after(NAVIGATION_VELOCITY),
+            v + rotated(build, name, state, compensated(build, form, u, eta, beta)),
+        ),
+        (NAVIGATION_ROTATION, after(NAVIGATION_ROTATION), rotation_sum(theta, before, turn)),
+        (PREVIOUS_TURN, after(PREVIOUS_TURN), turn),
+    )
+    for _, signal, value in states:
+        build.output(signal, value)
+    return build.kernel(
+        f"{name}-two-speed-slow-{form}",
+        f"Two speeds: slow loop of the {_title(name)}",
+        f"{SAVAGE}, equations {_UPDATE[name]}, (22), (27) and {VELOCITY_EQUATIONS[name, form]}",
+        recursion=Recursion(
+            tuple((held.name, signal.name) for held, signal, _ in states),
+            kept=(kinematics.state.name, PREVIOUS_TURN.name),
+        ),
+    )
+
+
+def navigation(name: str) -> Kernel:
+    """Return the loop of the navigation frame, which corrects attitude and velocity for its rotation.
+
+    Parameters
+    ----------
+    name : str
+        "dcm" or "euler".
+
+    Returns
+    -------
+    Kernel
+        Inputs ``state``, which is a state, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
+        ``velocity_change`` (3,) in m/s, the integral of the specific force in the rotating navigation axes.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state, theta, v = map(build.input, (kinematics.state, NAVIGATION_ROTATION, NAVIGATION_VELOCITY))
+    build.output(kinematics.next, turned_frame(build, kinematics, state, theta))
+    gained: Signal = replace(
+        NAVIGATION_VELOCITY,
+        name="velocity_change",
+        elements=tuple(f"change_{axis}" for axis in "xyz"),
+        meaning="integral of the specific force over the navigation cycle, navigation axes as they turn",
+        over="cycle",
+    )
+    build.output(gained, v + frame_correction(theta, v))
+    return build.kernel(
+        f"{name}-two-speed-navigation",
+        f"Two speeds: navigation loop of the {_title(name)}",
+        f"{SAVAGE}, equations {_TURNED_FRAME[name]} and (59)",
+        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+    )
+
+
+def _title(name: str) -> str:
+    """Return the title of the attitude representation for use within a sentence."""
+    title = KINEMATICS[name].title
+    return title.lower() if name == "dcm" else title

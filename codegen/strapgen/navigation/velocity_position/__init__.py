@@ -1,0 +1,1 @@
+"""Velocity and position beside truth."""

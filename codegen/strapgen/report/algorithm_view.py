@@ -1,0 +1,188 @@
+"""What the page shows of one algorithm: its interface, formulas, formats, bounds, code and evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from strapgen.evidence.evidence_report import EvidencePage
+from strapgen.evidence.subjects import Subject
+from strapgen.ir.decimals import above, below
+from strapgen.ir.integer_program import FixedProgram, used_by
+from strapgen.ir.signals import FRAMES, Signal
+from strapgen.report.dossier import AlgorithmDossier
+from strapgen.report.mathml import FormulaRow, equations
+from strapgen.results.display.formulas import as_latex
+from strapgen.targets.contract import operations_text
+
+#: What targets are called on the page.
+TARGET_TITLES = {
+    "numpy": "Python with numpy",
+    "c": "C in double",
+    "c-float": "C in float",
+    "c-fixed": "C in fixed point",
+}
+
+
+@dataclass(frozen=True)
+class SignalRow:
+    """A row of the table of inputs and outputs.
+
+    Parameters
+    ----------
+    direction : str
+        "in" or "out".
+    name, shape, unit, frame, meaning : str
+        In words.
+    format, range, bound : str
+        Of fixed point; "" where there is none.
+    """
+
+    direction: str
+    name: str
+    shape: str
+    unit: str
+    frame: str
+    meaning: str
+    format: str = ""
+    range: str = ""
+    bound: str = ""
+
+
+@dataclass(frozen=True)
+class CodeFile:
+    """A file of code.
+
+    Parameters
+    ----------
+    name, text : str
+    language : str
+        "python" or "c", which the page colours.
+    """
+
+    name: str
+    text: str
+    language: str
+
+
+@dataclass(frozen=True)
+class AlgorithmView:
+    """What the page shows of one algorithm.
+
+    Parameters
+    ----------
+    name, title, source, operations, order : str
+        The kernel in words; `order` is "" for what is no step.
+    notes : tuple of str
+    signals : tuple of SignalRow
+    formulas : tuple of FormulaRow
+    values : tuple of (str, str, str, str)
+        Name, format, range and error bound of every value on the way in fixed point.
+    no_fixed : str
+        Why there is no fixed point.
+    code : dict of str to tuple of CodeFile
+        By the title of the target.
+    evidence : dict of str to str
+        A result by claim; empty where the tools have not run on this very code.
+    refused : dict of str to str
+        What back ends say that do not hold the run.
+    """
+
+    name: str
+    title: str
+    source: str
+    operations: str
+    order: str
+    notes: tuple[str, ...]
+    signals: tuple[SignalRow, ...]
+    formulas: tuple[FormulaRow, ...]
+    values: tuple[tuple[str, str, str, str], ...]
+    no_fixed: str
+    code: dict[str, tuple[CodeFile, ...]]
+    evidence: dict[str, str]
+    refused: dict[str, str]
+
+
+def view(known: AlgorithmDossier, evidence: EvidencePage | None) -> AlgorithmView:
+    """Return what the page shows of an algorithm.
+
+    Parameters
+    ----------
+    known : AlgorithmDossier
+    evidence : EvidencePage or None
+        What tools said of generated code; results are taken over where the digest is that of the code shown.
+    """
+    kernel, order = known.kernel, known.kernel.order
+    return AlgorithmView(
+        known.choice.kernel,
+        kernel.title,
+        kernel.source,
+        operations_text(known.program),
+        "" if order is None else f"{order.step}: {order}",
+        tuple(known.program.notes),
+        tuple(_signals(known)),
+        tuple(equations(as_latex(kernel))),
+        () if known.fixed is None else tuple(_values(known.fixed)),
+        known.no_fixed,
+        {TARGET_TITLES[target]: _files(sources.step_files) for target, sources in known.sources.items()},
+        {} if evidence is None or known.fixed is None else _evidence(known, known.fixed, evidence),
+        {} if known.runs is None else known.runs.refused,
+    )
+
+
+def _signals(known: AlgorithmDossier) -> Iterable[SignalRow]:
+    arguments = (
+        {}
+        if known.fixed is None
+        else {a.signal.name: a for a in (*known.fixed.interface.inputs, *known.fixed.interface.outputs)}
+    )
+    outputs = (("out", stage.signal) for stage in known.kernel.outputs)
+    for direction, signal in (*(("in", signal) for signal in known.kernel.inputs), *outputs):
+        fixed: dict[str, str] = {}
+        if (argument := arguments.get(signal.name)) is not None:
+            low, high, bound = (
+                argument.low * argument.unit,
+                argument.high * argument.unit,
+                max(argument.errors),
+            )
+            fixed = {"format": str(argument.format), "range": f"{below(low)} to {above(high)}"}
+            fixed["bound"] = "" if direction == "in" else above(bound, 4) if bound else "exact"
+        yield SignalRow(
+            direction,
+            signal.name,
+            " × ".join(map(str, signal.shape)) or "scalar",
+            signal.unit,
+            _frame(signal),
+            signal.meaning,
+            **fixed,
+        )
+
+
+def _frame(signal: Signal) -> str:
+    """Return the frame of a signal in words."""
+    return " to ".join(FRAMES.get(part, part) for part in signal.frame.split(" to "))
+
+
+def _values(fixed: FixedProgram) -> Iterable[tuple[str, str, str, str]]:
+    formats, ranges = fixed.formats, fixed.ranges
+    inputs = {name for argument in fixed.interface.inputs for name in argument.values}
+    for value in fixed.body:
+        if value.name in inputs and not used_by(value):
+            continue
+        low, high = ranges[value.name]
+        error = above(value.error, 3) if value.error else "exact"
+        yield value.name, str(formats[value.name]), f"{below(low)} to {above(high)}", error
+
+
+def _files(files: dict[str, str]) -> tuple[CodeFile, ...]:
+    return tuple(
+        CodeFile(name, text, "python" if name.endswith(".py") else "c") for name, text in files.items()
+    )
+
+
+def _evidence(known: AlgorithmDossier, fixed: FixedProgram, evidence: EvidencePage) -> dict[str, str]:
+    """Return the results of tools on the code that the page shows: none on code that has changed since."""
+    subject = Subject(known.choice, fixed.interface.settings)
+    if evidence.digests.get(subject.name) != subject.digest:
+        return {}
+    return evidence.results.get(subject.name, {})

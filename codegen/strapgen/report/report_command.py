@@ -1,0 +1,223 @@
+"""The command ``strapgen report`` writes a page of HTML about algorithms or the standard catalogue."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+import typer
+
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.options import FastBackends, KernelOptions, SeveralMethods, backends, listed, option
+from strapgen.cli.output import Output
+from strapgen.cli.progress import track
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.simulate.sample_source import (
+    MOTION_FILE,
+    RUN_MOTION_NAMES,
+    MotionSettings,
+    check_motion,
+    pairs,
+)
+from strapgen.thesis.tables_command import runnable
+
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+    from strapgen.evidence.evidence_report import EvidencePage
+    from strapgen.report.conditions import Conditions
+
+#: The options of fixed point, for which the sampling rate is that of the runs.
+_FIXED = (
+    *("word", "max_rate_deg_s", "lsb", "lsb_rad", "input_bits", "max_angle_rad"),
+    *("rounding", "carry", "state", "drift_allowance"),
+)
+
+#: The options that choose kernels.
+_CHOOSING = (
+    *("method", "tableau", "window", "coning"),
+    *("increments", "previous", "ahead", "constant", "layout"),
+)
+#: Most names in the heading of a page.
+_MOST_NAMES = 3
+
+
+@dataclass(frozen=True)
+class SeveralKernels(SeveralMethods, KernelOptions):
+    """Options that choose kernels: the methods and the numbers of increments of steps, and the layout of others."""
+
+
+@dataclass(frozen=True)
+class ReportRuns:
+    """Options of the runs that a page shows."""
+
+    panel: ClassVar[str] = "Input"
+
+    motion: Annotated[
+        str | None,
+        option(
+            "--motion",
+            metavar="NAME",
+            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: coning]",
+        ),
+    ] = None
+    settings: MotionSettings = None
+    sample_hz: Annotated[
+        str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
+    ] = "100"
+    duration: Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.")] = "20"
+
+    @property
+    def files(self) -> list[str]:
+        """The files that the options name."""
+        return [self.motion] if self.motion is not None and is_file(self.motion) else []
+
+    def conditions(self) -> Conditions:
+        """Return the motion, the sampling rate and the duration of the runs, checked."""
+        from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+        from strapgen.report.conditions import Conditions
+
+        check_motion(self.motion, RUN_MOTIONS)
+        if self.motion is None and self.settings:
+            raise InputError("--set goes with --motion")
+        numbers = {"sample_hz": self.sample_hz, "duration": self.duration}
+        for name, value in numbers.items():
+            checks.number(name, value, positive=True)
+        conditions = Conditions(sample_hz=self.sample_hz, duration=self.duration)
+        if self.motion is not None:
+            conditions = replace(conditions, motion=self.motion, settings=pairs(self.settings or []))
+        conditions.profile()  # refuses what is not known
+        return conditions
+
+
+@dataclass(frozen=True)
+class ReportOutput(Output):
+    """Where the page goes."""
+
+    out: Annotated[Path, option("--out", metavar="FILE", help="File of the page; - is the terminal.")] = Path(
+        "report.html"
+    )
+
+    def check(self, *read: str | Path | None) -> None:
+        """Check that the page is not written over a file that is read, and that its folder can hold it."""
+        from strapgen.storage.files import check_folder
+
+        super().check(*read)
+        if self.file is not None:
+            check_folder(self.file.parent)
+
+
+@grouped
+def report(
+    kernels: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="ALGORITHM...",
+            help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file.  "
+            "[default: the standard catalogue]",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    methods: Annotated[SeveralKernels, Shown(only=_CHOOSING)],
+    backend: FastBackends = None,
+    beside: Annotated[
+        str,
+        option(
+            "--beside",
+            metavar="NAME,...",
+            help="Methods that accuracy against cost shows beside the algorithms, as --method of frontier.",
+            panel="Algorithm",
+        ),
+    ] = "all",
+    runs: ReportRuns,
+    fixed: Annotated[FixedOptions, Shown(only=_FIXED)],
+    output: Annotated[ReportOutput, Shown(only=("out",))],
+) -> None:
+    """Write one HTML file with formulas, code, bounds, runs and evidence.
+
+    The page is one file that opens anywhere, without a network. It holds the formulas and the code of each algorithm,
+    its formats and error bounds in fixed point, its drift on a motion and the order that it shows, back ends side by
+    side, accuracy against cost for all methods of the catalogue, the tables of the thesis, and what independent tools
+    have said of the C. Each result stands beside the command that prints it.
+
+    Example: strapgen report euler --method rk4 --out out/report.html
+    """
+    names = kernels or []
+    output.check(*names, *methods.files, *runs.files)
+    if not names and methods.stated:
+        raise InputError(
+            f"{methods.stated[0]} goes with an algorithm; without one, the page shows the catalogue"
+        )
+    places = tuple(runnable() if backend is None else backends("--backend", backend, ()))
+    conditions = runs.conditions()
+    choices = [choice for name in names for choice in methods.choices(name, step=False)]
+    stated = {"--backend": backend} if backend is not None else {}
+    stated |= {"--beside": beside} if beside != "all" else {}
+    where = replace(output, out=Path(output.out.name))
+    command = command_line("report", names, stated, methods, runs, fixed, where)
+    others = listed("--beside", beside)
+    output.deliver(_page(list(dict.fromkeys(choices)), others, conditions, places, fixed, command))
+
+
+def _page(
+    choices: list[Choice],
+    beside: list[str],
+    conditions: Conditions,
+    places: tuple[str, ...],
+    fixed: FixedOptions,
+    command: str,
+) -> str:
+    """Run all that a page shows, and return it."""
+    from strapgen import catalogue
+    from strapgen.design.frontier import frontier
+    from strapgen.report import gathering
+    from strapgen.report.content import Content
+    from strapgen.report.page import report_page
+    from strapgen.run.versions import versions
+    from strapgen.storage import cache
+
+    shown = choices or catalogue.standard()
+    if fixed.max_rate_deg_s is not None or fixed.lsb is not None:
+        fixed = replace(fixed, sample_hz=conditions.sample_hz)
+    cases = [
+        gathering.DossierCase(choice, conditions, fixed.settings(choice.increments_per_step), places)
+        for choice in shown
+    ]
+    several = gathering.compared(shown, beside)
+    frontier.require_steps(several, conditions.sample_hz, conditions.duration)  # before what takes long
+    known = [*track(gathering.dossiers(cases), "gathering", len(cases))]
+    standings = [*track(gathering.standings(several, conditions), "comparing", len(several))]
+    tables = gathering.tables(shown, places)
+    content = Content(
+        _title(choices),
+        command,
+        conditions,
+        places,
+        tuple(sorted(known, key=lambda one: shown.index(one.choice))),
+        tuple(tables),
+        tuple(frontier.in_order(standings, several)),
+        gathering.named(several, beside),
+        _recorded_evidence(),
+    )
+    return report_page(content, versions(), cache.generator_digest())
+
+
+def _title(choices: list[Choice]) -> str:
+    """Return the heading of a page."""
+    if not choices:
+        return "The standard catalogue"
+    names = [choice.kernel for choice in choices]
+    return ", ".join(names) if len(names) <= _MOST_NAMES else f"{names[0]} and {len(names) - 1} others"
+
+
+def _recorded_evidence() -> EvidencePage | None:
+    """Return what tools said of the standard catalogue, where the page about it is there."""
+    from strapgen.evidence.evidence_report import read_page
+    from strapgen.storage import resources
+
+    page = resources.folder("generated") / "EVIDENCE.md"
+    return read_page(page.read_text(encoding="utf-8")) if page.is_file() else None

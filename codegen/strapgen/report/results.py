@@ -1,0 +1,132 @@
+"""The results of a page: the JSON data of commands, each under the command line that prints it again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from strapgen.design.frontier.frontier import Standing
+from strapgen.design.frontier.frontier_report import frontier_report
+from strapgen.ir import checks
+from strapgen.ir.fixed_settings import Settings
+from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
+from strapgen.lab.converge.convergence_report import convergence_report
+from strapgen.lab.simulate.runs_report import run_data, step_facts
+from strapgen.report.conditions import Conditions
+from strapgen.report.dossier import REFERENCE, AlgorithmDossier, StepRuns, run_settings
+from strapgen.report.gathering import motions
+from strapgen.results.display.formulas import formulas_report
+from strapgen.run.generation import generated_data
+from strapgen.targets import contract
+from strapgen.thesis.tables_report import thesis_tables_report
+from strapgen.thesis.thesis_tables import TableEntry
+
+#: What makes every command print its data.
+_JSON = "--format json"
+
+
+@dataclass(frozen=True)
+class CommandResult:
+    """What a command prints as JSON.
+
+    Parameters
+    ----------
+    command : str
+        The command line.
+    data : object
+        Plain JSON data. The lists of files that `generate` writes are empty, since nothing is written.
+    """
+
+    command: str
+    data: Any
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the result as plain JSON data."""
+        return {"command": self.command, "data": self.data}
+
+
+def arguments(known: AlgorithmDossier) -> str:
+    """Return name and options of a kernel on the command line."""
+    stated = known.program.arguments
+    return known.choice.kernel if stated.startswith("strapgen ") else stated
+
+
+def of_algorithm(known: AlgorithmDossier, conditions: Conditions) -> dict[str, CommandResult]:
+    """Return the results of one algorithm by the names of the commands; `generate` is that of fixed point.
+
+    Parameters
+    ----------
+    known : AlgorithmDossier
+    conditions : Conditions
+        Those of its runs.
+    """
+    formulas = formulas_report(known.kernel, known.program, "operations")
+    derive = f"strapgen derive {arguments(known)} --show operations {_JSON}"
+    results = {"derive": CommandResult(derive, formulas.data())}
+    if known.fixed is not None:
+        command = f"{contract.command(known.fixed, 'c-fixed')} {_JSON}"
+        data = generated_data(known.choice, known.sources["c-fixed"], "c-fixed", ())
+        results["generate"] = CommandResult(command, data)
+    if known.runs is not None:
+        results |= _of_runs(known, known.runs, conditions)
+    return results
+
+
+def _of_runs(known: AlgorithmDossier, runs: StepRuns, conditions: Conditions) -> dict[str, CommandResult]:
+    """Return the results of the runs of a step."""
+    step, schedule = arguments(known), runs.schedule
+    where = f"{conditions.options} {schedule.options}"
+    simulate = f"strapgen simulate {step} {where} --record {schedule.record} {_JSON}"
+    facts = step_facts(runs.backend, known.choice) | {
+        "motion": runs.profile.name,
+        "step_s": float(schedule.step),
+        "duration_s": float(schedule.duration),
+    }
+    results = {"simulate": CommandResult(simulate, run_data(runs.run, facts))}
+    if runs.comparison:
+        names = ",".join(row.backend for row in runs.comparison)
+        rounding = _rounding(runs.settings) if any("fixed" in row.backend for row in runs.comparison) else ""
+        compare = (
+            f"strapgen compare {step} --backend {names} --reference {REFERENCE} {where}{rounding} {_JSON}"
+        )
+        compared = ComparedKernel(known.choice.kernel, "", runs.comparison)
+        results["compare"] = CommandResult(compare, comparison_report([compared], REFERENCE, "").data())
+    ladder = convergence_report([runs.ladder], "").data()
+    results["converge"] = CommandResult(f"strapgen converge {step} {_JSON}", ladder)
+    return results
+
+
+def _rounding(settings: Settings) -> str:
+    """Return the options of settings that differ from the default of a run."""
+    plain, words = run_settings(None), ""
+    for name in ("rounding", "carry"):
+        if getattr(settings, name) != getattr(plain, name):
+            words += f" --{name} {getattr(settings, name)}"
+    return words
+
+
+def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> CommandResult:
+    """Return the tables of the thesis as the result of `tables`."""
+    command = f"strapgen tables --backend {','.join(backends)} {_JSON}"
+    return CommandResult(command, thesis_tables_report([*entries]).data())
+
+
+def of_frontier(
+    standings: Sequence[Standing], methods: Sequence[str], conditions: Conditions
+) -> CommandResult:
+    """Return what algorithms cost and how they drift as the result of `frontier`.
+
+    Parameters
+    ----------
+    standings : sequence of Standing
+    methods : sequence of str
+        What the option of that name states.
+    conditions : Conditions
+    """
+    words = f"--sample-hz {conditions.sample_hz} --duration {conditions.duration}"
+    names = shlex.quote(",".join(methods))
+    command = f"strapgen frontier --method {names} {conditions.options} {words} {_JSON}"
+    hertz, seconds = (float(checks.number("", text)) for text in (conditions.sample_hz, conditions.duration))
+    return CommandResult(command, frontier_report(standings, hertz, seconds, motions(conditions)).data())

@@ -1,1 +1,0 @@
-"""Reports write results as text, tables, JSON, CSV and pictures."""

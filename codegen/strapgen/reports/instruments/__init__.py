@@ -1,1 +1,0 @@
-"""Reports on the instruments and systems of 1984."""

@@ -1,1 +1,0 @@
-"""Reports what is computed again of the thesis: its tables, and the statements of its text."""

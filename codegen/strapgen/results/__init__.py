@@ -1,0 +1,1 @@
+"""Results as text, JSON, CSV, Markdown, LaTeX and images, and how objects show themselves."""

@@ -1,0 +1,236 @@
+"""What all plots share: matplotlib without a display, kinds of image files, and the look of axes and legends."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import textwrap
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from strapgen.ir.exceptions import InputError, MissingExtraError
+from strapgen.results.dark_mode import for_both_pages
+
+#: Resolution of images of pixels, in dots per inch.
+RESOLUTION_DPI = 150
+#: Colours that the colour-blind tell apart too; the first three are those of M. Okabe and K. Ito, 2008.
+COLOURS = ("#0072b2", "#d55e00", "#009e73")
+_SEVERAL = (*COLOURS, "#332288", "#cc79a7", "#8c5a00", "#88001b", "#6b6b6b")
+#: How far colours from dark to light go, so that the last one still shows on white.
+LIGHTEST = 0.62
+
+
+def pyplot() -> Any:
+    """Return matplotlib's pyplot, drawing to files alone.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    before = os.environ.get("MPLBACKEND")
+    os.environ["MPLBACKEND"] = "agg"  # a backend of the user's that is not installed would stop the import
+    try:
+        import matplotlib
+    except ImportError:
+        raise MissingExtraError("plots need matplotlib: pip install 'strapgen[plot]'") from None
+    finally:
+        if before is None:
+            del os.environ["MPLBACKEND"]
+        else:
+            os.environ["MPLBACKEND"] = before
+    matplotlib.use("Agg")
+    import matplotlib.pyplot
+
+    return matplotlib.pyplot
+
+
+def require_kind(path: str | Path) -> str:
+    """Return the kind of image that a file's ending says.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib is not installed.
+    InputError
+        If the kind is unknown.
+    """
+    pyplot()
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    kind = Path(path).suffix.lstrip(".").lower()
+    allowed = sorted({*FigureCanvasBase.get_supported_filetypes()} - {"pgf"})  # pgf takes a TeX system
+    if kind not in allowed:
+        raise InputError(f"plot {path}: file type {kind!r} is not known; allowed: {', '.join(allowed)}")
+    return kind
+
+
+def image(figure: Any, path: str | Path) -> bytes:
+    """Return a figure as the content of an image file, of the kind that the file's ending says; it is closed.
+
+    SVG has its text as text, and colours for light and for dark pages.
+    """
+    pyplot().close(figure)  # pyplot lets go of it, it can still be drawn
+    kind = require_kind(path)
+    content = io.BytesIO()
+    if kind != "svg":
+        figure.savefig(content, format=kind, dpi=RESOLUTION_DPI)
+        return content.getvalue()
+    # The same figure has the same text: without the date, the version and random names.
+    with pyplot().rc_context({"svg.hashsalt": "strapgen", "svg.fonttype": "none"}):
+        figure.savefig(content, format=kind, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    return for_both_pages(content.getvalue().decode()).encode()
+
+
+def grid_of_axes(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:
+    """Return a figure of a size in inches, and its axes as an array (rows, columns), with the axis of x shared."""
+    figure, grid = pyplot().subplots(
+        rows, columns, figsize=size, sharex=True, layout="constrained", squeeze=False, **options
+    )
+    return figure, grid
+
+
+def colours(count: int, last: float) -> Any:
+    """Return so many colours from dark to light; `last` is how far they go, 0 to 1."""
+    import numpy as np
+
+    return pyplot().get_cmap("viridis")(np.linspace(0.0, last, count))
+
+
+def several_colours(count: int) -> list[str]:
+    """Return so many colours that are told apart without an order."""
+    return [_SEVERAL[number % len(_SEVERAL)] for number in range(count)]
+
+
+#: Characters of a title on an inch.
+_CHARACTERS = 11.5
+
+
+def title(figure: Any, text: str) -> None:
+    """Write a title at the left of a figure, on as many lines as its width needs."""
+    lines = textwrap.wrap(printable(text), int(figure.get_figwidth() * _CHARACTERS))
+    figure.suptitle("\n".join(lines), fontsize=11, x=0.01, ha="left")
+
+
+def printable(text: str) -> str:
+    """Return text without what cannot be encoded, as names of files may have it."""
+    return text.encode(errors="replace").decode()
+
+
+def style(axes: Any, grid: str = "both") -> None:
+    """Give axes an open frame and a light grid."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(alpha=0.25, linewidth=0.6, axis=grid)
+
+
+def style_over_time(axes: Any) -> None:
+    """Give axes of a quantity over time their look, with a line at zero."""
+    style(axes)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    axes.margins(x=0)
+    axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+
+
+def step_ticks(axes: Any, steps: Iterable[float]) -> None:
+    """Show steps in s on a logarithmic axis of x, as fractions where they are."""
+    steps = list(steps)
+    axes.set_xscale("log", base=2)
+    axes.set_xticks(steps, [fraction(step) for step in steps])
+    axes.minorticks_off()
+    axes.set_xlabel("step, s")
+
+
+def labels_at_the_right(axes: Any, labels: Iterable[tuple[float, str, Any]]) -> None:
+    """Write labels beside the right end of axes, at a height in data or a little off, so that none covers another.
+
+    Parameters
+    ----------
+    axes : Axes
+        With its final limits.
+    labels : iterable of (float, str, colour)
+        Heights, texts and colours; a height outside of the axes stands at their border.
+    """
+    height = axes.get_position().height * axes.figure.get_size_inches()[1]
+    apart = 11.5 / 72 / height  # a line of text, as a part of the height
+    upwards = sorted(labels, key=lambda label: label[0])
+    places = [_height(axes, value) for value, _, _ in upwards]
+    for number in range(1, len(places)):
+        places[number] = max(places[number], places[number - 1] + apart)
+    for number in reversed(range(len(places))):
+        limit = 1.0 if number == len(places) - 1 else places[number + 1] - apart
+        places[number] = min(places[number], limit)
+    for place, (_, text, colour) in zip(places, upwards, strict=True):
+        axes.text(
+            1.01, place, printable(text), transform=axes.transAxes, fontsize=9, color=colour, va="center"
+        )
+
+
+#: Where a label can stand beside its point, in points of 1/72 inch: left and below, and so on.
+_PLACES = [(x, y) for x in (-7, 7) for y in (-11, -2, -21, -31, -41, 5, 15, 25)]
+
+
+def labels_beside_points(
+    axes: Any, points: Mapping[str, tuple[float, float]], colours: Mapping[str, Any]
+) -> None:
+    """Write labels beside points, each where it covers no other label and leaves the axes as little as can be.
+
+    Parameters
+    ----------
+    axes : Axes
+        With their final place and limits.
+    points : mapping of str to (float, float)
+        Points in data by their labels.
+    colours : mapping of str to colour
+        Of the labels.
+    """
+    boxes: list[Any] = []
+    frame = axes.get_window_extent()
+    for text, point in points.items():
+        best: tuple[float, Any, Any] | None = None
+        for place in _PLACES:
+            label = axes.annotate(
+                printable(text),
+                point,
+                xytext=place,
+                textcoords="offset points",
+                ha="left" if place[0] > 0 else "right",
+                fontsize=8,
+                color=colours[text],
+            )
+            box = label.get_window_extent()
+            outside = max(0.0, box.x1 - frame.x1) + max(0.0, frame.x0 - box.x0)
+            cost = outside + 1000 * sum(box.overlaps(other) for other in boxes)
+            if best is None or cost < best[0]:
+                if best is not None:
+                    best[1].remove()
+                best = cost, label, box
+            else:
+                label.remove()
+            if not best[0]:
+                break
+        assert best is not None, "there are places"
+        boxes.append(best[2])
+
+
+def _height(axes: Any, value: float) -> float:
+    """Return where a number stands between the lower and the upper end of axes, 0 to 1."""
+    low, high = map(float, axes.get_ylim())
+    if axes.get_yscale() == "log":
+        low, high, value = math.log(low), math.log(high), math.log(value) if value > 0 else -math.inf
+    return min(1.0, max(0.0, (value - low) / (high - low)))
+
+
+def common_legend(figure: Any, panels: Iterable[Any], **options: Any) -> None:
+    """Give panels one legend outside of them, each label once."""
+    handles: dict[str, Any] = {}
+    for axes in panels:
+        handles |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), frameon=False, fontsize=9, **options)
+
+
+def fraction(number: float) -> str:
+    """Return a number as one part of a whole where it is one."""
+    parts = round(1 / number)
+    return f"1/{parts}" if parts > 1 and abs(parts * number - 1) < 1e-9 else f"{number:g}"

@@ -1,1 +1,0 @@
-"""Runs back ends on motions with known attitude and on recordings."""

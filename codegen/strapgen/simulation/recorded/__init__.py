@@ -1,1 +1,0 @@
-"""Reads recorded files: their rows, columns and headers, and rates that are integrated."""

@@ -1,0 +1,1 @@
+"""Files on disk: the cache, drafts of files, what the package ships."""

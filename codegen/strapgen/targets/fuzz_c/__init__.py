@@ -1,1 +1,0 @@
-"""Prints drivers for fuzzers of generated C functions."""

@@ -1,1 +1,0 @@
-"""The target that prints the Python twin of the C of a described system."""

@@ -1,1 +1,0 @@
-"""The target that prints the C of all loops of an algorithm in two speeds."""

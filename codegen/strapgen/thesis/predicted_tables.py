@@ -1,0 +1,116 @@
+"""Predicts the tables of the thesis from error series and sets them beside simulations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+from strapgen import catalogue
+from strapgen.analysis.series.prediction import Prediction, predict
+from strapgen.lab.motions.motions import motion
+from strapgen.lab.simulate.runs import simulate
+from strapgen.run.backends import backend
+from strapgen.thesis.printed_tables import ALGORITHMS, ORDERS, TABLES, Table, agrees
+from strapgen.thesis.thesis_tables import DURATION, INTERVAL, STEP, drift_deg
+
+
+@dataclass(frozen=True)
+class PredictedEntry:
+    """One figure of a table.
+
+    Parameters
+    ----------
+    table : int
+    algorithm : str
+    order : int
+        Order of the integration.
+    drift_deg, normalised : float
+        Predicted drift in degrees, and its ratio to that of the direction cosine matrix, as in the table.
+    simulated_deg, simulated : float
+        The same two numbers from a run in numpy.
+    thesis : str
+        The ratio as the thesis prints it.
+    agrees : bool
+        Whether `normalised` has the printed digits.
+    scan, repairs : str or None, tuple of str
+        As for `TableEntry`.
+    """
+
+    table: int
+    algorithm: str
+    order: int
+    drift_deg: float
+    normalised: float
+    simulated_deg: float
+    simulated: float
+    thesis: str
+    agrees: bool
+    scan: str | None = None
+    repairs: tuple[str, ...] = ()
+
+    @property
+    def agrees_simulated(self) -> bool:
+        """Whether `simulated` has the printed digits."""
+        return agrees(self.simulated, self.thesis)
+
+    @property
+    def deviation(self) -> float:
+        """Relative difference of the predicted ratio from the simulated one."""
+        return self.normalised / self.simulated - 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry as plain JSON data, the thesis's figure as a number and as it is printed."""
+        return asdict(self) | {
+            "thesis": float(Fraction(self.thesis)),
+            "thesis_printed": self.thesis,
+            "deviation": self.deviation,
+        }
+
+
+def predicted(tables: Sequence[Table] = TABLES) -> Iterator[PredictedEntry]:
+    """Predict tables from two powers of the error rate, and compare them with the simulation.
+
+    Parameters
+    ----------
+    tables : sequence of Table, optional
+
+    Yields
+    ------
+    PredictedEntry
+    """
+    for table in tables:
+        profile = motion(table.motion, **table.settings)
+        drifts, runs = {}, {}
+        for algorithm in ALGORITHMS:
+            for order in ORDERS:
+                choice = catalogue.choose(algorithm, f"rk{order}", 2)
+                expected = predict(choice, profile, STEP, DURATION, INTERVAL, INTERVAL)
+                drifts[algorithm, order] = _drift_deg(table, expected)
+                stepper = backend(algorithm, f"rk{order}", 2, "numpy")
+                runs[algorithm, order] = drift_deg(
+                    table, simulate(stepper, profile, STEP, DURATION, INTERVAL, INTERVAL)
+                )
+                base = ("dcm", order if table.by_order else 1)
+                printed = table.printed[algorithm][ORDERS.index(order)]
+                normalised = drifts[algorithm, order] / drifts[base]
+                yield PredictedEntry(
+                    table.number,
+                    algorithm,
+                    order,
+                    drifts[algorithm, order],
+                    normalised,
+                    runs[algorithm, order],
+                    runs[algorithm, order] / runs[base],
+                    printed,
+                    agrees(normalised, printed),
+                    None if (repair := table.repair(algorithm, order)) is None else repair.scan,
+                    tuple(each.sentence for each in table.repairs_behind(algorithm, order)),
+                )
+
+
+def _drift_deg(table: Table, expected: Prediction) -> float:
+    """Return the drift of a prediction as the table reports it."""
+    return math.degrees(expected.mean_drift if table.mean else max(expected.drift_by_axis))

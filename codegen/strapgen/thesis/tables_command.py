@@ -1,0 +1,119 @@
+"""The command ``strapgen tables`` computes the five tables of the thesis."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import FastBackends, backends, option, whole
+from strapgen.cli.output import Output
+from strapgen.cli.progress import track
+from strapgen.ir.exceptions import InputError
+
+
+@grouped
+def tables(
+    *,
+    backend: FastBackends = None,
+    table: Annotated[
+        str | None,
+        option(
+            "--table",
+            metavar="N",
+            help="Number of the only table to compute.  [default: all five]",
+            panel="Algorithm",
+        ),
+    ] = None,
+    orthonormalize: Annotated[
+        str,
+        option(
+            "--orthonormalize",
+            metavar="S",
+            help="Time from one orthonormalization, and record, to the next in s; the thesis has 5 s and 10 s.",
+            panel="Run",
+        ),
+    ] = "5",
+    predict: Annotated[
+        bool,
+        option(
+            "--predict",
+            help="Predict every figure from the truncation-error series, and show it beside a simulation in numpy.",
+            panel="Algorithm",
+        ),
+    ] = False,
+    fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
+    output: Output,
+) -> None:
+    """Compute the tables of the thesis beside its printed figures.
+
+    Example: strapgen tables --backend c-fixed32 --carry full
+    """
+    output.check()
+    if predict:
+        values = {"--backend": backend, "--table": table}
+        stated = [name for name, value in values.items() if value is not None]
+        stated += ["--orthonormalize"] if orthonormalize != "5" else []
+        for name in [*stated, *fixed.stated]:
+            raise InputError(f"--predict and {name} do not go together")
+        _predict(output)
+        return
+    from strapgen.ir import checks
+    from strapgen.run.backends import BACKENDS
+    from strapgen.thesis.tables_plot import thesis_tables_image
+    from strapgen.thesis.tables_report import thesis_tables_report
+    from strapgen.thesis.thesis_tables import (
+        ALGORITHMS,
+        DURATION,
+        ORDERS,
+        STEP,
+        TABLES,
+        build_all,
+        run_tables,
+    )
+
+    names = runnable() if backend is None else tuple(backends("--backend", backend, ()))
+    settings = fixed.settings(2)
+    if settings is not None and not any(BACKENDS[name].fixed for name in names):
+        raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
+    number = None if table is None else checks.count("table", whole("table", table), largest=len(TABLES))
+    chosen = [each for each in TABLES if number in (None, each.number)]
+    interval = checks.number("orthonormalize", orthonormalize, positive=True)
+    checks.multiple("orthonormalize", interval, "step", STEP)
+    checks.multiple("duration", DURATION, "orthonormalize", interval)
+    cases = len(names) * len(ALGORITHMS) * len(ORDERS)
+    for _ in track(build_all(names, settings, chosen), "building", cases):
+        pass
+    entries = list(track(run_tables(names, settings, chosen, interval), "simulating", cases * len(chosen)))
+    output.report(thesis_tables_report(entries), lambda path: thesis_tables_image(entries, path))
+
+
+def _predict(output: Output) -> None:
+    """Deliver the tables as the series predict them, and the ratios that the thesis reads from its tables."""
+    from strapgen.analysis.ratios import ratios
+    from strapgen.thesis import predicted_tables
+    from strapgen.thesis.predicted_tables_report import predicted_report
+    from strapgen.thesis.tables_plot import predicted_tables_image
+    from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES
+
+    cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
+    entries = list(track(predicted_tables.predicted(), "predicting", cases))
+    output.report(
+        predicted_report(entries, ratios.claims()), lambda path: predicted_tables_image(entries, path)
+    )
+
+
+def runnable() -> tuple[str, ...]:
+    """Return all back ends, or, with a word on stderr, those that need no compiler if there is none."""
+    from strapgen.ir.exceptions import CompilerError
+    from strapgen.run import compiler
+    from strapgen.thesis.thesis_tables import DEFAULT_BACKENDS
+
+    try:
+        compiler.compiler()
+    except CompilerError as error:
+        typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
+        return ("numpy",)
+    return DEFAULT_BACKENDS

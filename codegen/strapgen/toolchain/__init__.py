@@ -1,1 +1,0 @@
-"""Compiles generated C and loads it, through cffi."""

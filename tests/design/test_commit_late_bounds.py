@@ -1,0 +1,248 @@
+"""The bounds of the attitude of now on integers: each term by hand, and inputs that come near the whole."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import isqrt
+
+import numpy as np
+import pytest
+from late_errors import Exact, parts, search, unit_after
+
+from strapgen.catalogue.kinematics import EULER
+from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.design.commit_late import commit_late_bounds, commit_late_fixed, commit_late_sources
+from strapgen.design.commit_late.commit_late_bounds import Advance
+from strapgen.design.commit_late.commit_late_fixed import interface_of, rounded
+from strapgen.design.commit_late.fixed_filters import FixedFilters
+from strapgen.design.commit_late.late_filters import LateFilters
+from strapgen.design.commit_late.late_unit_fixed import LateUnitInFixedC
+from strapgen.design.commit_late.lost_samples import REACH
+from strapgen.fixedpoint import quantize
+from strapgen.ir.attitude_step import Truncation
+from strapgen.ir.decimals import above
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.signals import Signal
+from strapgen.kernel.kernel import KernelBuilder
+from strapgen.lowering import lower
+
+P = L = 3
+#: Samples and a committed attitude whose error at the end of the start is more than half of its bound.
+START = [
+    (599689678, -599690398, -599689698),
+    (599689762, -599690195, -599689644),
+    (599690213, -599690038, -599690265),
+    (599689905, -599689594, -599690528),
+    (599689993, -599690114, -599690089),
+    (599689638, -599689908, -599690408),
+]
+ATTITUDE = (-317537299, -141784127, 173853576, 1000881493)
+
+
+def test_attitude_of_now_at_the_start_is_near_its_bound_and_below():
+    """It is beyond the bound of L intervals: p + L wait."""
+    late = parts("window-3-3", rounding="truncation")
+    unit = unit_after(late, START, ATTITUDE)
+    error, errors = Exact(late).error(unit), late.fixed.now_errors
+    assert unit.pending == P + L
+    assert errors.running < error < errors.start < 2 * error
+
+
+def test_generated_c_has_the_attitude_of_the_model_at_the_start():
+    late = parts("window-3-3", rounding="truncation")
+    settings = late.step.fixed.settings
+    unit = LateUnitInFixedC(commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings))
+    unit.reset(np.array(ATTITUDE))
+    for sample in START:
+        unit.push(np.array(sample), 0)
+    assert list(unit.now()) == list(unit_after(late, START, ATTITUDE).now())
+
+
+@pytest.mark.parametrize(
+    ("count", "lost", "which"), [(P + L + 3, (), "running"), (P + L, (), "start"), (16, (8,), "gap")]
+)
+def test_climb_stays_below_the_bounds_of_now(count, lost, which):
+    late = parts("window-3-3", rounding="truncation")
+    error, *_ = search(late, Exact(late), count, lost, 60, 1)
+    bound = getattr(late.fixed.now_errors, which)
+    assert bound / 5 < error < bound
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+@pytest.mark.parametrize("window", ["window-3-3", "window-5-5", "window-7-7"])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"rounding": "truncation"},
+        {"rounding": "nearest"},
+        {"rounding": "truncation", "carry": "full"},
+        {"lsb": "0.0175dps"},
+    ],
+    ids=["truncation", "nearest", "carry", "counts"],
+)
+def test_longer_climbs_stay_below_the_bounds_of_now(settings, window, algorithm):
+    late = parts(window, algorithm, **settings)
+    exact, filters, errors = Exact(late, algorithm), late.filters, late.fixed.now_errors
+    gap = max(REACH, filters.samples - 1)
+    for count, lost, bound in (
+        (filters.samples - 1, (), errors.start),
+        (filters.samples + 2, (), errors.running),
+        (gap + REACH, (gap,), errors.gap),
+    ):
+        error, *_ = search(late, exact, count, lost, 150, 2)
+        assert error < bound
+        if settings == {"rounding": "truncation"} and window == "window-3-3" and not lost:
+            assert error > bound * 0.4
+
+
+def test_steps_add_up_with_their_stretch():
+    assert commit_late_bounds._total([Advance(Fraction(1), Fraction(2))] * 3) == 7
+    assert (
+        commit_late_bounds._total([Advance(Fraction(1), Fraction(5)), Advance(Fraction(3), Fraction(2))]) == 5
+    )
+
+
+def test_every_interval_that_waits_is_counted(monkeypatch):
+    """With 1 for filters on all samples, 1000 for those of the start and the step's own error."""
+    filters = LateFilters(WINDOWS["window-3-3"], calm_start=True)
+    late = parts("window-3-3")
+    monkeypatch.setattr(commit_late_bounds, "_moved", lambda exact, integers, *_: {"groups": len(exact)})
+    monkeypatch.setattr(
+        commit_late_bounds,
+        "_rounding",
+        lambda _p, _i, moved: {7: Fraction(1), 10: Fraction(1000)}[moved["groups"]],
+    )
+    monkeypatch.setattr(commit_late_bounds, "_stretch", lambda *_: Fraction(1))
+    monkeypatch.setattr(commit_late_bounds, "_row_length", lambda _: Fraction(10**6))
+    interfaces = interface_of(late.step), interface_of(late.rotation)
+    errors = commit_late_bounds.now_errors(filters, late.fixed, (None, None), interfaces, None)
+    assert errors == (L, 1000 * (P + L), P + L + 10**6 * REACH)
+
+
+def test_rounding_of_taps_and_of_a_sum_move_a_coefficient():
+    """One row of taps 3/8 and -5/8 as 1/4 and -3/4, samples to 100 units of 1/16, a coefficient in units of 1/4."""
+    interface = toy()[1]
+    fixed = FixedFilters(100, 4, range(1), (), (), (4,), ((), ()), 0)
+    # An integer tap is one of 2^(4 - 4 - 2) = 1/4.
+    moved = commit_late_bounds._moved([((Fraction(3, 8), Fraction(-5, 8)),)], [((1, -3),)], fixed, interface)
+    off = (Fraction(1, 8) + Fraction(1, 8)) * Fraction(100, 16)
+    assert moved == dict.fromkeys(("c_x", "c_y", "c_z"), off + Fraction(1, 8))
+    # The worst group counts.
+    groups = [((Fraction(1, 4), Fraction(-3, 4)),), ((Fraction(3, 8), Fraction(-5, 8)),)]
+    assert commit_late_bounds._moved(groups, [((1, -3),)] * 2, fixed, interface) == moved
+
+
+def toy():
+    """Return a step that adds multiples of one coefficient to a state, with its interface in fixed point."""
+    build = KernelBuilder()
+    state = build.input(EULER.state)
+    c = build.input(Signal.labelled("legendre_0", "c", "xyz", meaning="coefficient"))
+    build.output(
+        Signal.labelled("next", "n", "xyzs", meaning="state"),
+        [state[0] + 2 * c[0], state[1] - 3 * c[1], state[2] + c[2] / 4, state[3]],
+    )
+    program = lower(build.kernel("toy", "A sum", "none"))
+    settings = Settings(
+        ranges={"legendre_0": Fraction(4)},
+        formats={"legendre_0": "Q29.2", "state": "Q2.29", "next": "Q20.11"},
+    )
+    return program, quantize(program, settings).interface
+
+
+def test_moved_coefficients_reach_the_state_by_their_derivatives():
+    program, interface = toy()
+    errors = interface.outputs[0].errors
+    moved = {"c_x": Fraction(1), "c_y": Fraction(2), "c_z": Fraction(8)}
+    exact = sum((e + m) ** 2 for e, m in zip(errors, (2, 6, 2, 0), strict=True))
+    length = commit_late_bounds._rounding(program, interface, moved)
+    assert exact <= length**2 < exact * (1 + Fraction(1, 2**60))
+    nothing = commit_late_bounds._rounding(program, interface, dict.fromkeys(moved, Fraction(0)))
+    assert sum(e**2 for e in errors) <= nothing**2 <= sum(e**2 for e in errors) * (1 + Fraction(1, 2**40))
+
+
+def test_length_of_a_row_is_rounded_up():
+    assert commit_late_bounds._row_length([Fraction(1)] * 9) ** 2 > 3
+    assert commit_late_bounds._row_length([Fraction(1)] * 9) ** 2 < Fraction(3) + Fraction(1, 2**60)
+    assert commit_late_bounds._row_length([Fraction(1)] * 4) >= 2
+    rows = [Fraction(x) for x in (0, 0, 1, 0, 3, 4, 2, 0, 0)]
+    assert 5 <= commit_late_bounds._row_length(rows) < Fraction(5) + Fraction(1, 2**60)
+
+
+def test_transition_stretches_by_what_its_series_leaves_out():
+    """At 1/4 rad the rotation vector is at least sqrt(3)/4 long, and a series to second order leaves out its third."""
+    late = parts("window-3-3")
+    program = commit_late_sources.generated_sources.program(
+        commit_late_sources.kernels(late.filters, "euler")[1]
+    )
+    stretch = commit_late_bounds._stretch(
+        late.filters,
+        late.fixed,
+        program,
+        interface_of(late.rotation),
+        Truncation(2, Fraction(1, 2), "angle_square"),
+    )
+    largest = late.fixed.limit * Fraction(2) ** -late.fixed.fraction
+    length = Fraction(isqrt(3 * 10**24), 10**12) * largest / 2
+    assert stretch - 1 > length**3 / 6
+
+
+def test_header_states_every_bound_rounded_up():
+    settings = parts("window-3-3", rounding="truncation").step.fixed.settings
+    text = commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings).files
+    header = " ".join(text["euler_late_3_3_w32.h"].replace("\n *     ", " ").split())
+    errors = parts("window-3-3", rounding="truncation").fixed.now_errors
+    running, start, gap = map(above, errors)
+    assert f"is at most {running} from" in header
+    assert (
+        f"before sample 7 at most {start}, and while a lost sample waits to be restored at most {gap}."
+        in header
+    )
+    assert all(Fraction(shown) >= exact for shown, exact in zip((running, start, gap), errors, strict=True))
+
+
+def test_tap_below_a_power_of_two_has_room():
+    """With 31 fraction bits it would be the largest word, and what rounding other taps leaves would go beyond."""
+    tap = Fraction(2**31 - 1, 2**31)
+    bits = commit_late_fixed._fraction([[Fraction(1, 3), Fraction(1, 3), tap]], 1)
+    assert bits == 30
+    assert max(map(abs, rounded([Fraction(1, 3), Fraction(1, 3), tap], bits, 2))) < 1 << 31
+    assert max(map(abs, rounded([Fraction(1, 3), Fraction(1, 3), tap], 31, 2))) >= 1 << 31, (
+        "the reason for the room"
+    )
+
+
+@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
+def test_reset_begins_error_feedback_anew(rounding):
+    """Half a unit with rounding to the nearest and nothing with truncation: in C as in the model."""
+    settings = Settings(carry="full", rounding=rounding)
+    late = commit_late_sources.parts(
+        commit_late_sources.family("window-3-3"), "euler", "fixed-model", settings
+    )
+    model = unit_after(late, [])
+    compiled = LateUnitInFixedC(
+        commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings)
+    )
+    drawn = np.random.default_rng(3).integers(-late.fixed.limit, late.fixed.limit, (30, 3))
+    state = np.array([0, 0, 644245094, 858993459])
+    for place, sample in enumerate(drawn):
+        if place == 12:
+            model.reset(state)
+            compiled.reset(state)
+        assert model.push(sample, 0) == compiled.push(sample, 0)
+        np.testing.assert_array_equal(model.attitude, compiled.attitude)
+        np.testing.assert_array_equal(model.now(), compiled.now())
+
+
+def test_gap_inside_the_start_has_the_bound_of_the_start(monkeypatch):
+    filters = LateFilters(WINDOWS["window-3-3"], calm_start=True)
+    late = parts("window-3-3")
+    monkeypatch.setattr(commit_late_bounds, "_moved", lambda exact, integers, *_: {"groups": len(exact)})
+    monkeypatch.setattr(
+        commit_late_bounds, "_rounding", lambda _p, _i, moved: Fraction({7: 1, 10: 1000}[moved["groups"]])
+    )
+    monkeypatch.setattr(commit_late_bounds, "_stretch", lambda *_: Fraction(1))
+    monkeypatch.setattr(commit_late_bounds, "_row_length", lambda _: Fraction(1))
+    interfaces = interface_of(late.step), interface_of(late.rotation)
+    errors = commit_late_bounds.now_errors(filters, late.fixed, (None, None), interfaces, None)
+    assert errors.gap == errors.start == 1000 * (P + L)

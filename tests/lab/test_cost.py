@@ -1,0 +1,127 @@
+"""What a step costs on microcontrollers: limits of instructions, the contract of the command, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+from gathering import each
+
+from strapgen import pipeline
+from strapgen.cli import main
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_settings import Settings
+from strapgen.lab.cost import cost
+from strapgen.lab.cost.processors import PROCESSORS
+
+#: Instructions of a call at most, by processor and kernel, with -O2.
+EXECUTED = {
+    ("euler", "cortex-m0"): 1500,
+    ("euler", "cortex-m3"): 240,
+    ("euler", "rv32imc"): 370,
+    ("dcm", "cortex-m3"): 576,
+}
+#: Instructions of a call on a Cortex-M3 that takes the counts of a gyro: a tenth more than 226, which the step on
+#: angles took once, and for direction cosines 15 % more than 520.
+COUNTS = {"euler": 248, "dcm": 598}
+
+
+def needed(cpu: str) -> None:
+    processor = PROCESSORS[cpu]
+    for program in (processor.compiler, *processor.emulator[:1]):
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not on this machine")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("kernel", "cpu"),
+    [pytest.param(*case, marks=pytest.mark.long if case[1] == "cortex-m0" else ()) for case in EXECUTED],
+)
+def test_a_call_executes_few_instructions(kernel, cpu):
+    needed(cpu)
+    settings = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2)
+    sources = pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c-fixed", settings)
+    measured = cost.cost(sources, cpu)
+    assert 50 < measured.executed <= EXECUTED[kernel, cpu]
+    loops = PROCESSORS[cpu].compiler.startswith("arm") and cpu == "cortex-m0"  # its products are calls
+    assert loops or measured.executed <= measured.instructions
+    assert 0 < measured.multiplications < measured.instructions
+    assert measured.code_bytes >= 2 * measured.instructions
+    assert measured.stack_bytes > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kernel", COUNTS)
+def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
+    needed("cortex-m3")
+    settings = Settings.of(max_rate_deg_s=400, sample_hz=100, increments=2, lsb="0.0175dps")
+    sources = pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c-fixed", settings)
+    assert cost.cost(sources, "cortex-m3").executed <= COUNTS[kernel]
+
+
+def test_the_command_prints_what_was_agreed(capsys):
+    needed("cortex-m3")
+    command = "cost euler-normalize euler-product --cross arm-none-eabi-gcc --cpu cortex-m3 --format json"
+    with pytest.raises(SystemExit) as stop:
+        main(command.split())
+    assert stop.value.code == 0
+    rows = json.loads(capsys.readouterr().out)
+    keys = {"cpu", "instructions", "executed", "multiplications", "compiler"}
+    keys |= {f"{what}_bytes" for what in ("code", "constant", "stack")}
+    assert [row["kernel"] for row in rows] == ["euler-normalize", "euler-product"]
+    for row in rows:
+        assert row.keys() >= keys
+        assert row["cpu"] == "cortex-m3" and row["compiler"].startswith("arm-none-eabi-gcc ")
+        assert row["executed"] is None or row["executed"] > 20
+
+
+@each(
+    ("words", "said"),
+    [
+        ("", "a kernel is needed, or --all"),
+        ("euler --all", "--all measures the whole catalogue in fixed point; euler does not go with it"),
+        ("--all --word 16", "--word does not go with it"),
+        ("--all --target c", "--target does not go with it"),
+        ("--all --method rk2", "--method does not go with it"),
+    ],
+)
+def test_the_whole_catalogue_is_measured_alone(words, said, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["cost", *words.split()])
+    assert stop.value.code == 2 and said in capsys.readouterr().err
+
+
+def test_without_an_emulator_nothing_is_executed(monkeypatch):
+    needed("cortex-m3")
+    here = shutil.which
+    monkeypatch.setattr(shutil, "which", lambda name: None if name.startswith("qemu") else here(name))
+    sources = pipeline.generate(pipeline.lower(pipeline.derive("euler-product")), "c-float")
+    assert cost.cost(sources, "cortex-m3").executed is None
+
+
+@pytest.mark.parametrize(
+    ("cross", "cpus", "said"),
+    [
+        (None, ["cortex-m9"], "cpu 'cortex-m9' is not known"),
+        ("icc", [], "cross compiler 'icc' is not known"),
+        ("avr-gcc", ["cortex-m3"], "avr-gcc does not compile for cortex-m3; arm-none-eabi-gcc does"),
+    ],
+)
+def test_processors_that_cannot_be_measured_are_refused(cross, cpus, said):
+    with pytest.raises(InputError, match=said):
+        cost.processors(cross, cpus)
+
+
+def test_a_compiler_that_is_missing_is_named(monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    said = r"no cross compiler for cortex-m0, cortex-m3.*: install arm-none-eabi-gcc"
+    with pytest.raises(InputError, match=said):
+        cost.processors()
+
+
+def test_python_is_not_measured():
+    sources = pipeline.generate(pipeline.lower(pipeline.derive("euler-product")), "numpy")
+    with pytest.raises(InputError, match="not in C"):
+        cost.cost(sources, "cortex-m3")

@@ -1,0 +1,373 @@
+"""Sensor errors: what each cause makes of increments, and that no cause disturbs another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from gathering import each
+from tolerances import roundoff
+
+import strapgen
+from strapgen.lab.recordings.recording import InertialRecording, Recording
+from strapgen.lab.sensor_errors.instruments import (
+    CAUSES,
+    Heating,
+    InstrumentErrors,
+    OutputNoise,
+    Sampling,
+    TriadErrors,
+    WarmUp,
+)
+from strapgen.lab.sensor_errors.measured_motions import measured, measured_recording
+from strapgen.lab.sensor_errors.response import bounded_noise, second_order
+from strapgen.lab.sensor_errors.sensors import MeasurementUnit
+from strapgen.lab.simulate.runs import simulate
+from strapgen.run.backends import evaluator
+
+CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}
+STEP = Fraction(1, 100)
+NONE = InstrumentErrors()
+THREE = np.array([1.0, -2.0, 3.0])
+#: One of each cause, of a size that is seen.
+EVERY = InstrumentErrors(
+    gyro=TriadErrors(
+        bias=1e-4 * THREE,
+        scale_plus=np.full(3, 1e-3),
+        scale_minus=np.full(3, 2e-3),
+        misalignment=1e-3 * (1 - np.eye(3)),
+        terms={"B_xx": 1e-5, "J_yz": 1e-4},
+        noise=np.full(3, 1e-4),
+        random_walk=np.full(3, 1e-4),
+        pulse=np.full(3, 1e-5),
+        bandwidth_hz=np.full(3, 20.0),
+        delay=np.full(3, 0.013),
+    ),
+    sampling=Sampling(1e-3, 0.05, "late"),
+    warm_up=WarmUp(np.full(3, 1e-3), np.full(3, 2.0)),
+    heating=Heating(np.full(3, -1e-2), 1.0),
+    output_noise=OutputNoise(0.9, np.full(3, 1e-5)),
+)
+
+
+@pytest.fixture
+def row() -> np.ndarray:
+    """Increments of a coning motion, 4 s."""
+    return strapgen.motion("coning", **CONING).samples(STEP, 0, 400)
+
+
+def gyros(errors: InstrumentErrors, row: np.ndarray, run: int = 0, force: float = 0.0) -> np.ndarray:
+    return MeasurementUnit(errors, float(STEP), run)(row, np.full_like(row, force))[0]
+
+
+def test_without_errors_a_run_is_the_same_to_the_last_bit(make, algorithm):
+    backend, motion = make(algorithm), strapgen.motion("coning", **CONING)
+    for errors in (NONE, EVERY.without(*CAUSES)):
+        assert measured(motion, errors) is motion
+        plain, beside = (
+            simulate(backend, profile, "0.125", 1) for profile in (motion, measured(motion, errors))
+        )
+        np.testing.assert_array_equal(plain.computed, beside.computed)
+    data = Recording(0.0, 0.01, motion.samples(STEP, 0, 5))
+    assert measured_recording(data, NONE) is data
+
+
+def test_errors_act_alike_on_every_back_end(make, algorithm):
+    errors = EVERY.without("terms")
+    reference = strapgen.backend(algorithm, method="rk4", increments=2)
+    profile = measured(strapgen.motion("coning", **CONING), errors)
+    expected = simulate(reference, profile, "0.02", 1)
+    backend = make(algorithm, largest=0.02)
+    run = simulate(backend, profile, "0.02", 1)
+    true = simulate(backend, profile.true, "0.02", 1)
+    # Both runs round, each element of a state within its bound, and a drift is up to four of them; the drift of the
+    # method, which is in the expected one alone, is far below 1e-6 rad.
+    assert np.abs(expected.drift).max() > 5e-4
+    allowed = 8 * roundoff(backend, 50) + 1e-6
+    np.testing.assert_allclose(run.drift - true.drift, expected.drift, atol=allowed)
+
+
+@each("cause", CAUSES)
+def test_every_cause_is_seen_and_leaves_the_others_alone(cause, row):
+    assert cause in [*EVERY.causes]
+    alone = EVERY.only(cause)
+    assert [*alone.causes] == [cause]
+    assert not np.array_equal(gyros(alone, row, force=0.1), row)
+    assert np.array_equal(gyros(alone.without(cause), row, force=0.1), row)
+
+
+@each("cause", ["noise", "random walk", "output noise", "lost samples"])
+def test_switching_a_cause_off_takes_no_number_from_the_others(cause, row):
+    others = [other for other in ("noise", "random walk", "output noise") if other != cause]
+    both = gyros(EVERY.only(*others, cause), row)
+    if cause == "lost samples":
+        arrived = both.any(axis=1)
+        arrived[1:] &= arrived[:-1]  # a sample after a lost one holds both
+        assert 300 < arrived.sum() < 400
+        np.testing.assert_array_equal(both[arrived], gyros(EVERY.only(*others), row)[arrived])
+        return
+    change = gyros(EVERY.only(cause), row) - row
+    np.testing.assert_allclose(both - gyros(EVERY.only(*others), row), change, atol=1e-16)
+
+
+@each("cause", [None, *CAUSES])
+def test_a_run_in_parts_measures_what_a_whole_one_does(cause, row):
+    errors = EVERY if cause is None else EVERY.only(cause)
+    whole = MeasurementUnit(errors, float(STEP))(row, 0.1 + row)
+    unit = MeasurementUnit(errors, float(STEP))
+    parts = [unit(part, 0.1 + part) for part in np.split(row, [0, 1, 2, 130, 130, 131, 390])]
+    for kind in (0, 1):
+        # Pulses are whole ones in both, where no angle lies at the edge of a pulse to round-off.
+        np.testing.assert_allclose(np.concatenate([part[kind] for part in parts]), whole[kind], atol=1e-15)
+
+
+def test_runs_and_seeds_differ_and_repeat(row):
+    one = gyros(EVERY, row)
+    np.testing.assert_array_equal(one, gyros(EVERY, row))
+    for other in (gyros(EVERY, row, run=1), gyros(replace(EVERY, seed=2), row)):
+        assert not np.array_equal(one, other)
+
+
+def test_a_motion_measures_the_same_however_it_is_read():
+    profile = measured(strapgen.motion("coning", **CONING), EVERY, force=(0, 0, 9.81))
+    whole = profile.samples(STEP, 0, 300)
+    np.testing.assert_allclose(profile.samples(STEP, 100, 200), whole[100:200], atol=1e-15)
+    np.testing.assert_allclose(profile.samples(STEP, 200, 300), whole[200:], atol=1e-15)
+    np.testing.assert_array_equal(profile.samples(STEP, 0, 300), whole)
+    # What lies before the run has the steady errors, and moves none of the random numbers.
+    before = profile.samples(STEP, -2, 300)
+    np.testing.assert_array_equal(before[2:], whole)
+    bias = 1e-4 * THREE * 0.01
+    alone = measured(profile.true, EVERY.only("bias"))
+    np.testing.assert_allclose(alone.samples(STEP, -2, 0) - profile.true.samples(STEP, -2, 0), [bias] * 2)
+    with pytest.raises(strapgen.InputError, match="takes rates"):
+        profile.rate(0.0)
+
+
+def test_a_turn_one_way_has_the_scale_error_times_its_angle():
+    turn = np.full((100, 3), 0.0157)
+    errors = InstrumentErrors(gyro=TriadErrors(scale_plus=np.full(3, 3e-4), scale_minus=np.full(3, 1e-4)))
+    np.testing.assert_allclose((gyros(errors, turn) - turn).sum(axis=0), 3e-4 * 1.57, rtol=1e-12)
+    np.testing.assert_allclose((gyros(errors, -turn) + turn).sum(axis=0), -1e-4 * 1.57, rtol=1e-12)
+
+
+def test_scale_factors_by_sign_rectify_an_oscillation():
+    amplitude, hertz, cycles, samples = 0.1, 5, 20, 200
+    angle = -amplitude * np.cos(2 * np.pi * np.arange(cycles * samples + 1) / samples)
+    row = np.repeat(np.diff(angle)[:, None], 3, axis=1)
+    errors = InstrumentErrors(gyro=TriadErrors(scale_plus=np.full(3, 3e-4), scale_minus=np.full(3, 1e-4)))
+    mean = (gyros(errors, row) - row).sum(axis=0) / (cycles / hertz)
+    np.testing.assert_allclose(mean, 2 * amplitude * hertz * 2e-4, rtol=1e-10)
+    assert np.degrees(mean[0]) * 3600 == pytest.approx(41.25296, abs=5e-6)
+
+
+def test_the_kernel_that_compensates_undoes_the_errors_to_second_order(row):
+    velocity = 0.1 + row
+
+    def left(share: float) -> float:
+        gyro = TriadErrors(
+            bias=share * 1e-3 * THREE,
+            misalignment=share * 1e-3 * (1 - np.eye(3)),
+            terms={"B_xy": share * 1e-5, "E_yy": share * 1e-6, "J_xz": share * 1e-4},
+        )
+        force = TriadErrors(bias=share * 1e-2 * THREE, terms={"N_zz": share * 1e-5})
+        errors = InstrumentErrors(gyro=gyro, accelerometer=force)
+        unit = MeasurementUnit(errors, float(STEP))
+        values = {
+            "D0": gyro.bias,
+            "K": gyro.misalignment.ravel(),
+            "A0": force.bias,
+            "J": share * np.array([0, 1e-4, 0]),
+            "B": share * np.array([0, 1e-5, 0, 0, 0, 0, 0]),
+            "E": share * np.array([0, 0, 0, 1e-6, 0]),
+            "N": share * np.array([0, 0, 0, 0, 0, 1e-5]),
+        }
+        compensate = evaluator("imu-compensate")
+        inputs = [
+            values.get(signal.elements[0].partition("_")[0], np.zeros(signal.shape))
+            for signal in compensate.function.inputs[4:]
+        ]
+        true = compensate(*unit(row, velocity), float(STEP), 1 / float(STEP), *inputs)
+        return float(max(np.abs(true[0] - row).max(), np.abs(true[1] - velocity).max()))
+
+    assert left(0.5) == pytest.approx(left(1.0) / 4, rel=0.01)
+
+
+def test_the_warm_up_is_the_integral_of_its_rate():
+    warm = WarmUp(np.radians(np.array([15.0, 60.0, 0.0]) / 3600), np.array([180.0, 210.0, 1.0]))
+    unit = MeasurementUnit(InstrumentErrors(warm_up=warm), 0.5)
+    angle = np.concatenate([unit(np.zeros((400, 3)))[0], unit(np.zeros((80, 3)))[0]]).sum(axis=0)
+    expected = warm.rate * (240 - warm.tau * (1 - np.exp(-240 / warm.tau)))
+    np.testing.assert_allclose(angle, expected, rtol=1e-12)
+
+
+def test_heating_follows_the_figures_of_its_kernel():
+    # 100 deg/s about x turns the torquers at 45 degrees by the same square of the rate on gyros 2 and 3.
+    errors = InstrumentErrors(heating=Heating(np.full(3, -2.6e-4), 150.0))
+    rate = np.zeros((720, 3))
+    rate[:, 0] = np.radians(100) * 0.5
+    measured_rate = MeasurementUnit(errors, 0.5)(rate)[0]
+    scale = rate[:, 0] / measured_rate[:, 0] - 1
+    assert scale[300] == pytest.approx(-5.00643e-4, rel=2e-3)
+    assert scale[-1] == pytest.approx(-7.20156e-4, rel=2e-3)
+
+
+def test_pulses_are_whole_and_lose_nothing(row):
+    pulse = np.array([1e-5, 0.0, 3e-5])
+    errors = InstrumentErrors(gyro=TriadErrors(pulse=pulse))
+    counted = gyros(errors, row)
+    np.testing.assert_array_equal(counted[:, 1], row[:, 1])
+    counts = counted[:, [0, 2]] / pulse[[0, 2]]
+    np.testing.assert_allclose(counts, np.rint(counts), atol=1e-9)
+    departure = np.abs(np.cumsum(counted - row, axis=0))
+    assert (departure.max(axis=0) <= pulse + 1e-15).all()
+    assert departure[:, 0].max() > 0.5e-5
+
+
+def test_a_delay_holds_the_angle_back_by_its_time(row):
+    steady = np.tile([0.01, -0.02, 0.0], (50, 1))
+    for delay in (0.002, 0.01, 0.037):
+        errors = InstrumentErrors(gyro=TriadErrors(delay=np.array([delay, delay, 0.0])))
+        np.testing.assert_allclose(gyros(errors, steady), steady, atol=1e-15)
+        lag = np.cumsum(row - gyros(errors, row), axis=0)[100:]
+        # A rate w that changes by a deg/s^2 is late by w delay, to half of a delay (delay + interval) for ends.
+        rate = row[100:] / 0.01
+        allowed = np.radians(100) * delay * (delay + 0.01)
+        past = delay * (rate - rate[0])[:, :2]
+        assert np.abs(lag[:, :2] - lag[0, :2] - past).max() < 2 * allowed
+        assert not lag[:, 2].any()
+
+
+def test_a_delay_that_no_memory_holds_is_refused(row):
+    errors = InstrumentErrors(gyro=TriadErrors(delay=np.full(3, 10.0)))
+    with pytest.raises(strapgen.InputError, match="2e\\+06 sampling intervals late"):
+        MeasurementUnit(errors, 5e-6)
+
+
+def test_jitter_moves_the_angle_by_rate_times_time():
+    steady = np.tile([0.01, -0.02, 0.0], (20_000, 1))
+    errors = InstrumentErrors(sampling=Sampling(jitter=1e-4))
+    angle = np.cumsum(gyros(errors, steady) - steady, axis=0)
+    # 20,000 numbers tell a standard deviation to 1/sqrt(40000); four of these are allowed.
+    assert angle[:, 0].std() == pytest.approx(1e-4 * 1.0, rel=0.02)
+    np.testing.assert_allclose(angle[:, 1], -2 * angle[:, 0], atol=1e-12)
+
+
+def test_a_gyro_of_limited_bandwidth_has_the_gain_and_the_phase_of_second_order():
+    hertz, damping, interval = 80.0, 0.7, 1e-4
+    recursion = second_order(hertz, damping, interval)
+    for frequency in (10.0, 80.0, 200.0):
+        turn = 2 * np.pi * frequency
+        time = np.arange(20_001) * interval
+        put_in = np.diff(np.sin(turn * time))
+        angle = np.cumsum(recursion.run(put_in, np.array([put_in[0], 0.0]))[0])[10_000:]
+        seen = 2 * np.mean(angle * np.exp(-1j * turn * time[10_001:])) * 1j
+        ratio = 1j * frequency / hertz
+        expected = 1 / (1 + 2 * damping * ratio + ratio**2)
+        # The rate is a staircase: its error is (turn interval)^2/12.
+        assert abs(seen - expected) < (turn * interval) ** 2
+
+
+def test_a_wide_bandwidth_passes_everything(row):
+    for hertz in (1e4, 1e6):
+        errors = InstrumentErrors(gyro=TriadErrors(bandwidth_hz=np.full(3, hertz)))
+        late = 2 * 0.5**0.5 / (2 * np.pi * hertz)  # 2 zeta/w
+        assert np.abs(np.cumsum(gyros(errors, row) - row, axis=0)).max() < late
+
+
+def test_output_noise_has_the_printed_variances_and_a_bounded_sum():
+    impulse = np.zeros(3000)
+    impulse[0] = 1.0
+    response, _ = bounded_noise(0.9).run(impulse, np.zeros(2))
+    # Printed for unit noise: 2(1-A)^2/(1+A), and (1-A)/(1+A) for the running sum.
+    assert np.sum(response**2) == pytest.approx(0.02 / 1.9, rel=1e-12)
+    assert np.sum(response**2) == pytest.approx(0.0105263, abs=5e-8)
+    assert np.sum(np.cumsum(response) ** 2) == pytest.approx(0.0526316, abs=5e-8)
+    assert response.sum() == pytest.approx(0.0, abs=1e-12)  # so that the sum does not walk
+    row = gyros(InstrumentErrors(output_noise=OutputNoise(0.9, THREE**2)), np.zeros((20_000, 3)))
+    # Numbers that are correlated over some ten samples tell a deviation to 1 or 2 %.
+    np.testing.assert_allclose(row.std(axis=0), np.sqrt(0.0105263) * THREE**2, rtol=0.05)
+
+
+def test_accelerometers_have_errors_of_their_own(row):
+    force = TriadErrors(
+        bias=1e-2 * THREE,
+        scale_plus=np.full(3, 1e-3),
+        noise=np.full(3, 1e-3),
+        pulse=np.array([0.01, 0, 0]),
+    )
+    errors, up = InstrumentErrors(accelerometer=force), np.full_like(row, 0.0981)
+
+    def sensed(*causes: str) -> np.ndarray:
+        angle, velocity = MeasurementUnit(errors.only(*causes), float(STEP))(row, up)
+        np.testing.assert_array_equal(angle, row)
+        return velocity
+
+    np.testing.assert_allclose(sensed("bias") - up, [1e-4 * THREE] * len(row), rtol=1e-9)
+    np.testing.assert_allclose(sensed("scale"), 1.001 * up, rtol=1e-14)
+    # 1200 numbers tell a deviation to 2 %.
+    assert (sensed("noise") - up).std() == pytest.approx(1e-3 * 0.1, rel=0.08)
+    counts = sensed("pulses")[:, 0] / 0.01
+    assert {*np.rint(counts)} == {9.0, 10.0} and np.abs(counts - np.rint(counts)).max() < 1e-9
+
+
+def test_a_unit_of_unbalanced_gyros_senses_acceleration_through_the_same_torquers(row):
+    heat = Heating(np.full(3, -2.6e-4), 150.0, np.radians(5) / 9.81)
+    unit = MeasurementUnit(InstrumentErrors(heating=heat), float(STEP))
+    fast, up = np.tile([0.0, 0.0, np.radians(200) / 100], (500, 1)), np.full((500, 3), 0.0981)
+    angle, velocity = unit(fast, up)
+    np.testing.assert_allclose(angle[0], fast[0], atol=1e-15)
+    np.testing.assert_allclose(velocity[0], up[0], atol=1e-14)
+    # The torquers that turn have warmed up; what they then say of the acceleration is off as well.
+    assert angle[-1, 2] > fast[-1, 2] * (1 + 1e-5)
+    assert np.abs(velocity[-1] - up[-1]).max() > 1e-5
+
+
+@each(
+    ("lost_as", "expected"),
+    [("zero", [1, 0, 0, 4, 5, 0]), ("repeat", [1, 1, 1, 4, 5, 5]), ("late", [1, 0, 0, 9, 5, 0])],
+)
+def test_lost_samples_are_replaced_as_stated(lost_as, expected, monkeypatch):
+    class Dice:
+        def uniform(self, name, count, width):
+            return np.array([[0.9], [0.0], [0.0], [0.9], [0.9], [0.0]])[:count]
+
+    errors = InstrumentErrors(sampling=Sampling(0.0, 0.5, lost_as))
+    unit = MeasurementUnit(errors, 0.01)
+    unit._loss._streams = Dice()
+    row = np.repeat(np.arange(1.0, 7.0)[:, None], 3, axis=1)
+    np.testing.assert_array_equal(unit(row)[0][:, 0], expected)
+    rest = {"late": [7.0], "zero": [1.0], "repeat": [1.0]}[lost_as]  # the sixth arrives with the seventh
+    np.testing.assert_array_equal(unit(np.ones((1, 3)))[0][:, 0], rest)
+
+
+def test_drawn_constants_have_the_stated_deviations():
+    stated = InstrumentErrors(gyro=TriadErrors(bias=np.full(3, 2.0), scale_plus=np.full(3, 0.1)), drawn=True)
+    units = [MeasurementUnit(stated, 0.01, run).errors for run in range(300)]
+    bias = np.array([unit.gyro.bias for unit in units])
+    # 900 numbers tell a deviation to 1/sqrt(1800); three of these are allowed.
+    assert bias.std() == pytest.approx(2.0, rel=0.07)
+    assert abs(np.corrcoef(bias[:, 0], [unit.gyro.scale_plus[0] for unit in units])[0, 1]) < 0.2
+
+
+def test_errors_by_acceleration_need_one():
+    errors = InstrumentErrors(gyro=TriadErrors(terms={"B_xz": 1e-5}))
+    motion = strapgen.motion("constant", z_deg_s=0)
+    with pytest.raises(strapgen.InputError, match="a specific force is needed"):
+        measured(motion, errors)
+    profile = measured(motion, errors, force=(0, 0, 9.81))
+    np.testing.assert_allclose(profile.samples(STEP, 0, 2)[:, 0], 9.81e-5 * 0.01)
+    with pytest.raises(strapgen.InputError, match="no velocity increments"):
+        measured_recording(Recording(0.0, 0.01, np.zeros((5, 3))), errors)
+    data = InertialRecording(0.0, 0.01, np.zeros((5, 3)), np.full((5, 3), 0.1))
+    np.testing.assert_allclose(measured_recording(data, errors).increments[:, 0], 1e-6)
+
+
+def test_the_start_turns_the_specific_force():
+    errors = InstrumentErrors(gyro=TriadErrors(terms={"B_xz": 1e-5}))
+    motion = strapgen.motion("constant", z_deg_s=0)
+    turned = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # body z points along reference -y
+    profile = measured(motion, errors, force=(0, -9.81, 0), start=turned)
+    np.testing.assert_allclose(profile.samples(STEP, 0, 2)[:, 0], 9.81e-5 * 0.01)

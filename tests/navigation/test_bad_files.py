@@ -1,0 +1,342 @@
+"""Bad files of systems: one line on stderr that names the stage and the wire, exit 2, and nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from gathering import each
+from navigation.described_files import ATTITUDE, TWO_SPEEDS
+
+from strapgen.cli import main
+
+GYRO = "[inputs.gyro]\n"
+FAST, SLOW, NAVIGATION = "every = 1\n", "every = 8\n", "every = 16\n"
+#: A change of TWO_SPEEDS, and what the message says.
+BAD = [
+    # Inputs
+    ("range = 0.001\n", "", "input gyro: range is missing; the largest magnitude of an element is needed"),
+    ("range = 0.001\n", "range = -1\n", "input gyro: range is -1; a number above 0 is needed"),
+    ("range = 0.001\n", "range = nan\n", "input gyro: range is 'nan'; a finite number is needed"),
+    ("range = 0.001\n", "range = 1e400\n", "input gyro: range is '1e400'; a finite number is needed"),
+    ("range = 0.001\n", 'range = "wide"\n', "input gyro: range is 'wide'; a finite number is needed"),
+    ("range = 0.001\n", 'range = "1/0"\n', "input gyro: range is '1/0', which divides by 0"),
+    (
+        "range = 0.001\n",
+        "range = 2020-01-01\n",
+        "input gyro: range is datetime.date(2020, 1, 1); a number is needed",
+    ),
+    ('frame = "n"', 'frame = "q"', "input earth: frame 'q' is not known; allowed: b, n, e, i"),
+    ('frame = "n"', 'frame = "any"', "input earth: frame 'any' is not known"),
+    ('unit = "m/s"', 'unit = "any"', "input accelerometer: unit is 'any'; a unit is needed"),
+    ('unit = "m/s"\n', "", "input accelerometer: 'unit' is missing; needed: 'unit', 'range'"),
+    (GYRO, f'[inputs.spare]\nunit = "1"\nrange = 1\n{GYRO}', "input spare is taken by no stage"),
+    (GYRO, f"[inputs]\nspare = 3\n{GYRO}", "input spare is no table"),
+    # Names
+    ("gyro", "int", "input 'int' has a meaning in generated code; another name is needed"),
+    ("gyro", "lambda", "input 'lambda' has a meaning in generated code"),
+    ("gyro", "memory", "input 'memory' has a meaning in generated code"),
+    ("gyro", "memcpy", "input 'memcpy' has a meaning in generated code"),
+    ("gyro", "two_fast", "input 'two_fast' has a meaning in generated code"),
+    ("gyro", "Gyro", "inputs is 'Gyro'; a name of at most 31 lower-case letters"),
+    ('"navigation"', '"run"', "stage 'run' has a meaning in generated code"),
+    ('"navigation"', '"every_1"', "stage 'every_1' has a meaning in generated code"),
+    ('"navigation"', '"residuals"', "stage 'residuals' has a meaning in generated code"),
+    ('name = "two"', 'name = "string"', "the name 'string' has a meaning in generated code"),
+    ('name = "two"', 'name = "2"', "name is '2'; a name of at most 31"),
+    (
+        'name = "slow"',
+        'name = "fast"',
+        "the name 'fast' stands twice; every input and stage needs its own name",
+    ),
+    ('name = "slow"', 'name = "gyro"', "the name 'gyro' stands twice"),
+    ('name = "slow"\n', "", "name of stage 2 is ''; a name of at most 31"),
+    ('title = "Two', 'title = "*/Two', "title holds */, which has a meaning in generated code; leave it out"),
+    # Wires
+    (
+        'increment = "gyro"',
+        'increment = "gyr"',
+        "stage fast: increment = 'gyr': input 'gyr' is not known (did you",
+    ),
+    (
+        '"fast.coning"',
+        '"fats.coning"',
+        "stage slow: coning = 'fats.coning': stage 'fats' is not known (did you mean",
+    ),
+    (
+        '"fast.coning"',
+        '"fast.conin"',
+        "stage slow: coning = 'fast.conin': value of stage fast 'conin' is not known",
+    ),
+    ('"fast.coning"', '"fast."', "stage slow: coning = 'fast.': "),
+    (
+        '"fast.coning"',
+        '"fast.coning.x"',
+        "stage slow: coning = 'fast.coning.x': value of stage fast 'coning.x'",
+    ),
+    ('"fast.coning"', "7", "stage slow: wires: coning is no text of one line"),
+    ('turn = "earth"', 'trun = "earth"', "'trun' is not known (did you mean turn?)"),
+    (
+        'turn = "earth"\n',
+        "",
+        "stage slow: turn is not wired; wire it to an input or a stage.output, or state a constant",
+    ),
+    ('frame = "n"', 'frame = "b"', "stage slow: turn = 'earth': frame b meets frame n"),
+    ('frame = "n"\n', "", "stage slow: turn = 'earth': frame none meets frame n"),
+    ('unit = "m/s"', 'unit = "m"', "stage fast: velocity_increment = 'accelerometer': unit m meets unit m/s"),
+    (
+        'state = "slow.state"',
+        'state = "slow.previous_turn"',
+        "stage navigation: wires: state: shape (3,) meets shape",
+    ),
+    (
+        'coning = "fast.coning"',
+        'coning = "fast.angle_sum"',
+        "stage fast: coning is a sum that no stage takes",
+    ),
+    ('"fast.angle_sum"', '"gyro"', "stage fast: angle_sum is a sum that no stage takes"),
+    # What goes back
+    ('turn = "earth"', 'turn = "slow.navigation_rotation"', "comes from the stage itself; state its delay"),
+    (
+        'increment = "gyro"',
+        'increment = "navigation.velocity_change"',
+        "stage fast: increment = 'navigation.velocity_change': unit m/s meets unit rad",
+    ),
+    (
+        SLOW,
+        f"{SLOW}delay = {{ coning = 1 }}\n",
+        "stage slow: delay of coning, which comes from the earlier stage fast",
+    ),
+    (SLOW, f"{SLOW}delay = {{ turn = 1 }}\n", "stage slow: delay of turn, which is an input of the system"),
+    (SLOW, f"{SLOW}delay = {{ turn = 2 }}\n", "stage slow: delay of turn is 2; 1, for one cycle, is allowed"),
+    (
+        SLOW,
+        f"{SLOW}delay = {{ trun = 1 }}\n",
+        "stage slow: delay: input of euler-two-speed-slow-2 'trun' is not known",
+    ),
+    (SLOW, f"{SLOW}delay = {{ state = 1 }}\n", "stage slow: delay of state, which is not wired"),
+    (
+        NAVIGATION,
+        f"{NAVIGATION}delay = {{ state = 1 }}\n",
+        "stage navigation: delay of state, which is the same memory",
+    ),
+    # Rates
+    ("every = 16", "every = 12", "stage navigation: every 12 is no multiple of the 8 of slow; rates divide"),
+    ("every = 16", "every = 4", "stage navigation (every 4) stands after slow (every 8)"),
+    ("every = 1\n", "every = 2\n", "stage fast: every is 2; the fastest stage has 1, unless it collects"),
+    ("every = 16", "every = 0", "stage navigation: every is 0; a whole number from 1 to 1048576 is needed"),
+    ("every = 16", "every = 99999999999", "stage navigation: every is 99999999999; a whole number from 1 to"),
+    ("every = 16", "every = 1.5", "stage navigation: every is 1.5; a whole number of cycles is needed"),
+    ("every = 16", 'every = "7 Hz"', "stage navigation: every is '7 Hz', which does not divide the 3200 Hz"),
+    ("every = 16", 'every = "0 Hz"', "stage navigation: every is '0 Hz'; a rate above 0 Hz is needed"),
+    ("every = 16\n", "", "stage navigation: 'every' is missing; needed: 'name', 'kernel', 'every'"),
+    ("sample_hz = 3200\n", "", "the system: 'sample_hz' is missing"),
+    ("sample_hz = 3200\n", "sample_hz = 0\n", "'sample_hz' is 0; a number above 0 is needed"),
+    ("sample_hz = 3200\n", "sample_hz = true\n", "'sample_hz' is True; a number is needed"),
+    # Kernels
+    (
+        "two-speed-fast-2",
+        "two-speed-fsat-2",
+        "'two-speed-fsat-2' is not known (did you mean two-speed-fast-2",
+    ),
+    (FAST, f'{FAST}method = "rk4"\n', "stage fast: kernel two-speed-fast-2 takes no method (got rk4)"),
+    (FAST, f"{FAST}increments = 2\n", "stage fast: kernel two-speed-fast-2 takes no increments (got 2)"),
+    (FAST, f"{FAST}evry = 1\n", "stage fast: key 'evry' is not known (did you mean 'every'?)"),
+    (FAST, f"{FAST}constants = {{ coning = [0, 0, 0] }}\n", "coning is a state, which each call changes"),
+    (
+        FAST,
+        f"{FAST}constants = {{ conig = [0, 0, 0] }}\n",
+        "stage fast: kernel two-speed-fast-2: constant 'conig'",
+    ),
+    (
+        SLOW,
+        f"{SLOW}constants = {{ turn = [0, 0, 0] }}\n",
+        "stage slow: turn is wired and stated as a constant",
+    ),
+    (
+        SLOW,
+        f"{SLOW}initial = {{ state = [0, 0, 1] }}\n",
+        "stage slow: initial state has 3 numbers; 4 are needed",
+    ),
+    (
+        SLOW,
+        f"{SLOW}initial = {{ state = [0, 0, 0, 3] }}\n",
+        "stage slow: initial state holds 3, beyond its range of 1",
+    ),
+    (
+        SLOW,
+        f'{SLOW}initial = {{ state = ["x", 0, 0, 1] }}\n',
+        "stage slow: initial: state is 'x'; a finite number",
+    ),
+    (
+        NAVIGATION,
+        f"{NAVIGATION}initial = {{ state = [0, 0, 0, 1] }}\n",
+        "initial state is that of another stage",
+    ),
+    (
+        "turn = 0.0001 }",
+        "trun = 0.0001 }",
+        "stage slow: ranges: input of euler-two-speed-slow-2 'trun' is not known",
+    ),
+    ("turn = 0.0001 }", "turn = 0 }", "stage slow: range of turn is 0; a number above 0 is needed"),
+    ("word = 32", "word = 7", "stage navigation: word is 7; a whole number of bits from 8 to 64 is needed"),
+    ('carry = "full"', 'carry = "some"', "stage fast: carry 'some' is not known; allowed: none, state, full"),
+    (
+        NAVIGATION,
+        f'{NAVIGATION}writes = {{ next = "slow.state" }}\n',
+        "stage navigation: writes: next is the next state already",
+    ),
+    (
+        NAVIGATION,
+        f'{NAVIGATION}writes = {{ velocity_change = "fast.coning" }}\n',
+        "stage navigation: writes: velocity_change = 'fast.coning': unit rad meets unit m/s",
+    ),
+    # The file
+    (
+        "sample_hz",
+        'outputs = ["fast.none"]\nsample_hz',
+        "outputs: fast.none: value of stage fast 'none' is not known",
+    ),
+    ("sample_hz", 'outputs = ["gyro"]\nsample_hz', "outputs: stage 'gyro' is not known; allowed: fast, slow"),
+    ("sample_hz", 'outputs = "fast.coning"\nsample_hz', "outputs is no list of texts"),
+    (
+        "sample_hz",
+        "sampel = 1\nsample_hz",
+        "the system: key 'sampel' is not known (did you mean 'sample_hz'?)",
+    ),
+    ("sample_hz", "sample_hz = 3\nsample_hz", "is not TOML"),
+    ("sample_hz", f"outputs = {'[' * 3000}{']' * 3000}\nsample_hz", "is not TOML"),
+]
+#: Changes of ATTITUDE.
+BAD_STEPS = [
+    (
+        "increments = 2\nevery = 2",
+        "increments = 2\nevery = 4",
+        "a step takes 2 samples of every 1, so that its every is 2, not 4",
+    ),
+    (
+        "delay = { state = 1 }\n",
+        "",
+        "stage turned: state = 'matrix.attitude' goes back from a later stage to an earlier",
+    ),
+    ('method = "rk4"', 'method = "rk44"', "stage step: method 'rk44' is not known"),
+    ('"gyro"', '"force"', "stage step: increments = 'force': unit m/s^2 meets unit rad"),
+    ("[0, 0, 1]]", "[0, 0]]", "stage matrix: initial attitude has 8 numbers; 9 are needed"),
+]
+#: Stages that are added at the end of TWO_SPEEDS.
+ADDED = [
+    (
+        'name = "late"\nkernel = "sum-3"\nevery = 16\nwires = { increment = "gyro" }\nranges = { sum = 1 }',
+        "stage late: increment = 'gyro': increments of every 1 meet a stage of every 16; sum-3 sums them up",
+    ),
+    (
+        'name = "late"\nkernel = "sum-3"\nevery = 16\nwires = { increment = "navigation.velocity_change" }\n'
+        '[[stage]]\nname = "later"\nkernel = "hold-3"\nevery = 16\nconstants = { share = 1 }\n'
+        'wires = { increment = "late.sum" }',
+        "stage late: the range of sum is missing; state it under ranges",
+    ),
+]
+
+
+def refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the one line with which the command refuses its words."""
+    with pytest.raises(SystemExit) as stop:
+        main(["system", *words])
+    said = capsys.readouterr()
+    assert stop.value.code == 2
+    assert not said.out
+    assert said.err.count("\n") == 1
+    assert said.err.startswith("strapgen: ")
+    return said.err
+
+
+def check(folder: Path, text: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Check that a file is refused with a message that begins with its name, and that nothing is written."""
+    path = folder / "case.toml"
+    path.write_text(text)
+    out, drawing = folder / "out", folder / "case.svg"
+    said = refused([str(path), "--target", "numpy", "--out", str(out), "--draw", str(drawing)], capsys)
+    assert said.startswith(f"strapgen: {path}")
+    assert message in said
+    assert sorted(folder.iterdir()) == [path]
+
+
+@each("old, new, message", BAD)
+def test_a_file_that_is_wrong_in_one_place_is_refused_in_one_line(old, new, message, tmp_path, capsys):
+    assert old in TWO_SPEEDS
+    check(tmp_path, TWO_SPEEDS.replace(old, new), message, capsys)
+
+
+@each("old, new, message", BAD_STEPS)
+def test_a_step_that_collects_increments_is_refused_in_one_line_too(old, new, message, tmp_path, capsys):
+    assert old in ATTITUDE
+    check(tmp_path, ATTITUDE.replace(old, new), message, capsys)
+
+
+@each("stage, message", ADDED)
+def test_a_stage_too_many_is_refused_in_one_line(stage, message, tmp_path, capsys):
+    check(tmp_path, f"{TWO_SPEEDS}\n[[stage]]\n{stage}\n", message, capsys)
+
+
+def test_a_sum_is_cleared_at_one_rate(tmp_path, capsys):
+    late = '\n[[stage]]\nname = "late"\nkernel = "sum-3"\nevery = 16\nwires = { increment = "fast.coning" }\n'
+    message = "a sum that is cleared every 8 cycles is taken every 16 too"
+    check(tmp_path, f"{TWO_SPEEDS}{late}ranges = {{ sum = 1 }}\n", message, capsys)
+
+
+@each(
+    "content, message",
+    [
+        (b"", "the system: 'sample_hz' is missing"),
+        (b"sample_hz = 1\ninputs = {}\nstage = []", "stage is no list of tables; [[stage]] begins each"),
+        (b"sample_hz = 1\nstage = 3\ninputs = {}", "stage is no list of tables"),
+        (b"\xff\xfe", "is not UTF-8 (byte 0)"),
+        (b"\0", "is not TOML"),
+        (b"x" * (1 << 20) + b"xx", "is over 1048576 bytes long"),
+    ],
+)
+def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, tmp_path, capsys):
+    path = tmp_path / "case.toml"
+    path.write_bytes(content)
+    assert message in refused([str(path), "--out", str(tmp_path / "out")], capsys)
+    assert sorted(tmp_path.iterdir()) == [path]
+
+
+@each(
+    "words, message",
+    [
+        ("nowhere.toml", "nowhere.toml cannot be read (No such file or directory)"),
+        ("two-speed-dmc", "system 'two-speed-dmc' is not known (did you mean two-speed-dcm"),
+        (".", ". cannot be read (Is a directory)"),
+        ("a*/b.toml", "FILE holds */"),
+        (
+            "case.toml --target rust",
+            "target 'rust' is not known; allowed: numpy, c, c-float, c-fixed, fixed-model",
+        ),
+        (
+            "case.toml --word 16",
+            "the options of fixed point go with --target c-fixed or fixed-model, not with c",
+        ),
+        ("case.toml --target c-fixed --word 17", "word"),
+        (
+            "case.toml --target numpy --out o --with-runs",
+            "--with-runs goes with targets in C, not with numpy",
+        ),
+        ("case.toml --with-runs", "--with-runs goes with --out"),
+        ("case.toml --check", "--check goes with --out"),
+        ("case.toml --force", "--force goes with --out"),
+        ("case.toml --draw case.png", "--draw case.png is no SVG file"),
+        ("case.svg --draw ./case.svg", "--draw case.svg is the file that the command reads"),
+        ("case.toml --out o --check --draw o.svg", "--check writes nothing; --draw does not go with it"),
+        ("case.toml --sample-hz 0", "--sample-hz is 0; a number above 0 is needed"),
+        ("case.toml --sample-hz fast", "--sample-hz is 'fast'; a finite number is needed"),
+        ("case.toml --target numpy --cpu cortex-m3", "--cpu goes with targets in C, not with numpy"),
+        ("case.toml --cpu z80", "cpu 'z80' is not known"),
+        ("case.toml --format csv", "format 'csv' is not known"),
+    ],
+)
+def test_words_that_do_not_go_together_are_refused_in_one_line(words, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("case.toml").write_text(TWO_SPEEDS)
+    assert message in refused(words.split(), capsys)
+    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]

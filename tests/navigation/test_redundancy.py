@@ -1,0 +1,357 @@
+"""Redundant sensors: the numbers of the hexad, failures by brute force, moment arm, quantization and boresight."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+import pytest
+import sympy as sp
+from gathering import each
+
+import strapgen
+from strapgen.ir.exceptions import InputError
+from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, geometry
+from strapgen.navigation.redundancy.geometry_file import kernels, read
+from strapgen.navigation.redundancy.geometry_report import geometry_report
+from strapgen.navigation.redundancy.parity_equations import SensorSet
+from strapgen.navigation.redundancy.redundancy_names import HEXAD_TRIADS, REDUNDANCY
+from strapgen.run.fixed import ModelEvaluator
+
+#: The parity vectors of the six sensors, by the sensors of each.
+VECTORS = {
+    "0123": [-2, -2, 1, 3],
+    "0124": [1, -2, -2, 3],
+    "0125": [-2, 1, -2, 3],
+    "0134": [-1, -2, 2, 1],
+    "0135": [-2, -1, 2, 1],
+    "0145": [-1, 1, -1, 1],
+    "0234": [1, -1, -1, 1],
+    "0235": [-2, -1, 1, 2],
+    "0245": [-1, -2, 1, 2],
+    "0345": [-3, 2, -1, 2],
+    "1234": [-2, -1, 1, 2],
+    "1235": [1, -1, -1, 1],
+    "1245": [-1, -2, 2, 1],
+    "1345": [3, -2, -2, 1],
+    "2345": [-3, -1, 2, 2],
+}
+#: Six axes of which no three lie in a plane, with Pythagorean components, and five of them.
+USERS = geometry(
+    [
+        [1, 0, 0],
+        ["-1/3", "2/3", "2/3"],
+        ["2/7", "3/7", "-6/7"],
+        ["4/9", "-7/9", "4/9"],
+        ["6/11", "6/11", "7/11"],
+        ["2/3", "-1/3", "-2/3"],
+    ]
+)
+PENTAD = SensorGeometry(USERS.axes[:5])
+TETRAD = SensorGeometry(USERS.axes[:4])
+AXES = np.array(HEXAD.axes, float)
+EQUATIONS = np.array(HEXAD.equations, float)
+LENGTHS = np.linalg.norm(EQUATIONS, axis=1)
+TRIP = 1e-3
+
+
+def test_the_second_triad_is_the_first_turned_by_60_degrees_about_the_cone_axis():
+    axis = sp.Matrix([1, 1, 1]) / sp.sqrt(3)
+    skew = sp.Matrix(3, 3, lambda i, j: -sum(sp.LeviCivita(i, j, k) * axis[k] for k in range(3)))
+    turn = sp.eye(3) + sp.sqrt(3) / 2 * skew + skew**2 / 2
+    rows = sp.Matrix([[sp.Rational(x.numerator, x.denominator) for x in row] for row in HEXAD.axes])
+    assert rows[:3, :] == sp.eye(3)
+    assert sp.simplify(rows[3:, :] - turn.T) == sp.zeros(3)
+    assert rows.T * rows == 2 * sp.eye(3)
+    angles = [sp.deg(sp.acos((rows[k, :] * axis)[0])) for k in range(6)]
+    assert {f"{float(angle):.4f}" for angle in angles} == {"54.7356"}
+
+
+def test_the_parity_vectors_are_these_integers_and_the_null_space():
+    assert len(HEXAD.equations) == 15
+    for (sensors, values), equation in zip(VECTORS.items(), HEXAD.equations, strict=True):
+        vector = [0] * 6
+        for sensor, value in zip(map(int, sensors), values, strict=True):
+            vector[sensor] = value
+        assert equation == tuple(vector)
+        null = np.linalg.svd(AXES[[*map(int, sensors)]].T)[2][-1]
+        np.testing.assert_allclose(np.abs(null @ values), np.linalg.norm(values), rtol=1e-12)
+    m = strapgen.derive("parity-hexad").expand()["parity"]
+    vector = sp.symbols("x y z")
+    measured = {sp.Symbol(f"m_{k}", real=True): sp.Matrix(HEXAD.axes[k]).dot(vector) for k in range(6)}
+    assert all(sp.expand(p.subs(measured)) == 0 for p in m)
+    assert f"{(np.abs(EQUATIONS)[EQUATIONS != 0].reshape(15, 4) / LENGTHS[:, None]).min():.7f}" == "0.2357023"
+
+
+def test_the_triads_have_the_determinants_conditions_and_gains_of_the_page():
+    determinants = [abs(triad.determinant) for triad in HEXAD.triads]
+    assert [determinants.count(Fraction(n, 3)) for n in (3, 2, 1)] == [2, 12, 6]
+    conditions = {round(np.linalg.cond(AXES[list(triad.sensors)]), 3) for triad in HEXAD.triads}
+    assert conditions == {1, 2.618, 5.828}
+    assert max(max(triad.squared_gains) for triad in HEXAD.triads) == 17
+    assert max(triad.squared_gain for triad in HEXAD.triads) == 19
+    assert all(sum(x * x for x in row) == Fraction(1, 2) for row in HEXAD.least_squares)
+    assert tuple("".join(map(str, triad.sensors)) for triad in HEXAD.triads) == HEXAD_TRIADS
+    for name in (f"triad-hexad-{three}" for three in HEXAD_TRIADS):
+        kernel = strapgen.derive(name)
+        assert kernel.name == name
+        x = sp.symbols("x y z")
+        axes = [sp.Matrix(HEXAD.axes[int(k)]).dot(x) for k in name[-3:]]
+        known = dict(zip(kernel.inputs[0].elements, axes, strict=True))
+        assert [sp.expand(e) for e in kernel.expand(known)["increment"]] == list(x)
+    known = {f"m_{k}": sp.Matrix(HEXAD.axes[k]).dot(x) for k in range(6)}
+    assert [sp.expand(e) for e in strapgen.derive("all-hexad").expand(known)["increment"]] == list(x)
+
+
+def test_parity_is_exact_in_fixed_point_where_the_format_of_the_input_is_that_of_the_output():
+    fixed = strapgen.quantize(
+        strapgen.lower(strapgen.derive("parity-hexad")),
+        strapgen.Settings(word=16, formats={"measurement": "Q1.14"}),
+    )
+    assert fixed.error_bounds["parity"] == 0
+
+
+def select(parity, excluded=()):
+    flags = np.zeros(6)
+    flags[list(excluded)] = 1
+    return strapgen.evaluator("select-hexad")(parity, TRIP * LENGTHS, flags)
+
+
+def sensors_of(triad) -> set[int]:
+    return {*HEXAD.triads[int(triad)].sensors}
+
+
+def test_two_failures_are_isolated_whichever_sensors_they_hit_and_a_third_is_detected():
+    parity, true = strapgen.evaluator("parity-hexad"), AXES @ [0.01, 0.02, -0.03]
+    assert [float(np.sum(x)) for x in select(parity(true))] == [0, 0, 0]
+    least = TRIP / (np.sqrt(2) / 6)
+    for first, sign in zip(range(6), (1, -1) * 3, strict=True):
+        failure = np.eye(6)[first] * sign * least
+        tripped = np.abs(parity(true + 1.0001 * failure)) >= TRIP * LENGTHS
+        assert np.array_equal(tripped, EQUATIONS[:, first] != 0) and tripped.sum() == 10
+        assert (np.abs(parity(true + 0.9999 * failure)) >= TRIP * LENGTHS).sum() < 10
+        detected, failed, triad = select(parity(true + 1.0001 * failure))
+        assert detected == 1 and [*failed] == [*np.eye(6)[first]] and first not in sensors_of(triad)
+        for second in {*range(6)} - {first}:
+            both = true + 1.0001 * failure + 1.01 * least * np.eye(6)[second]
+            left = EQUATIONS[:, first] == 0
+            assert (np.abs(parity(both)) >= TRIP * LENGTHS)[left].sum() == 4 and left.sum() == 5
+            detected, failed, triad = select(parity(both), [first])
+            assert detected == 1 and [*failed] == [*np.eye(6)[second]]
+            assert not {first, second} & sensors_of(triad)
+            third = min({*range(6)} - {first, second})
+            detected, failed, triad = select(parity(both + 1.01 * least * np.eye(6)[third]), [first, second])
+            assert detected == 1 and not failed.any() and not {first, second} & sensors_of(triad)
+
+
+def by_ranks(one: SensorGeometry) -> int:
+    """Return the failures that are isolated, from ranks in floating point: no two failures explain one measurement."""
+    axes = np.array(one.axes, float)
+    for failures in range(one.count):
+        for removed in combinations(range(one.count), failures):
+            rest = [k for k in range(one.count) if k not in removed]
+            for pair in combinations(rest, 2):
+                both = np.hstack([axes[rest], np.eye(one.count)[np.ix_(rest, pair)]])
+                if np.linalg.matrix_rank(both) < 5:
+                    return failures
+    return one.count
+
+
+@each("one", [HEXAD, USERS, PENTAD, TETRAD])
+def test_failures_that_are_isolated_agree_with_ranks(one):
+    expected = {6: 2, 5: 1, 4: 0}[one.count]
+    assert one.fail_operate == by_ranks(one) == expected
+    assert one.fail_safe
+
+
+def test_a_geometry_with_two_alike_axes_detects_their_failures_and_isolates_none():
+    alike = geometry([[1, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, "3/5", "4/5"]])
+    assert (alike.fail_operate, alike.fail_safe) == (0, True)
+    assert (0, 1) in alike.ambiguous()
+    assert (-1, 1, 0, 0, 0) in alike.equations
+
+
+def test_bad_geometries_are_refused_in_one_line_with_the_reason(tmp_path):
+    file = tmp_path / "bad.toml"
+    good = "[1, 0, 0], [0, 1, 0], [0, 0, 1]"
+    for text, reason in (
+        (f"axes = [{good}]", "the number of axes is 3"),
+        ("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0]]", "all axes lie in one plane"),
+        ("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1]]", "axis 3 is in no parity equation"),
+        (f"axes = [{good}, [0, 0, 0]]", "axis 3 is zero"),
+        (f'axes = [{good}, [1, 2, "x"]]', "a component of axis 3 is 'x': numbers, + - * /"),
+        (f"axes = [{good}, [1e308, 0, 0]]", "a component of axis 3 is '1e308': an exponent is at most 100"),
+        (f"axes = [{good}, [1{'0' * 400}, 0, 0]]", "axis 3 has a component beyond 1000"),
+        (f"axes = [{good}, [0, 0, nan]]", "a component of axis 3 is 'nan'"),
+        (f'axes = [{good}, ["sqrt(6)-sqrt(2)*sqrt(3)", 0, 0.0]]', "axis 3 is zero"),
+        (
+            f'axes = [{good}, ["sqrt(2)", "sqrt(3)", 0], ["sqrt(5)", "sqrt(7)", 0]]',
+            "over three different square roots",
+        ),
+        (f"axes = [{good}, [1, 2]]", "axis 3 is [1, 2]; three numbers are needed"),
+        ("axes = 3", "axes is no list"),
+        ("", "has no axes"),
+        (f"axes = [{good}, [1, 1, 1]]\nrange = 0", "range is 0"),
+        (f"axes = [{good}, [1, 1, 1]]\nname = '../x'", "the name is '../x'"),
+        (f"axes = [{good}, [1, 1, 1]]\nsensor = 'gyros'", "sensor"),
+        (f"axes = [{good}, [1, 1, 1]]\nkind = 1", "kind"),
+        ("axes = [", "is not TOML"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InputError) as error:
+            read(file)
+        assert reason in str(error.value) and "\n" not in str(error.value), text
+
+
+#: Sensors on a cone, as its drawing has them, and the same with rows that are no unit vectors.
+CONE = """
+axes = [
+    [1, 0, 0], ["-1/2", "sqrt(3)/2", 0], ["-0.5", "-sqrt(3)/2", 0], [0, 0, 1],
+    [0.5, 0, "sqrt(3)/2"], ["1/4", "sqrt(3)/4", "sqrt(3)/2"],
+]
+"""
+
+
+def test_axes_with_roots_and_decimals_are_exact(tmp_path):
+    """Equations and matrices are those of exact arithmetic with SymPy's own numbers."""
+    file = tmp_path / "cone.toml"
+    file.write_text(CONE)
+    cone = read(file).geometry
+    assert cone.axes[4] == (Fraction(1, 2), 0, sp.sqrt(3) / 2) and cone.lengths == (1,) * 6
+    assert cone.equations[:2] == ((1, 1, 1, 0, 0, 0), (-1, 0, 0, -sp.sqrt(3), 2, 0))
+    rows = sp.Matrix([[sp.sympify(x) for x in row] for row in cone.axes])
+    for equation in cone.equations:
+        assert (sp.Matrix([equation]) * rows).applyfunc(sp.expand) == sp.zeros(1, 3)
+    for triad in cone.triads:
+        inverse = sp.Matrix([[sp.sympify(x) for x in row] for row in triad.inverse])
+        assert (inverse * rows[list(triad.sensors), :]).applyfunc(sp.expand) == sp.eye(3)
+        gains = [sp.expand((inverse[k, :] * inverse[k, :].T)[0]) for k in range(3)]
+        assert [sp.sympify(x) for x in triad.squared_gains] == gains
+    gains = [float(triad.squared_gain) for triad in cone.triads]
+    assert gains == sorted(gains) and len(gains) == 16
+    least = sp.Matrix([[sp.sympify(x) for x in row] for row in cone.least_squares])
+    assert (least * rows).applyfunc(sp.expand) == sp.eye(3)
+    assert len(cone.parity_basis) == 3 and np.linalg.matrix_rank(np.array(cone.parity_basis, float)) == 3
+    assert cone.fail_operate == by_ranks(cone) == 1
+
+
+def test_code_of_axes_with_roots_is_inside_its_bound(tmp_path, rng):
+    file = tmp_path / "cone.toml"
+    file.write_text(CONE)
+    parity = strapgen.lower(next(kernels(read(file))))
+    fixed = strapgen.quantize(parity, strapgen.Settings(word=32))
+    model = ModelEvaluator(strapgen.generate(fixed, "fixed-model"))
+    (measured,), (result,) = fixed.interface.inputs, fixed.interface.outputs
+    words = rng.integers(measured.low, measured.high, (20, 6), endpoint=True)
+    (computed,), _ = model.run([words], model.fresh(20))
+    equations, worst = sp.Matrix(read(file).geometry.equations), 0.0
+    for row, outcome in zip(words, computed, strict=True):
+        exact = equations * sp.Matrix([int(word) for word in row]) * sp.sympify(measured.unit)
+        off = [abs(int(w) * sp.sympify(result.unit) - x) for w, x in zip(outcome, exact, strict=True)]
+        assert all(sp.N(x - sp.sympify(e), 30) <= 0 for x, e in zip(off, result.errors, strict=True))
+        worst = max(worst, *(float(x) for x in off))
+    assert worst > float(max(result.errors)) / 4
+
+
+def test_axis_is_divided_by_its_length_where_that_is_in_the_field():
+    one = geometry([[1, 0, 0], [0, 2, 0], [0, 0, "0.5"], [1, 2, 2], ["sqrt(2)", "sqrt(2)", 0], [1, 1, 1]])
+    third = Fraction(1, 3)
+    assert one.axes[1:4] == ((0, 1, 0), (0, 0, 1), (third, 2 * third, 2 * third))
+    assert one.axes[4] == (sp.sqrt(2) / 2, sp.sqrt(2) / 2, 0)
+    # The root of 3 is not among these numbers.
+    assert one.axes[5] == (1, 1, 1) and one.lengths == (1, 1, 1, 1, 1, sp.sqrt(3))
+    sensors = SensorSet("six", one)
+    assert float(sensors.parity.bound) >= max(np.abs(np.array(one.equations, float)).sum(axis=1)) / 8
+    said = geometry_report(sensors, []).written("text")
+    assert said.count("stands as it is") == 1
+    assert "axis 5 stands as it is: its length sqrt(3) is not in the field of the axes" in said
+    data = json.loads(geometry_report(sensors, []).written("json"))
+    assert data["lengths"][5] == "sqrt(3)" and data["axes"][4][0] == "sqrt(2)/2"
+
+
+def test_the_kernels_of_a_file_are_those_of_its_sensors(tmp_path):
+    file = tmp_path / "tetrad.toml"
+    file.write_text(
+        'sensor = "accelerometer"\naxes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], ["2/3", "2/3", "1/3"]]'
+    )
+    names = [kernel.name for kernel in kernels(read(file))]
+    assert names[:4] == ["parity-tetrad", "parity-rest-tetrad", "select-tetrad", "all-tetrad"]
+    assert len(names) == 4 + 4
+    parity = next(kernels(read(file)))
+    assert (parity.inputs[0].unit, parity.arguments) == ("m/s", f"strapgen redundancy {file}")
+
+
+@pytest.mark.long
+def test_the_acceleration_at_the_end_of_a_moment_arm():
+    rate, change, arm = np.array([0.5, -0.2, 0.3]), np.array([1.0, 2, -3]), [-2.8, 0, 0.1]
+    cycle = 0.02
+    step = strapgen.evaluator("moment-arm")
+    before = cycle * (rate - cycle * change)
+    moved, _ = step(cycle * np.array([1, -2, 9]), cycle * rate, before, arm, 1 / cycle)
+    np.testing.assert_allclose(moved / cycle, [1.579, 6.574, 14.151], atol=5e-4)
+    kernel = strapgen.derive("moment-arm")
+    w, a, r = (sp.Matrix(sp.symbols(f"{n}x {n}y {n}z")) for n in "war")
+    t, dw = sp.Symbol("T"), sp.Matrix(sp.symbols("cx cy cz"))
+    values = [*(t * a), *(t * w), *(t * (w - t * dw)), *r, 1 / t]
+    known = dict(zip([e for s in kernel.inputs for e in s.elements], values, strict=True))
+    outcome = sp.Matrix(kernel.expand(known)["arm_velocity_increment"]) / t
+    assert (outcome - (a + dw.cross(r) + w.cross(w.cross(r)))).applyfunc(sp.simplify) == sp.zeros(3, 1)
+
+
+def test_quantized_angles_make_the_noise_of_the_law(rng):
+    """The relative error of a standard deviation over n samples that follow one another is about sqrt(2/n)."""
+    quantum, cycle, arm, count = np.radians(3 / 3600), 0.02, 2.8, 40_000
+    rate_noise = np.degrees(quantum / (cycle * np.sqrt(6)))
+    arm_noise = arm * quantum / (cycle**2 * np.sqrt(2))
+    assert (f"{rate_noise:.7f}", f"{arm_noise:.7f}") == ("0.0170103", "0.0719912")
+    angle = np.cumsum(cycle * rng.uniform(-0.01, 0.01, count))
+    increment = np.diff(quantum * np.floor(angle / quantum))
+    rates = np.zeros((count - 2, 2, 3))
+    rates[:, 0, 1], rates[:, 1, 1] = increment[1:], increment[:-1]
+    true = np.diff(angle)
+    zero, r = np.zeros((count - 2, 3)), np.tile([arm, 0, 0], (count - 2, 1))
+    moved, _ = strapgen.evaluator("moment-arm")(
+        zero, rates[:, 0], rates[:, 1], r, np.full(count - 2, 1 / cycle)
+    )
+    exact = -arm * np.diff(true) / cycle
+    assert np.std(np.degrees((increment - true) / cycle)) == pytest.approx(rate_noise, rel=0.03)
+    assert np.std(moved[:, 2] - exact) / cycle == pytest.approx(arm_noise, rel=0.03)
+
+
+def rotation(vector) -> np.ndarray:
+    skew = np.cross(np.eye(3), vector)
+    return np.linalg.solve(np.eye(3) - skew / 2, np.eye(3) + skew / 2)
+
+
+def test_the_boresight_is_the_nearest_rotation_to_the_mean_of_eight_alignments(rng):
+    true, arcmin = rotation([0.3, -0.2, 0.1]), np.radians(1 / 60)
+    errors = 1.5 * np.sqrt(8) * arcmin / np.sqrt(3) * rng.normal(size=(8, 3))
+    mean, step = np.zeros((3, 3)), strapgen.evaluator("boresight")
+    for number, error in enumerate(errors, 1):
+        b = rotation(rng.normal(size=3))
+        mean = step(b @ true @ rotation(error), b, mean, 1 / number)
+    nearest = strapgen.evaluator("dcm-orthonormalize-optimal")(mean)
+    left = true.T @ nearest
+    vector = np.array([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0], left[1, 0] - left[0, 1]]) / 2
+    largest = np.abs(errors).max()
+    np.testing.assert_allclose(vector, errors.mean(axis=0), atol=10 * largest**2)
+    assert np.linalg.norm(vector) < np.linalg.norm(errors, axis=1).mean()
+
+
+def test_parity_at_rest_becomes_a_bias_that_no_equation_sees(rng):
+    parity, rest = strapgen.evaluator("parity-hexad"), strapgen.evaluator("parity-rest-hexad")
+    biases, mean = 1e-3 * rng.normal(size=6), np.zeros(15)
+    for number in range(1, 5):
+        mean, corrected = rest(parity(biases), mean, 1 / number)
+    np.testing.assert_allclose(mean, EQUATIONS @ biases, atol=1e-15)
+    _, corrected = rest(parity(biases + AXES @ [0.01, 0.02, 0.03]), mean, 0.0)
+    np.testing.assert_allclose(corrected, 0, atol=1e-15)
+
+
+@pytest.mark.long
+def test_every_kernel_says_what_is_printed_derived_or_lost():
+    for name in REDUNDANCY:
+        source = strapgen.derive(name).source
+        assert "Sebring" in source and "derived" in source, name

@@ -1,0 +1,147 @@
+"""What a described system navigates on every back end, and each single pass held to its bounds."""
+
+import json
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from strapgen.analysis.vibration.spectrum import read_spectrum
+from strapgen.cli import main
+from strapgen.ir.exceptions import InputError
+from strapgen.navigation.systems import system_study
+from strapgen.navigation.systems.system_agreement import agreement
+from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.turning_vehicle import TurningVehicle
+from strapgen.navigation.systems.wiring import described
+
+EXAMPLE = "examples/strapdown.toml"
+#: One count of the gyros in rad.
+COUNT = 3 * math.pi / 648000
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    return TurningVehicle(math.radians(45), math.radians(70), read_spectrum("examples/vibration.csv"))
+
+
+def test_rates_and_attitudes_of_the_vehicle_belong_together(shaken):
+    h, times = 1e-5, np.linspace(0.3, 50, 40)
+    before, attitude, after = (shaken.attitude(times + dt) for dt in (-h, 0, h))
+    skew = attitude.swapaxes(-1, -2) @ (after - before) / (2 * h)
+    rate = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+    sensed, force = shaken.measured(times)
+    # A central difference errs by h^2/6 times the third derivative, at 200 Hz at most 1e-3 rad of 1e9 1/s^3.
+    assert np.allclose(rate + shaken.earth_rate @ attitude, sensed, atol=1e-4)
+    calm = TurningVehicle(math.radians(45), math.radians(70)).measured(times)[1]
+    assert np.allclose(np.linalg.norm(calm, axis=1), shaken.gravity, rtol=1e-12)
+    assert np.abs(force - calm).max() > 1
+
+
+def test_increments_repeat_with_the_motion(shaken):
+    for increments in TurningVehicle(math.radians(45), math.radians(70)).increments(0.1, 1300):
+        assert (increments[1200:] == increments[:100]).all()
+    first, again = np.array([0.25, 0.5]), np.array([120.25, 120.5])
+    assert np.allclose(shaken.attitude(again), shaken.attitude(first), atol=1e-9)
+    # Phases of up to 461 Hz are 3.5e5 rad after two minutes, and rounded to 8e-11; accelerations add up to less than
+    # 1000 m/s^2.
+    for one, other in zip(shaken.measured(again), shaken.measured(first), strict=True):
+        assert np.allclose(one, other, rtol=0, atol=1e-7)
+
+
+def test_increments_are_those_of_half_the_cycle_added(shaken):
+    for whole, halves in zip(shaken.increments(0.01, 50), shaken.increments(0.005, 100), strict=True):
+        assert np.allclose(whole, halves.reshape(-1, 2, 3).sum(axis=1), rtol=0, atol=1e-12)
+
+
+@pytest.mark.long
+def test_the_chain_finds_the_attitude_of_a_vehicle_that_turns():
+    vehicle = TurningVehicle(math.radians(45), math.radians(70))
+    description = described(EXAMPLE)
+    result = system_study.study(description, vehicle, Fraction(4), ["c-fixed32", "c-fixed16"])
+    # Half a count on each axis, and what compensation leaves to second order, 1e-6 of the angles.
+    assert result.against_truth.max() < 2 * COUNT
+    fine, coarse = result.errors
+    assert fine.attitude.max() < 1e-8 * 16  # units of 2^-30 over 200 passes, with error feedback
+    assert 1e-6 < coarse.attitude.max() < 2e-3
+    assert fine.velocity.max() < 1e-5
+    assert fine.position.max() < 0.1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("rate", "seconds", "backend", "reference"),
+    [
+        (100, 240, "c-fixed32", "numpy"),
+        (100, 120, "c-fixed16", "numpy"),
+        (100, 30, "c", "numpy"),
+        (100, 8, "c-fixed32", "exact"),
+        (3200, 5, "c-fixed16", "numpy"),
+    ],
+)
+def test_every_pass_of_the_chain_is_within_the_sum_of_the_bounds(shaken, rate, seconds, backend, reference):
+    description = described(EXAMPLE, Fraction(rate))
+    inputs = system_study.samples(description, shaken, Fraction(seconds))
+    runner = system_runner(description, backend)
+    start = system_study.started(runner, system_study.Outputs.of(description), shaken)
+    result = agreement(runner, system_runner(description, reference), inputs, start)
+    assert result.holds, {name: share for name, share in result.share.items() if share > 1}
+    assert set(result.reasons) == {"angles_previous", "geographic_previous"}  # angles jump by a turn
+    assert max(result.largest[name] for name in result.reasons) < 1e-3
+    assert (result.share["velocity_velocity"] > 0.05) == (backend != "c")
+
+
+@pytest.mark.long
+def test_the_model_and_the_c_have_the_same_bits_along_the_chain(shaken):
+    description = described(EXAMPLE, Fraction(100))
+    inputs = system_study.samples(description, shaken, Fraction(5))
+    from strapgen.ir.fixed_settings import Settings
+
+    for word in (16, 32):
+        runs = [
+            system_runner(description, name, Settings(word=word)).run(inputs).values
+            for name in (f"c-fixed{word}", "fixed-model")
+        ]
+        assert all((runs[0][name] == runs[1][name]).all() for name in runs[0])
+
+
+@pytest.mark.long
+def test_the_command_prints_differences(capsys):
+    def printed(*options):
+        with pytest.raises(SystemExit) as stop:
+            main(["study", "system", EXAMPLE, "--sample-hz", "100", "--duration", "2", *options])
+        assert not stop.value.code
+        return capsys.readouterr().out
+
+    assert "attitude in double" in printed("--backend", "c-fixed16")
+    data = json.loads(printed("--backend", "c-fixed32", "--format", "json"))
+    assert data["sample_hz"] == 100
+    assert data["from_double"][0]["backend"] == "c-fixed32"
+    assert 0 < data["from_double"][0]["attitude_arcsec"] < 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--duration", "0.05"], "no whole number of cycles of the slowest rate, 0.1 s"),
+        (["--sample-hz", "70"], "which does not divide the 70 Hz of the samples"),
+        (["--backend", "c-fixed8"], "backend 'c-fixed8' is not known"),
+    ],
+)
+def test_what_does_not_go_is_said_in_one_line(options, message, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["study", "system", EXAMPLE, *options])
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_inputs_that_no_vehicle_measures_are_refused(shaken):
+    description = described(EXAMPLE, Fraction(100))
+    choices = {**description.choices, "gyro": description.choices["cosines"]}
+    with pytest.raises(InputError, match=r"gyro_counts \(unit 1, frame b\) is no gyro or accelerometer"):
+        system_study.samples(
+            type(description)(**{**vars(description), "choices": choices}), shaken, Fraction(1)
+        )

@@ -1,0 +1,361 @@
+"""Building: one compilation for each content and compiler, and clear words where there is no compiler."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from navigation.described_files import description
+from small_systems import COUNTING
+
+import strapgen
+from strapgen import pipeline
+from strapgen.cli import main
+from strapgen.ir.exceptions import CompilerError
+from strapgen.ir.sources import Sources
+from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.run import backends as run
+from strapgen.run import compiler, compiler_service
+
+SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]
+SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Start with an empty cache, on disk and in memory, and the machine's own compiler."""
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiler, "_loaded", {})
+    monkeypatch.setattr(compiler, "_modules", {})
+    monkeypatch.delenv("CC", raising=False)
+    return tmp_path / "cache"
+
+
+@pytest.fixture(scope="module")
+def sources() -> Sources:
+    return pipeline.generate(pipeline.lower(pipeline.derive("euler-normalize")), "c")
+
+
+@pytest.fixture
+def counting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Return a compiler that counts its calls, and the count."""
+    script, log = tmp_path / "counting-cc", tmp_path / "log"
+    log.write_text("")
+    script.write_text(f'#!/bin/sh\necho "$@" >> {log}\nexec {shutil.which("cc")} "$@"\n')
+    script.chmod(0o755)
+    monkeypatch.setenv("CC", str(script))
+    return lambda: len(log.read_text().splitlines())
+
+
+@pytest.fixture
+def without_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide every compiler."""
+    (tmp_path / "nothing").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+
+
+def test_a_compiled_function_is_called_and_a_second_time_nothing_is_compiled(
+    sources, counting, root, monkeypatch
+):
+    first = compiler.load(sources)
+    result = first.ffi.new("double[4]")
+    first.lib.euler_normalize([0.0, 0.0, 3.0, 4.0], result)
+    np.testing.assert_allclose(list(result), [0, 0, 0.6, 0.8])
+    calls = counting()
+    assert calls > 0
+    assert compiler.load(sources) is first
+    monkeypatch.setattr(compiler, "_loaded", {})  # as another process
+    again = compiler.load(sources)
+    assert again.__file__ == first.__file__
+    assert counting() == calls
+    (place,) = (root / "builds").iterdir()
+    kept = {path.name for path in place.iterdir()} - {"manifest.json"}
+    assert kept == {Path(first.__file__).name}, "only what is loaded is kept"
+
+
+def test_other_text_and_another_compiler_compile_again(sources, counting, root, monkeypatch):
+    compiler.load(sources)
+    calls = counting()
+    files = {name: text.replace("Euler", "Euler's") for name, text in sources.files.items()}
+    compiler.load(Sources.restore(sources.interface(), files))
+    assert counting() == 2 * calls
+    assert len(list((root / "builds").iterdir())) == 2
+    monkeypatch.setenv("CC", "cc -Wall")
+    monkeypatch.setattr(compiler, "_loaded", {})
+    compiler.load(sources)
+    assert len(list((root / "builds").iterdir())) == 3
+    assert os.environ["CC"] == "cc -Wall", "the environment is put back"
+
+
+def test_blank_choice_of_compiler_is_none(sources, monkeypatch):
+    for blank in ("", "  "):
+        monkeypatch.setenv("CC", blank)
+        assert compiler.compiler() == shutil.which("cc")
+    assert compiler.load(sources).lib.euler_normalize
+    assert os.environ["CC"] == "  "
+
+
+def test_cache_folder_may_be_relative(sources, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", "relative")
+    assert compiler.load(sources).lib.euler_normalize
+    assert "CC" not in os.environ
+    assert len(list((tmp_path / "relative" / "builds").iterdir())) == 1
+
+
+# No compiler, or a bad one
+
+
+def test_no_compiler(sources, without_compiler, root):
+    with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH; install gcc .*numpy"):
+        compiler.load(sources)
+    assert not (root / "builds").exists()
+
+
+@pytest.mark.parametrize("chosen", ["strange-cc -O2", "/nowhere/cc", "'unclosed", '""'])
+def test_chosen_compiler_is_not_there(chosen, sources, monkeypatch):
+    monkeypatch.setenv("CC", chosen)
+    with pytest.raises(
+        CompilerError, match=r"^no C compiler: .* is not on the PATH; install gcc \(or set CC\)"
+    ):
+        compiler.load(sources)
+
+
+def test_numpy_works_without_a_compiler(without_compiler):
+    history = strapgen.backend("euler", "rk4", 2, "numpy").propagate(np.full((3, 2, 3), 0.01))
+    assert np.isfinite(history).all()
+
+
+def test_generation_works_without_a_compiler(without_compiler, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["generate", "euler", "--target", "c", "--out", str(tmp_path / "out")])
+    assert stop.value.code == 0
+    assert (tmp_path / "out" / "euler_rk4_2.c").is_file()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("backend", ["c", "c-float"])
+def test_command_line_without_a_compiler(backend, without_compiler, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([*SIMULATE, "--backend", backend])
+    assert stop.value.code == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("strapgen: no C compiler: ")
+    assert said.err.count("\n") == 1
+    with pytest.raises(SystemExit) as stop:
+        main([*SIMULATE, "--backend", "numpy"])
+    assert stop.value.code == 0
+
+
+def test_version_without_a_compiler(without_compiler, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert "C compiler is not installed" in capsys.readouterr().out
+
+
+def test_compiler_that_fails(sources, root, monkeypatch, capfd):
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(CompilerError, match=r"false failed on strapgen_euler_normalize") as failure:
+        compiler.load(sources)
+    assert "\n" not in str(failure.value)
+    assert list((root / "builds").iterdir()) == []
+    assert capfd.readouterr() == ("", "")
+
+
+def test_source_that_does_not_compile(sources, root, capfd):
+    files = {name: text.replace("#include", "#error no") for name, text in sources.files.items()}
+    with pytest.raises(CompilerError, match=r"failed on strapgen_euler_normalize: .*error.* no") as failure:
+        compiler.load(Sources.restore(sources.interface(), files))
+    assert "\n" not in str(failure.value)
+    assert list((root / "builds").iterdir()) == []
+    assert capfd.readouterr() == ("", "")
+
+
+def test_flags_of_the_environment_do_not_reach_the_compiler(sources, root, monkeypatch):
+    for name in ("CFLAGS", "CPPFLAGS", "LDFLAGS"):
+        monkeypatch.setenv(name, "-no-such-flag-at-all")
+    assert compiler.load(sources).lib.euler_normalize
+
+
+def test_a_compiler_that_fails_is_told_in_one_line(sources, root, monkeypatch, capfd):
+    monkeypatch.setenv("CC", "cc -no-such-flag-at-all")
+    with pytest.raises(CompilerError, match=r"cc failed on strapgen_\w+: .*error.*no-such-flag-at-all"):
+        compiler.load(sources)
+    assert capfd.readouterr() == ("", "")
+    assert not list((root / "builds").iterdir())
+
+
+def test_a_compiler_that_makes_nothing(sources, root, monkeypatch):
+    monkeypatch.setenv("CC", "true")
+    with pytest.raises(CompilerError, match="failed on"):
+        compiler.load(sources)
+    assert not list((root / "builds").iterdir())
+
+
+# Many in one module
+
+
+@pytest.fixture(scope="module")
+def many() -> list[Sources]:
+    names = ("euler-normalize", "dcm-from-euler")
+    lowered = [pipeline.lower(pipeline.derive(name)) for name in names]
+    return [pipeline.generate(program, target) for target in ("c", "c-float", "numpy") for program in lowered]
+
+
+@pytest.mark.long
+def test_many_sources_become_one_module_in_three_commands(many, counting, root, monkeypatch, tmp_path):
+    """One compiles all kernels, one the wrapper, and one links; each function is the one that it is alone."""
+    compiler.compile_together(many)
+    assert counting() == 3
+    (place,) = (root / "builds").iterdir()
+    modules = {compiler.load(sources) for sources in many if sources.target != "numpy"}
+    assert {Path(module.__file__).parent for module in modules} == {place}
+    assert len(modules) == 1
+    together = [run.of_sources(sources) for sources in many]
+    assert counting() == 3
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "other"))
+    monkeypatch.setattr(compiler, "_loaded", {})
+    rng = np.random.default_rng(7)
+    for sources, function in zip(many, together, strict=True):
+        alone = run.of_sources(sources)
+        values = [
+            rng.normal(size=(9, *signal.shape)).astype(alone.dtype) for signal in sources.function.inputs
+        ]
+        np.testing.assert_array_equal(function(*values), alone(*values))
+        if sources.target != "numpy":
+            assert function.module.__file__ != alone.module.__file__
+
+
+def test_what_is_there_is_not_compiled_again(many, counting):
+    first = many[0]
+    compiler.load(first)
+    calls = counting()
+    compiler.compile_together([first])
+    assert counting() == calls
+    compiler.compile_together(many)
+    assert counting() == calls + 3
+    calls = counting()
+    compiler.compile_together(many)
+    assert counting() == calls
+
+
+def test_functions_of_one_name_go_into_two_modules(sources, counting, root):
+    """Each module has one kernel: it is what `load` compiles of that alone, and found without a pointer."""
+    pair = [sources, other(sources, 1)]
+    compiler.compile_together(pair)
+    calls = counting()
+    shutil.rmtree(root / "shared", ignore_errors=True)
+    assert len(list((root / "builds").iterdir())) == 2
+    assert len({compiler.load(one).__file__ for one in pair}) == 2
+    assert counting() == calls
+
+
+def test_a_module_of_many_that_is_gone_is_compiled_alone(many, root, monkeypatch):
+    compiler.compile_together(many)
+    shutil.copytree(root, root.with_name("other"))
+    for kind, place in (("builds", root), ("shared", root.with_name("other"))):
+        monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(place))
+        monkeypatch.setattr(compiler, "_loaded", {})
+        for entry in (place / kind).iterdir():
+            shutil.rmtree(entry)
+        module = compiler.load(many[0])
+        assert module.lib.euler_normalize
+        assert Path(module.__file__).name.startswith("strapgen_euler_normalize")
+        assert Path(module.__file__).is_relative_to(place)
+
+
+def test_many_without_a_compiler(many, without_compiler, root):
+    with pytest.raises(CompilerError, match=r"^no C compiler: 'cc' is not on the PATH"):
+        compiler.compile_together(many)
+    assert not (root / "builds").exists()
+    compiler.compile_together([sources for sources in many if sources.target == "numpy"])
+
+
+def test_one_of_many_that_does_not_compile(many, root):
+    first = many[0]
+    files = {name: text.replace("#include", "#error no") for name, text in first.files.items()}
+    broken = Sources.restore(first.interface(), files)
+    with pytest.raises(CompilerError, match=r"error.* no"):
+        compiler.compile_together([broken, *many[1:]])
+    assert not list((root / "builds").iterdir())
+    assert not (root / "shared").exists()
+
+
+# The process that compiles
+
+
+def other(sources: Sources, number: int) -> Sources:
+    """Return sources that differ in a comment."""
+    files = {
+        name: text + (f"/* {number} */\n" if name.endswith(".c") else "")
+        for name, text in sources.files.items()
+    }
+    return Sources.restore(sources.interface(), files)
+
+
+def test_one_process_compiles_one_source_after_the_other(sources):
+    process = compiler_service.compiling_process()
+    compiler.load(sources)
+    assert compiler_service.compiling_process() is process
+
+
+def test_a_compiling_process_that_has_ended_is_replaced(sources, root):
+    process = compiler_service.compiling_process()
+    process.stop()
+    assert compiler.load(sources).lib.euler_normalize
+    assert compiler_service.compiling_process() is not process
+
+
+def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, monkeypatch):
+    """The compiler kills what called it; the next compilation has a process of its own again."""
+    script = tmp_path / "killing-cc"
+    script.write_text("#!/bin/sh\nkill -9 $PPID\n")
+    script.chmod(0o755)
+    with monkeypatch.context() as patched, pytest.raises(CompilerError, match="has ended before"):
+        patched.setenv("CC", str(script))
+        compiler.load(sources)
+    assert list((root / "builds").iterdir()) == []
+    assert compiler.load(sources).lib.euler_normalize
+
+
+def _compile_in_a_fork(text_number: int, sources: Sources, made) -> None:
+    made.put(
+        (compiler.load(other(sources, text_number)) is not None, compiler_service.compiling_process()._owner)
+    )
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_fork_compiles_in_a_process_of_its_own(sources):
+    assert compiler_service.compiling_process().serves
+    context = multiprocessing.get_context("fork")
+    made = context.SimpleQueue()
+    child = context.Process(target=_compile_in_a_fork, args=(2, sources, made))
+    child.start()
+    child.join(60)
+    assert made.get() == (True, child.pid)
+    assert compiler.load(other(sources, 3)).lib.euler_normalize
+
+
+def test_stages_of_a_system_are_compiled_together_and_only_where_they_are_called(sources, counting, tmp_path):
+    compiler.load(sources)
+    of_one_module = counting()
+    runner = system_runner(description(tmp_path, COUNTING, "counted.toml"), "c")
+    runner.run({"counts": np.zeros((4, 3))})
+    assert counting() == 2 * of_one_module
+    assert len(runner.evaluators) == 2
+    assert counting() == 3 * of_one_module
+
+
+def test_back_ends_that_are_compared_are_compiled_together(sources, counting):
+    compiler.load(sources)
+    of_one_module = counting()
+    rows = strapgen.compare("euler", "rk1", 1, ["c", "c-float", "c-fixed32"], np.full((5, 1, 3), 0.01))
+    assert [row.backend for row in rows] == ["c", "c-float", "c-fixed32"]
+    # Six kernels; those in double and in float have the same names, and go into two modules.
+    assert counting() == 3 * of_one_module

@@ -1,0 +1,39 @@
+"""Compilers that fail or lie: one line names them, and the cache holds nothing that cannot be loaded."""
+
+from __future__ import annotations
+
+import pytest
+
+from strapgen.catalogue import choose
+from strapgen.ir.exceptions import CompilerError
+from strapgen.run import compiler, generated_sources
+
+FAILING = "#!/bin/sh\necho 'no licence for this host' >&2\nexit 3\n"
+SILENT = "#!/bin/sh\nexit 3\n"
+LYING = """#!/bin/sh
+while [ $# -gt 0 ]; do [ "$1" = "-o" ] && echo rubbish > "$2"; shift; done
+exit 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (FAILING, "failed on strapgen_euler_rk1_1: no licence for this host"),
+        (SILENT, "strapgen_euler_rk1_1: exit "),
+        (LYING, "it reports success and writes no library"),
+    ],
+    ids=["failing", "silent", "lying"],
+)
+def test_compiler_that_fails_is_named_in_one_line(text, said, tmp_path, monkeypatch):
+    path = tmp_path / "mycc"
+    path.write_text(text)
+    path.chmod(0o755)
+    monkeypatch.setenv("CC", str(path))
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
+    sources = generated_sources.sources(choose("euler", "rk1", 1), "c")
+    for _ in range(2):  # the cache keeps nothing of it
+        with pytest.raises(CompilerError) as caught:
+            compiler.load(sources)
+        assert said in str(caught.value) and str(path) in str(caught.value)
+        assert "CalledProcessError" not in str(caught.value) and "\n" not in str(caught.value)

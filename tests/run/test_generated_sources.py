@@ -1,0 +1,114 @@
+"""Generated sources by name: never out of step, and quick the second time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+
+import strapgen
+from strapgen import catalogue, pipeline
+from strapgen.ir.fixed_settings import Settings
+from strapgen.run import compiler, generated_sources
+from strapgen.storage import cache
+
+#: Runs with flags of the compiler.
+RUN = """
+import sys
+import numpy as np
+import strapgen
+from strapgen.run import compiler
+compiler._flags = tuple(sys.argv[1:])
+for backend in ("numpy", "c"):
+    strapgen.backend("euler", "rk1", 2, backend).propagate(np.zeros((4, 2, 3)))
+print(*sorted({"sympy", "jinja2", "cffi"} & set(sys.modules)))
+"""
+
+
+def test_a_second_use_loads_neither_sympy_nor_jinja_nor_a_compiler():
+    for backend in ("numpy", "c"):
+        strapgen.backend("euler", "rk1", 2, backend).propagate(np.zeros((4, 2, 3)))
+    command = [sys.executable, "-c", RUN, *compiler._flags]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == ""
+
+
+def test_sources_are_those_of_the_pipeline():
+    choice = catalogue.choose("euler", "rk1", 3)
+    program = strapgen.lower(catalogue.derive(choice))
+    for target in strapgen.targets.TARGETS:
+        assert generated_sources.sources(choice, target) == strapgen.generate(program, target)
+
+
+def test_what_a_user_does_to_the_files_changes_no_sources_of_others():
+    sources = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
+    files, operations = {**sources.files}, {**sources.operations}
+    sources.files.clear()
+    sources.operations.clear()
+    again = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
+    assert (again.files, again.operations) == (files, operations) and files and operations
+
+
+def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):
+    choice = catalogue.choose("euler-product")
+    first = generated_sources.sources(choice, "numpy"), generated_sources.fixed_program(choice)
+    monkeypatch.setattr(cache, "entry", None)
+    assert (generated_sources.sources(choice, "numpy"), generated_sources.fixed_program(choice)) == first
+
+
+def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch):
+    monkeypatch.setattr(generated_sources, "_entries", {})
+    monkeypatch.setattr(generated_sources, "_MOST_ENTRIES", 2)
+    read = []
+    for key in ("a", "b", "a", "c", "a", "b"):
+        assert generated_sources._remembered(key, "", lambda key=key: read.append(key) or key) == key
+    assert read == ["a", "b", "c", "b"]
+
+
+def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    choice = catalogue.choose("euler-normalize")
+    generated_sources.sources(choice, "numpy")
+    generated_sources.sources(choice, "numpy")
+    assert len(list((tmp_path / "sources").iterdir())) == 1
+    monkeypatch.setattr(cache, "generator_digest", lambda: "another generator")
+    generated_sources.sources(choice, "numpy")
+    assert len(list((tmp_path / "sources").iterdir())) == 2
+
+
+def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(generated_sources, "_programs", {})
+    choice = catalogue.choose("euler-product")
+    wanted = strapgen.lower(catalogue.derive(choice))
+    generated_sources.sources(choice, "numpy")
+    for name in ("_programs", "_entries"):  # as another process
+        monkeypatch.setattr(generated_sources, name, {})
+
+    def never(_choice):
+        raise AssertionError("derived again")
+
+    monkeypatch.setattr(pipeline, "derive", never)
+    settings = strapgen.Settings(16)
+    assert generated_sources.sources(choice, "c-fixed", settings) == strapgen.generate(
+        wanted, "c-fixed", settings
+    )
+    assert generated_sources.program(choice) == wanted
+
+
+def test_the_integer_model_takes_the_integers_of_the_c(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    choice = catalogue.choose("euler-normalize")
+    compiled = generated_sources.sources(choice, "c-fixed", Settings())
+
+    def never(*_):
+        raise AssertionError("quantized again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "quantize", never)
+        model = generated_sources.sources(choice, "fixed-model", Settings())
+    assert model.fixed == compiled.fixed
+    others = Settings(word=16)
+    assert generated_sources.fixed_program(choice, others) == pipeline.quantize(
+        generated_sources.program(choice), others
+    )
