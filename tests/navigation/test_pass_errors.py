@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from navigation.described_files import ATTITUDE, TWO_SPEEDS, description
-from system_errors import PassErrors, Passes, search, two_speeds
 from navigation.test_system_bounds import TABLES
+from system_errors import PassErrors, Passes, search, two_speeds
 
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.systems.compiled_system import CompiledSystem
