@@ -205,7 +205,7 @@ def test_compared_run_has_the_step_of_the_options(options, step):
 def make(target: str, variables: str) -> str:
     """Return the commands of a target of the Makefile, with single spaces."""
     needed("make")
-    command = f"make -n -f {EXAMPLE / 'strapgen.mk'} {target} {variables}"
+    command = f"make --no-print-directory -n -f {EXAMPLE / 'strapgen.mk'} {target} {variables}"
     said = subprocess.run(shlex.split(command), capture_output=True, text=True, check=True).stdout
     return " ".join(said.replace("\\\n", " ").split())
 
