@@ -1,4 +1,4 @@
-"""The drawing of the pipeline, from the stages themselves and from what the page on the architecture says of them."""
+"""The drawing of the two storeys, from the stages, the applications and the page on the architecture."""
 
 from __future__ import annotations
 
@@ -12,38 +12,36 @@ from typing import Any
 from canvas import Drawing, Point
 
 import strapgen
+from strapgen.applications import built_in
 
-#: Where a stage's result stands, as column and row; and which results are its input, from a box to a box.
+_BOX: Point = (154, 92)
+_GAP = 74
+_EDGE = 22
+_STEP = _BOX[0] + _GAP
+_WIDTH = round(2 * _EDGE + 5 * _BOX[0] + 4 * _GAP)
+#: Applications in a row, the height of their boxes, and the gap between them.
+_COLUMNS, _ROOM, _SPACE = 4, 92, 14
+#: Upper edges of the storeys, of the rows in them, and the lower edge of all.
+_APPLICATIONS, _FIRST_ROOM = 8, 40
+_COMPILER = _FIRST_ROOM + 2 * (_ROOM + _SPACE) + 36
+_STAGES = _COMPILER + 34
+_FIXED = _STAGES + _BOX[1] + 46
+_HEIGHT = round(_FIXED + _BOX[1] + _EDGE + 8)
+#: Where a stage's result stands, as column and upper edge.
 _PLACES: dict[str, Point] = {
-    "Choice": (0, 0),
-    "Kernel": (1, 0),
-    "Program": (2, 0),
-    "FixedProgram": (2, 1),
-    "Sources": (1, 1),
-    "Backend": (0, 1),
-    "Run": (1, 2),
-    "Motion": (2, 2),
+    "Choice": (0, _STAGES),
+    "Kernel": (1, _STAGES),
+    "Program": (2, _STAGES),
+    "FixedProgram": (2, _FIXED),
+    "Sources": (3, _STAGES),
+    "Backend": (4, _STAGES),
 }
-_KINDS = {"Backend": ("sand", "orange"), "Motion": ("leaf", "green"), "Run": ("sand", "orange")}
-_BOX: Point = (174, 96)
-_GAP: Point = (60, 48)
-_EDGE = 12
 #: What stands in a box that no stage of the page on the architecture describes.
-_OTHERS = {
-    "Choice": "algorithm, method, increments",
-    "Motion": "exact increments and the true attitude",
-    "Run": "scale, skew and drift against the truth",
-}
+_OTHERS = {"Choice": "algorithm, method, increments"}
 
 
 def stages(root: Path) -> dict[str, tuple[str, str]]:
-    """Return the result of every stage and the words about it, as the page on the architecture lists them.
-
-    Parameters
-    ----------
-    root : Path
-        The root of the repository.
-    """
+    """Return the result of every stage and the words about it, as the page on the architecture lists them."""
     page = (root / "docs" / "architecture.md").read_text()
     rows = re.findall(r"^    (\w+) +.*?  ->  (\w+): (.*)$", page, re.MULTILINE)
     return {name: (result, words) for name, result, words in rows}
@@ -55,74 +53,67 @@ def result(stage: Callable[..., Any]) -> str:
 
 
 def pipeline(root: Path) -> Drawing:
-    """Draw the stages.
+    """Draw the applications above the compiler and its stages.
 
-    Parameters
-    ----------
-    root : Path
-        The root of the repository.
-
-    Raises
-    ------
-    ValueError
-        If a stage of the page does not return what the page says, or has no place in the drawing.
+    Raises ValueError if a stage of the page does not return what the page says, or has no place in the drawing.
     """
     listed = stages(root)
-    for name, kind in {**{name: kind for name, (kind, _) in listed.items()}, "simulate": "Run"}.items():
+    for name, (kind, _) in listed.items():
         returned = result(getattr(strapgen, name))
         if returned != kind or kind not in _PLACES:
             raise ValueError(f"{name} returns {returned}; the page or the drawing has {kind}")
+    drawing = Drawing(_WIDTH, _HEIGHT, "The two storeys of strapgen: applications on a compiler")
+    _storey(drawing, _APPLICATIONS, "applications: each a question that a user asks")
+    _rooms(drawing)
+    _storey(drawing, _COMPILER, "the compiler: from a choice to code that runs")
     words = {kind: text for kind, text in listed.values()} | _OTHERS
-    width = round(2 * _EDGE + 3 * _BOX[0] + 2 * _GAP[0])
-    drawing = Drawing(width, round(2 * _EDGE + 3 * _BOX[1] + 2 * _GAP[1]), "The pipeline of strapgen")
-    for kind, (column, row) in _PLACES.items():
-        corner = (_EDGE + column * (_BOX[0] + _GAP[0]), _EDGE + row * (_BOX[1] + _GAP[1]))
-        drawing.box(corner, _BOX, *_KINDS.get(kind, ("sky", "blue")))
-        middle = corner[0] + _BOX[0] / 2
-        drawing.text((middle, corner[1] + 26), kind, size=17, bold=True, anchor="middle")
-        for k, line in enumerate(textwrap.wrap(words[kind], 23)):
-            drawing.text((middle, corner[1] + 47 + 18 * k), line, size=14, anchor="middle")
+    for kind in _PLACES:
+        _box(drawing, _corner(kind), _BOX, kind, words[kind], ("sky", "blue"))
     _arrows(drawing)
     return drawing
 
 
-def _side(kind: str, right: float, down: float) -> Point:
-    """Return a place on a box: 0 and 0 are its left and its upper edge, 1 and 1 its right and its lower edge."""
-    column, row = _PLACES[kind]
-    return (
-        _EDGE + column * (_BOX[0] + _GAP[0]) + right * _BOX[0],
-        _EDGE + row * (_BOX[1] + _GAP[1]) + down * _BOX[1],
-    )
+def _storey(drawing: Drawing, top: float, words: str) -> None:
+    drawing.line([(_EDGE, top), (_WIDTH - _EDGE, top)], "grey", width=1.2)
+    drawing.text((_EDGE, top + 20), words, "grey", size=15, bold=True)
+
+
+def _box(
+    drawing: Drawing, corner: Point, size: Point, title: str, words: str, colours: tuple[str, str]
+) -> None:
+    drawing.box(corner, size, *colours)
+    middle = corner[0] + size[0] / 2
+    drawing.text((middle, corner[1] + 24), title, size=16, bold=True, anchor="middle")
+    for k, line in enumerate(textwrap.wrap(words, int(size[0] / 7.3))):
+        drawing.text((middle, corner[1] + 43 + 17 * k), line, size=13.5, anchor="middle")
+
+
+def _rooms(drawing: Drawing) -> None:
+    """Draw the applications, those above that need others."""
+    rooms = built_in()
+    width = (_WIDTH - 2 * _EDGE - (_COLUMNS - 1) * _SPACE) / _COLUMNS
+    rows = -(-len(rooms) // _COLUMNS)
+    for k, (name, room) in enumerate(rooms.items()):
+        row = rows - 1 - k // _COLUMNS
+        corner = (_EDGE + k % _COLUMNS * (width + _SPACE), _FIRST_ROOM + row * (_ROOM + _SPACE))
+        _box(drawing, corner, (width, _ROOM), name, room.title, ("sand", "orange"))
+
+
+def _corner(kind: str) -> Point:
+    column, top = _PLACES[kind]
+    return _EDGE + column * _STEP, top
 
 
 def _arrows(drawing: Drawing) -> None:
-    across = (
-        ("Choice", "Kernel"),
-        ("Kernel", "Program"),
-        ("FixedProgram", "Sources"),
-        ("Sources", "Backend"),
-    )
-    for start, end in across:
-        leftwards = _PLACES[start][0] > _PLACES[end][0]
-        drawing.arrow(
-            [_side(start, 0 if leftwards else 1, 0.5), _side(end, 1 if leftwards else 0, 0.5)],
-            "ink",
-            width=1.8,
-        )
-    for name, start, lift in (("derive", "Choice", 0.5), ("lower", "Kernel", 0.5), ("build", "Backend", 0.5)):
-        x, y = _side(start, 1, lift)
-        drawing.text((x + _GAP[0] / 2, y - 9), name, "grey", size=13, bold=True, anchor="middle")
-    drawing.arrow([_side("Program", 0.7, 1), _side("FixedProgram", 0.7, 0)], "ink", width=1.8)
-    x, y = _side("Program", 0.7, 1)
-    drawing.text((x - 8, y + 28), "quantize", "grey", size=13, bold=True, anchor="end")
-    x, y = _side("Program", 0.1, 1)
-    turn = y + _GAP[1] / 2
-    drawing.arrow(
-        [(x, y), (x, turn), (_side("Sources", 0.8, 0)[0], turn), _side("Sources", 0.8, 0)], "ink", width=1.8
-    )
-    x, y = _side("Sources", 0.8, 0)
-    drawing.text((x - 8, y - 18), "generate", "grey", size=13, bold=True, anchor="end")
-    x, y = _side("Backend", 0.5, 1)
-    drawing.arrow([(x, y), (x, _side("Run", 0, 0.5)[1]), _side("Run", 0, 0.5)], "ink", width=1.8)
-    drawing.arrow([_side("Motion", 0, 0.5), _side("Run", 1, 0.5)], "ink", width=1.8)
-    drawing.text((x + 12, _side("Run", 0, 0.5)[1] - 9), "simulate", "grey", size=13, bold=True)
+    middle = _STAGES + _BOX[1] / 2
+    for column, name in enumerate(("derive", "lower", "generate", "build")):
+        right = _EDGE + column * _STEP + _BOX[0]
+        drawing.arrow([(right, middle), (right + _GAP, middle)], "ink", width=1.8)
+        drawing.text((right + _GAP / 2, middle - 9), name, "grey", size=13, bold=True, anchor="middle")
+    x = _corner("Program")[0] + _BOX[0] / 2
+    drawing.arrow([(x, _STAGES + _BOX[1]), (x, _FIXED)], "ink", width=1.8)
+    drawing.text((x - 8, _FIXED - 18), "quantize", "grey", size=13, bold=True, anchor="end")
+    x, y = _corner("Sources")[0] + _BOX[0] / 2, _FIXED + _BOX[1] / 2
+    right = _corner("FixedProgram")[0] + _BOX[0]
+    drawing.arrow([(right, y), (x, y), (x, _STAGES + _BOX[1])], "ink", width=1.8)
+    drawing.text((x + 8, _FIXED - 18), "generate", "grey", size=13, bold=True)

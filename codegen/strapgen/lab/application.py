@@ -7,7 +7,7 @@ from strapgen.applications import Application, Command
 _HERE = __name__.rpartition(".")[0]
 
 APPLICATION = Application(
-    "runs of generated code against truth: simulation, comparison, convergence, recordings, sensor errors, cost",
+    "runs against truth: simulation, comparison, convergence, recordings, sensor errors, cost",
     commands={
         "simulate": Command(f"{_HERE}.simulate.simulate_command:simulate", "Run"),
         "compare": Command(f"{_HERE}.compare.compare_command:compare", "Run"),
