@@ -27,22 +27,6 @@ _FUNCTIONS: dict[str, Callable[..., None]] = {
 def derive_function(
     kind: str, chain: Chain, arguments: Sequence[str], distance: Fraction = Fraction(0)
 ) -> None:
-    """Add to a chain the quantities that a function is computed by, in order; the last is its value.
-
-    Parameters
-    ----------
-    kind : str
-        "sin", "cos", "sinc", "atan2", "direction" or "wrap".
-    chain : Chain
-    arguments : sequence of str
-        Quantities that are stored whole.
-    distance : Fraction, optional
-        The inverse of a bound of how fast atan2 changes with its arguments, where more is known than their ranges tell.
-
-    Raises
-    ------
-    ValueError
-        If the range of an argument is too wide.
-    """
+    """Append to a chain the quantities from which a function is computed; the last is its value."""
     options = {"distance": distance, "turns": kind == "atan2"} if kind in ("atan2", "direction") else {}
     _FUNCTIONS[kind](chain, *arguments, **options)
