@@ -138,14 +138,11 @@ class ComputedNumbers:
             left, right = (self.items[k] for k in expression.arguments)
             if not left.error and not right.error:
                 return
-            low, high = left.range - right.range, self._exact_difference(expression)
-            if min(low.low, high.low) >= 0 or max(low.high, high.high) < 0:
+            exact_left, exact_right = (self.ranges[k] for k in expression.arguments)
+            computed, exact = left.range - right.range, exact_left - exact_right
+            if min(computed.low, exact.low) >= 0 or max(computed.high, exact.high) < 0:
                 return
         raise NoBoundError(f"rounding may turn a comparison in {self.expressions.labels[place]}")
-
-    def _exact_difference(self, expression: Expression) -> Interval:
-        left, right = (self.ranges[k] for k in expression.arguments)
-        return left - right
 
     # Rounding
 

@@ -69,11 +69,7 @@ def _room(term: Term, place: int, value: Value, factor: Value, others: list[Valu
         size, bits = other.magnitude, other.fraction
     if not size:  # a product with what is always zero
         return place
-    fraction = value.fraction + (_FED_BACK if _is_fed_back(value) else 0)
+    is_fed_back = isinstance(value.definition, IntegerSum) and value.definition.residual is not None
+    fraction = value.fraction + (_FED_BACK if is_fed_back else 0)
     units = factor.fraction + bits - fraction - _PART
     return max(0, ((1 << units) // size).bit_length() - 1) if units > 0 else 0
-
-
-def _is_fed_back(value: Value) -> bool:
-    """Tell whether the rounding error of a sum comes with the next call, so that only other errors add up."""
-    return isinstance(value.definition, IntegerSum) and value.definition.residual is not None
