@@ -20,7 +20,7 @@ from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler, generated_files, generated_sources, octave_process
 from strapgen.run.backends import of_sources
-from strapgen.targets.matlab.emit import MatlabPrinter
+from strapgen.targets.matlab.emit import _MatlabPrinter
 from strapgen.targets.matlab.names import MATLAB
 
 #: Functions of MATLAB without a toolbox that Octave has too: all that generated code calls.
@@ -117,9 +117,9 @@ def test_every_kernel_has_the_bits_of_c(has_octave, rng):
 
 
 def test_other_bits_are_seen(has_octave, rng, monkeypatch):
-    printed = MatlabPrinter.constant
+    printed = _MatlabPrinter.constant
     monkeypatch.setattr(
-        MatlabPrinter, "constant", lambda self, value: f"({printed(self, value)} * (1 + eps))"
+        _MatlabPrinter, "constant", lambda self, value: f"({printed(self, value)} * (1 + eps))"
     )
     program = generated_sources.program(catalogue.choose("euler"))
     other = strapgen.generate(program, "matlab")

@@ -23,7 +23,7 @@ from strapgen.ir.signals import Signal
 from strapgen.run.compiler import C_FLAGS
 from strapgen.targets.c import emit
 from strapgen.targets.lines import fill_expression
-from strapgen.targets.numpy_code.emit import NumpyPrinter
+from strapgen.targets.numpy_code.emit import _NumpyPrinter
 from strapgen.targets.numpy_code.emit import emit as emit_numpy
 
 NAMES = ("x_1", "x_2", "x_3", "x_4")
@@ -113,7 +113,7 @@ def test_python_text_has_the_value_of_the_tree(tree):
         wanted = run(tree, float)
     except ZeroDivisionError:
         assume(False)
-    text = NumpyPrinter().text(tree)
+    text = _NumpyPrinter().text(tree)
     values = {name: np.float64(value) for name, value in VALUES.items()}
     with np.errstate(all="ignore"):
         got = float(eval(text, {"np": np, **values}))
@@ -135,7 +135,7 @@ def test_python_text_has_the_value_of_the_tree(tree):
     ],
 )
 def test_no_more_parentheses_than_needed(tree, text):
-    assert NumpyPrinter().text(tree) == text
+    assert _NumpyPrinter().text(tree) == text
     assert emit.CPrinter(emit.DOUBLE).text(tree) == text
 
 
@@ -203,6 +203,6 @@ def test_emitted_numpy_module_has_the_values_of_the_trees():
 @given(trees)
 @example(op("select", op("at_least", x, op("maximum", Constant(Fraction(1, 3)), x)), x, x))
 def test_lines_break_at_spaces_and_behind_parentheses(tree):
-    text = NumpyPrinter().text(tree)
+    text = _NumpyPrinter().text(tree)
     wrapped = fill_expression(text, " " * 8, 40)
     assert re.sub(r"\(\n +", "(", wrapped).split() == text.split()

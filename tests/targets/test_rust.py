@@ -18,7 +18,7 @@ from strapgen.run.backends import of_sources
 from strapgen.run.shared_libraries import COMPILERS
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.names import Naming
-from strapgen.targets.rust.fixed import _WORDS, RustStatementPrinter
+from strapgen.targets.rust.fixed import _WORDS, _RustStatementPrinter
 from strapgen.targets.rust.text import module_name
 
 #: A step that no other test compiles: what is loaded already needs no compiler.
@@ -46,7 +46,7 @@ def test_every_kernel_has_the_bits_of_c(rustc, other, c, rng):
 
 @each("value", [0, 1, 15, 16, 17, 31, 48, 2**40 - 1, 2**40, 2**40 + 1, -16, -31, -(2**40)])
 def test_a_wide_constant_is_its_integer_and_a_power_of_two_from_16_on_says_its_type(value):
-    printer = object.__new__(RustStatementPrinter)
+    printer = object.__new__(_RustStatementPrinter)
     printer.word = _WORDS[32]
     text = printer.constant(value, wide=True)
     assert eval(text.replace("_i64", "")) == value

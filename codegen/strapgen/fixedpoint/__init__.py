@@ -13,22 +13,7 @@ __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can
 
 
 def quantize(program: Program, settings: Settings) -> FixedProgram:
-    """Lower a program to integers.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-
-    Returns
-    -------
-    FixedProgram
-
-    Raises
-    ------
-    InputError
-        If an input has no known range, a stated format does not hold its values, or the word is too short.
-    """
+    """Lower a program to integers."""
     from strapgen.fixedpoint.quantization import lowered
     from strapgen.fixedpoint.sensor_scale import counted, in_counts
 

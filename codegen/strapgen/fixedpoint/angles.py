@@ -22,14 +22,8 @@ def arctangent(
 ) -> None:
     """Make atan2, by the nearer axis or diagonal, then by octant, quadrant, half and side.
 
-    Parameters
-    ----------
-    chain : Chain
-    ordinate, abscissa : str
-    distance : Fraction, optional
-        The inverse of a bound of how fast the angle changes with them, where more is known than their ranges tell.
-    turns : bool, optional
-        Whether an angle that is off by a whole turn is wrong.
+    The slope by either argument is at most 1/`distance`, where that is not 0; the ranges may tell more. Without `turns`
+    an angle that is off by a whole turn counts as right.
     """
     y, x = chain.computed(ordinate), chain.computed(abscissa)
     height, width = chain.magnitude("height", y), chain.magnitude("width", x)
@@ -95,13 +89,7 @@ def _from(chain: Chain, part: Fraction, angle: str, sign: int) -> str:
 
 
 def wrap(chain: Chain, argument: str) -> None:
-    """Take a whole turn off an angle, or add one: the error is that of the angle, where turns do not count.
-
-    Raises
-    ------
-    ValueError
-        If the angle may be more than a turn and a half.
-    """
+    """Take a whole turn off an angle, or add one: the error is that of the angle, where turns do not count."""
     angle = chain.computed(argument)
     inside = chain.range(angle)
     if inside.magnitude > 3 * pi():
@@ -128,7 +116,7 @@ def wrap(chain: Chain, argument: str) -> None:
 def _slopes(
     chain: Chain, ordinate: str, abscissa: str, known: Fraction, turns: bool
 ) -> list[tuple[str, Fraction | None]]:
-    """Return how fast the angle can change: by the inverse distance from the origin, and by a turn at the cut."""
+    """Return bounds of the derivatives: the inverse distance from the origin, none across the cut."""
     above, beside = chain.range(ordinate), chain.range(abscissa)
     distances = [max(Fraction(0), inside.lowest, -inside.highest) for inside in (above, beside)]
     distance = max(known, Interval.of(sum((d * d for d in distances), Fraction(0))).sqrt().lowest)

@@ -25,36 +25,21 @@ _ONE = Fraction(1)
 
 @dataclass
 class Chain:
-    """The quantities of a function in order, each made from those before it.
+    """The quantities of a function in order, each made from those before it."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the function's value, which is the last link.
-    known : mapping of str to Quantity
-        The quantities that there are already.
-    same : dict of Definition to str
-        What other functions were made from, by definition; what is made here is added.
-    free : callable
-        Returns a name that no known quantity has: its argument, or that with a number behind it.
-    word : int
-        Bits of a word.
-    links : list of Quantity
-    ranges : dict of str to Interval
-        Range of every link.
-    """
-
-    name: str
+    name: str  # that of the function's value, which is the last link
     known: Mapping[str, Quantity]
-    same: dict[Definition, str]
-    free: Callable[[str], str]
-    word: int
+    same: dict[Definition, str]  # links of all functions so far, by definition
+    free: Callable[
+        [str], str
+    ]  # returns its argument, or that with a number behind it, as a name that is free
+    word: int  # bits
     links: list[Quantity] = field(default_factory=list)
-    ranges: dict[str, Interval] = field(default_factory=dict)
+    ranges: dict[str, Interval] = field(default_factory=dict)  # those of the links
 
     @property
     def tolerance(self) -> Fraction:
-        """What a series may leave out: an eighth of the last place of a word that holds 1."""
+        """The largest truncation error of a series: an eighth of the last place of a word that holds 1."""
         return Fraction(1, 1 << (self.word + 1))
 
     def range(self, operand: Operand) -> Interval:
@@ -155,14 +140,7 @@ class Chain:
         return total
 
     def finish(self, value: str, *slopes: tuple[str, Fraction | None]) -> None:
-        """Make the last quantity the function's value, whose error follows those of what was taken as exact.
-
-        Parameters
-        ----------
-        value : str
-        *slopes : tuple of (str, Fraction or None)
-            Quantities that were taken as exact, and bounds of the function's derivative by them.
-        """
+        """Make the last quantity the function's value; `slopes` bound its derivatives by quantities taken as exact."""
         inside = self.range(value)
         follows = ErrorPropagation(slopes, inside.highest - inside.lowest)
         last = self.links[-1] if self.links else None

@@ -24,27 +24,13 @@ _Case = tuple[Scaled, Scaled, Scaled]
 
 
 def lower_maximum(context: Quantization, quantity: Quantity, definition: Maximum) -> None:
-    """Lower the largest of several quantities.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : Maximum
-    """
+    """Lower the largest of several quantities."""
     operands = at_one_fraction(context, definition.arguments)
     _add(context, quantity, IntegerMaximum(operands.scaled), operands.fraction, operands.error)
 
 
 def lower_selection(context: Quantization, quantity: Quantity, definition: Selection) -> None:
-    """Lower a selection; where a comparison is inexact, another case may be selected, and the error is the range.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : Selection
-    """
+    """Lower a selection; where a comparison is inexact, another case may be selected, and the error is the range."""
     outcomes = [*(outcome for _, _, outcome in definition.cases), definition.otherwise]
     values = at_one_fraction(context, outcomes, lossless=False)
     cases: list[_Case] = []
@@ -59,19 +45,7 @@ def lower_selection(context: Quantization, quantity: Quantity, definition: Selec
 
 
 def lower_computed(context: Quantization, quantity: Quantity, definition: Computed) -> None:
-    """Keep the computed value inside the range of the exact one, which brings it no farther from that.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : Computed
-
-    Raises
-    ------
-    InputError
-        If no word lies in that range.
-    """
+    """Keep the computed value inside the range of the exact one, which brings it no farther from that."""
     name = word_of(context, definition.argument)
     value = context.values[name]
     unit = Fraction(2) ** value.fraction
@@ -91,19 +65,7 @@ def lower_computed(context: Quantization, quantity: Quantity, definition: Comput
 
 
 def lower_nearest_integer(context: Quantization, quantity: Quantity, definition: NearestInteger) -> None:
-    """Round a multiple to an integer, halves up whatever the rounding of words is.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : NearestInteger
-
-    Raises
-    ------
-    InputError
-        If the word has no bits below the integer.
-    """
+    """Round a multiple to an integer, halves up whatever the rounding of words is."""
     name = word_of(context, definition.argument)
     value = context.values[name]
     factor = definition.factor.numerator

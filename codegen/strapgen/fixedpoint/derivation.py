@@ -26,28 +26,7 @@ from strapgen.ir.program import Assignment, Constant, Operation, Program, Refere
 def quantities(
     program: Program, ranges: Mapping[str, Interval], split: bool = False, word: int = 32
 ) -> Quantities:
-    """Turn a program into exact quantities.
-
-    Parameters
-    ----------
-    program : Program
-    ranges : mapping of str to Interval
-        Range of every element of an input.
-    split : bool, optional
-        Whether what differs little from an exact sum of inputs is stored as its distance from that. It takes more
-        multiplications, and the rounding of a transition becomes as small as that of its terms of higher order.
-    word : int, optional
-        Bits of a word: series of functions are cut where it cannot tell any more.
-
-    Returns
-    -------
-    Quantities
-
-    Raises
-    ------
-    InputError
-        If an operation cannot be done in fixed point on these ranges.
-    """
+    """Turn a program into exact quantities, given the range of every element of an input."""
     derived = _derived(program, tuple(ranges.items()), split, word)
     return Quantities(dict(derived.items), dict(derived.results))
 
@@ -75,7 +54,7 @@ def _derived(
 
 
 def _add_truncation(context: DerivationContext) -> None:
-    """Note on the transition what its series leaves out."""
+    """Add the truncation error of the transition's series to its elements."""
     program = context.program
     if program.transition is None or program.companions is None or program.companions.truncation is None:
         return
@@ -142,7 +121,7 @@ def _is_whole_word(quantity: Quantity) -> bool:
 
 
 def _drop_unused(known: Quantities) -> None:
-    """Drop what no result needs: a function of a root may have been derived from what stands under the root."""
+    """Drop unused quantities: a function of a root may have been derived from its radicand."""
     results = (name for names in known.results.values() for name in names if isinstance(name, str))
     needed = set(results) | {quantity.name for quantity in known.items.values() if quantity.guarded}
     for quantity in reversed(list(known.items.values())):

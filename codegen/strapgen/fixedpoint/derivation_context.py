@@ -27,45 +27,23 @@ Samples = dict[str, NDArray[np.float64]]
 
 @dataclass
 class DerivationContext:
-    """The state of a walk over a program.
-
-    Parameters
-    ----------
-    program : Program
-    split : bool
-        Whether what differs little from an exact sum of inputs is stored as its distance from that.
-    word : int
-        Bits of a word.
-    derive_operation : callable
-        Makes the quantity of an operation that is no sum of products, from its name, the operation and the meaning.
-    quantities : Quantities
-        The quantities so far.
-    ranges : Ranges
-        Proves ranges from those of the quantities so far.
-    proper, anywhere : dict of str to array
-        Values of the quantities on proper inputs, and anywhere in the ranges of the inputs.
-    outputs : frozenset of str
-        Assignments that hold elements of results.
-    same : dict of Definition to str
-        Quantities of which functions were made, by definition: equal ones are stored once.
-    items : dict of str to Quantity
-        The quantities so far, by name.
-    assigned : frozenset of str
-        Names of all assignments of the program.
-    """
+    """The state of a walk over a program."""
 
     program: Program
-    split: bool
-    word: int
+    split: bool  # whether what differs little from an exact sum of inputs is stored as its distance from that
+    word: int  # bits
+    #: Makes the quantity of an operation that is no sum of products, from its name, the operation and the meaning.
     derive_operation: Callable[[DerivationContext, str, Operation, str], None]
-    quantities: Quantities
+    quantities: Quantities  # those derived so far
     ranges: Ranges
-    proper: Samples
-    anywhere: Samples
-    outputs: frozenset[str]
-    same: dict[Definition, str] = field(default_factory=dict)
-    items: dict[str, Quantity] = field(init=False)
-    assigned: frozenset[str] = field(init=False)
+    proper: Samples  # values of the quantities on proper inputs
+    anywhere: Samples  # the same anywhere in the ranges of the inputs
+    outputs: frozenset[str]  # assignments that hold elements of results
+    same: dict[Definition, str] = field(
+        default_factory=dict
+    )  # links of functions: equal ones are stored once
+    items: dict[str, Quantity] = field(init=False)  # those of `quantities`
+    assigned: frozenset[str] = field(init=False)  # names of all assignments of the program
 
     def __post_init__(self) -> None:
         self.items = self.quantities.items
@@ -89,7 +67,7 @@ def range_of(context: DerivationContext, operand: Operand) -> Interval:
 
 
 def free_name(context: DerivationContext, name: str) -> str:
-    """Return the name, or with a number behind it one that is free."""
+    """Return the name, or the name with a number behind it, whichever is free."""
     candidates = (name if number == 1 else f"{name}_{number}" for number in count(1))
     return next(
         candidate
@@ -99,7 +77,7 @@ def free_name(context: DerivationContext, name: str) -> str:
 
 
 def stored_terms(context: DerivationContext, name: str) -> Terms:
-    """Return a quantity, its offset included, in terms of what is stored."""
+    """Return a quantity, its offset included, as a sum of stored quantities."""
     quantity = context.items[name]
     definition = quantity.definition
     if isinstance(definition, Sum) and not quantity.inexact and not any(m for m, _ in definition.terms):

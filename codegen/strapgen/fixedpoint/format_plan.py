@@ -19,23 +19,12 @@ from strapgen.ir.signals import Signal
 
 @dataclass(frozen=True)
 class FormatPlan:
-    """The formats that are fixed before anything is lowered.
-
-    Parameters
-    ----------
-    inputs : tuple of Argument
-    values : mapping of str to Value
-        The elements of the inputs.
-    forced : mapping of str to int
-        Fraction bits of quantities whose format a user states, or which share it with the elements of a result.
-    words : frozenset of str
-        Quantities that must be rounded to words: those, and the factors and divisors.
-    """
+    """The formats that are fixed before anything is lowered."""
 
     inputs: tuple[Argument, ...]
-    values: Mapping[str, Value]
-    forced: Mapping[str, int]
-    words: frozenset[str]
+    values: Mapping[str, Value]  # the elements of the inputs
+    forced: Mapping[str, int]  # fraction bits that the user states, or that the elements of a result share
+    words: frozenset[str]  # quantities that must be rounded to words: these, and the factors and divisors
 
 
 def format_plan(
@@ -45,27 +34,7 @@ def format_plan(
     quantities: Quantities,
     guard_bits: int,
 ) -> FormatPlan:
-    """Return what is known of formats when inputs are stored so many bits below their finest format.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-    limits : sequence of Limit
-        Ranges and formats of the inputs.
-    quantities : Quantities
-    guard_bits : int
-        Bits below the finest format of an input.
-
-    Returns
-    -------
-    FormatPlan
-
-    Raises
-    ------
-    InputError
-        If a format is stated for what the program does not have, or for one element of an input.
-    """
+    """Fix the formats that follow from inputs, user and results, with `guard_bits` below an input's finest format."""
     values: dict[str, Value] = {}
     inputs: list[Argument] = []
     for limit in limits:

@@ -17,8 +17,6 @@ _ARCTANGENT = Fraction(21, 100)
 def pi() -> Fraction:
     """Return a rational number below pi, by less than 2**-248.
 
-    Examples
-    --------
     >>> float(pi())
     3.141592653589793
     """
@@ -36,24 +34,10 @@ def pi() -> Fraction:
 
 
 def sine_series(first: int, reach: Fraction, tolerance: Fraction) -> tuple[tuple[Fraction, ...], Fraction]:
-    """Return the series of the sine or the cosine in the square of its argument, with a bound of what is left out.
+    """Return a truncated series of the sine or the cosine in the square of its argument, and a bound of its error.
 
-    Parameters
-    ----------
-    first : int
-        Degree that the series begins with: 0 for the cosine, 1 for the sine.
-    reach : Fraction
-        Largest magnitude of the argument, at most 2.
-    tolerance : Fraction
-        Largest error that the terms left out may cause.
+    It begins with degree `first`, 0 for the cosine and 1 for the sine; `reach` bounds the argument, and is at most 2.
 
-    Returns
-    -------
-    coefficients : tuple of Fraction
-    left_out : Fraction
-
-    Examples
-    --------
     >>> sine_series(1, Fraction(1), Fraction(1, 5040))
     ((Fraction(1, 1), Fraction(-1, 6), Fraction(1, 120)), Fraction(1, 5040))
     """
@@ -72,16 +56,6 @@ def arctangent_series(tolerance: Fraction) -> tuple[tuple[Fraction, ...], Fracti
 
     With u = (2p/(1 - p^2)) x, arctan(u) is the sum of 2 (-1)^k p^(2k+1)/(2k+1) T_(2k+1)(x), T Chebyshev's polynomials,
     none of which exceeds 1 for x from -1 to 1.
-
-    Parameters
-    ----------
-    tolerance : Fraction
-        Largest error that the terms left out may cause.
-
-    Returns
-    -------
-    coefficients : tuple of Fraction
-    left_out : Fraction
     """
     p = _ARCTANGENT
     scale = (1 - p * p) / (2 * p)

@@ -16,8 +16,6 @@ _ONE = 1 << GRID
 class Interval:
     """All numbers from `low` to `high`, both counted in units of 2**-GRID.
 
-    Examples
-    --------
     >>> x = Interval.of(Fraction(-1, 2), 3)
     >>> (x * x).text(), x.square().text()
     ('[-1.5, 9]', '[0, 9]')
@@ -95,26 +93,14 @@ class Interval:
         return Interval(lowest * lowest >> GRID, -(-largest * largest >> GRID))
 
     def sqrt(self) -> Interval:
-        """Return the square roots of what is not negative.
-
-        Raises
-        ------
-        ValueError
-            If the interval has negative numbers.
-        """
+        """Return the square roots; ValueError for negative numbers."""
         if self.low < 0:
             raise ValueError(f"a square root of {self.text()}")
         high = math.isqrt(self.high << GRID)
         return Interval(math.isqrt(self.low << GRID), high + (high * high < self.high << GRID))
 
     def reciprocal(self) -> Interval:
-        """Return the reciprocals.
-
-        Raises
-        ------
-        ValueError
-            If zero lies in the interval.
-        """
+        """Return the reciprocals; ValueError if zero lies inside."""
         if self.low <= 0 <= self.high:
             raise ValueError(f"a division by {self.text()}")
         return Interval(_ONE * _ONE // self.high, -(-_ONE * _ONE // self.low))
@@ -124,13 +110,23 @@ class Interval:
         return Interval(min(self.low, other.low), max(self.high, other.high))
 
     def meet(self, other: Interval) -> Interval:
-        """Return what lies in both."""
+        """Return the intersection."""
         return Interval(max(self.low, other.low), min(self.high, other.high))
 
     def halves(self) -> tuple[Interval, Interval]:
         """Return the lower and the upper half."""
         middle = (self.low + self.high) >> 1
         return Interval(self.low, middle), Interval(middle, self.high)
+
+
+def root(value: Fraction) -> Fraction:
+    """Return an upper bound of a square root."""
+    return Interval.of(value).sqrt().highest
+
+
+def norm(values: Iterable[Fraction]) -> Fraction:
+    """Return an upper bound of the length of a vector."""
+    return root(sum((value * value for value in values), Fraction(0)))
 
 
 def maximum(intervals: Iterable[Interval]) -> Interval:

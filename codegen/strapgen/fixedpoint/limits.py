@@ -1,4 +1,4 @@
-"""Returns the range and the finest format of every input, from what the user states."""
+"""Range and finest format of every input, from the settings."""
 
 from __future__ import annotations
 
@@ -20,29 +20,14 @@ from strapgen.ir.signals import Signal
 
 @dataclass(frozen=True)
 class Limit:
-    """Range of one input as the user states it, and its finest format.
-
-    Parameters
-    ----------
-    signal : Signal
-    largest : Fraction
-        Largest magnitude of an element.
-    fraction : int
-        Fraction bits of the finest format, or of the one that the user states.
-    fixed : bool
-        Whether the user states it.
-    bits : int
-        Bits of an element in memory: 8, 16, 32 or 64 of them hold it, or a word.
-    sensor : Sensor or None
-        The scale of the gyro whose counts these are.
-    """
+    """Range of one input as the user states it, and its finest format."""
 
     signal: Signal
-    largest: Fraction
-    fraction: int
-    fixed: bool
-    bits: int
-    sensor: Sensor | None = None
+    largest: Fraction  # largest magnitude of an element
+    fraction: int  # fraction bits of the finest format, or of the one that the user states
+    fixed: bool  # whether the user states it
+    bits: int  # those of an element in memory: 8, 16, 32, 64 or a word
+    sensor: Sensor | None = None  # the scale of the gyro whose counts these are
 
     def places(self, guard_bits: int) -> int:
         """Return the fraction bits of the input when so many bits are left for sums of inputs."""
@@ -54,7 +39,7 @@ class Limit:
         return math.floor(scaled) if self.signal.constraint else math.ceil(scaled)
 
     def argument(self, guard_bits: int) -> Argument:
-        """Return the input; what its type in memory cannot hold beyond the range needs no check."""
+        """Return the input; a bound beyond the range of its type in memory needs no check."""
         top, exact = self.largest_integer(guard_bits), (Fraction(0),) * self.signal.size
         format_ = Format(self.bits, self.places(guard_bits))
         high = min(top, format_.largest)
@@ -66,22 +51,7 @@ class Limit:
 
 
 def limits(program: Program, settings: Settings) -> list[Limit]:
-    """Return the range and the finest format of every input of a program.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-
-    Returns
-    -------
-    list of Limit
-
-    Raises
-    ------
-    InputError
-        If an input has no known range, or the format that the user states does not hold it.
-    """
+    """Return the range and the finest format of every input of a program."""
     unknown = set(settings.ranges) - {signal.name for signal in program.inputs}
     if unknown:
         names = ", ".join(signal.name for signal in program.inputs)
@@ -129,16 +99,7 @@ def _counted(signal: Signal, largest: Fraction, settings: Settings, bits: int) -
 
 
 def ranges_of_copies(program: Program, settings: Settings, copied: Mapping[str, str]) -> dict[str, Fraction]:
-    """Return the ranges of states that are counted inputs of the call before, by name: all that those may be.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-        With the ranges of the inputs.
-    copied : mapping of str to str
-        The input by the name of the state.
-    """
+    """Return, by the name of a state that copies a counted input of the call before (`copied`), all that it may be."""
     if settings.input_bits is None:
         return {}
     accepted = {}
@@ -162,13 +123,7 @@ def state_fraction(word: int, largest: Fraction) -> int:
 
 
 def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> Fraction:
-    """Return the largest magnitude of the elements of an input.
-
-    Raises
-    ------
-    InputError
-        If it is not known.
-    """
+    """Return the largest magnitude of the elements of an input."""
     if signal.name in settings.ranges:
         if signal.constraint or signal.name in TURNING:
             raise InputError(

@@ -15,38 +15,14 @@ from strapgen.ir.integer_program import Scaled
 
 
 @dataclass(frozen=True)
-class Operands:
-    """Integers of one fraction.
-
-    Parameters
-    ----------
-    scaled : tuple of Scaled
-    fraction : int
-        Their fraction bits.
-    error : Fraction
-        The largest of their errors.
-    """
-
+class _Operands:
     scaled: tuple[Scaled, ...]
-    fraction: int
-    error: Fraction
+    fraction: int  # bits
+    error: Fraction  # the largest of all
 
 
-def at_one_fraction(context: Quantization, operands: Sequence[Operand], lossless: bool = True) -> Operands:
-    """Return operands as integers of one fraction.
-
-    Parameters
-    ----------
-    context : Quantization
-    operands : sequence of Operand
-    lossless : bool, optional
-        Whether the fraction is the finest of theirs; else it is one at which all of them have room.
-
-    Raises
-    ------
-    InputError
-        If one of them has no room in a wide number.
-    """
+def at_one_fraction(context: Quantization, operands: Sequence[Operand], lossless: bool = True) -> _Operands:
+    """Return operands as integers of one fraction: the finest of theirs, or if not `lossless` one with room for all."""
     room = largest_wide(context.word)
     fraction = max(_finest_fraction(context, operand) for operand in operands)
     while not lossless and max(_size(context, operand, fraction) for operand in operands) > room:
@@ -67,7 +43,7 @@ def at_one_fraction(context: Quantization, operands: Sequence[Operand], lossless
             raise InputError(
                 f"{context.program.kernel}: words of {context.word} bits are too short to compare {operand}"
             )
-    return Operands(tuple(scaled), fraction, error)
+    return _Operands(tuple(scaled), fraction, error)
 
 
 def _finest_fraction(context: Quantization, operand: Operand) -> int:

@@ -54,22 +54,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 def derive_operation(context: DerivationContext, name: str, node: Operation, meaning: str) -> None:
-    """Make the quantity of an operation.
-
-    Parameters
-    ----------
-    context : DerivationContext
-    name : str
-        Name of the quantity.
-    node : Operation
-    meaning : str
-        Said where a named stage of the algorithm begins.
-
-    Raises
-    ------
-    InputError
-        If fixed point does not have the operation, or its arguments may lie where it is not defined.
-    """
+    """Make the quantity of an operation that is no sum of products."""
     if node.kind not in _OPERATIONS:
         raise InputError(f"{context.program.kernel} uses {node.kind}, which fixed point does not have")
     _OPERATIONS[node.kind](context, name, node, meaning)
@@ -111,7 +96,7 @@ def _square_root(context: DerivationContext, name: str, node: Operation, meaning
 
 
 def _radicand(context: DerivationContext, node: Node, name: str) -> Operand:
-    """Return what a root is drawn from; a sum of squares as squares of words, so that it is not below 0."""
+    """Return a radicand; a sum of squares as squares of words, so that it is not below 0."""
     factors = _squared_names(context, node)
     if not any(context.items[factor].beside or context.items[factor].offset for factor in factors):
         return operand_of(context, node, name)
@@ -252,7 +237,7 @@ def _keep(
 
 
 def _check_range(context: DerivationContext, name: str) -> None:
-    """Bound a divisor, or what a root is drawn from, away from zero by a check when the code runs.
+    """Bound a divisor or a radicand away from zero by a check when the code runs.
 
     The limits are half the smallest and twice the largest value on proper inputs, to powers of two. Nothing is checked
     where these limits are proved, or where proper inputs come near zero.

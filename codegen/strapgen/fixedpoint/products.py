@@ -47,20 +47,7 @@ _SUFFIXES = {
 
 
 def terms_of(context: DerivationContext, node: Node, name: str) -> Terms:
-    """Return a node as a sum over products of at most two stored quantities.
-
-    Parameters
-    ----------
-    context : DerivationContext
-    node : Node
-    name : str
-        Name that quantities begin with which have to be stored on the way.
-
-    Returns
-    -------
-    dict
-        Coefficients by product.
-    """
+    """Return a node as a sum over products of at most two stored quantities; `name` begins the names of new ones."""
     if isinstance(node, Constant):
         return {(): node.value} if node.value else {}
     if isinstance(node, Reference):
@@ -102,19 +89,7 @@ def store_temporary(context: DerivationContext, name: str, terms: Terms) -> str:
 def store(
     context: DerivationContext, name: str, terms: Terms, meaning: str = "", whole: bool = False
 ) -> None:
-    """Make the quantity of a sum.
-
-    Parameters
-    ----------
-    context : DerivationContext
-    name : str
-    terms : dict
-        Coefficients by product.
-    meaning : str, optional
-        The comment where a named stage of the algorithm begins.
-    whole : bool, optional
-        Whether the sum itself is stored; else its distance from a constant that it stays near, or from inputs.
-    """
+    """Store a sum: whole, or as its distance from a constant or from inputs that it stays near."""
     terms = _with_plain_products(context, name, terms)
     constant = terms.get((), Fraction(0))
     rest = {monomial: c for monomial, c in terms.items() if monomial}

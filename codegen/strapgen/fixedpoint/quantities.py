@@ -7,6 +7,7 @@ a constant is stored as its distance from that constant, which is small and so h
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -81,73 +82,47 @@ Definition = InputElement | Sum | Quotient | SquareRoot | Maximum | Selection | 
 
 @dataclass(frozen=True)
 class ErrorPropagation:
-    """The error of a function of quantities whose computed values were taken as exact.
+    """The error of a function of quantities whose computed values were taken as exact."""
 
-    Parameters
-    ----------
-    slopes : tuple
-        Each of these quantities with a bound of the derivative by it, None where the derivative has none.
-    most : Fraction
-        The largest difference of two values of the function.
-    """
+    slopes: tuple[tuple[str, Fraction | None], ...]  # bounds of the derivatives, None where there is none
+    most: Fraction  # the largest difference of two values of the function
 
-    slopes: tuple[tuple[str, Fraction | None], ...]
-    most: Fraction
+    def bound(self, errors: Mapping[str, Fraction]) -> Fraction:
+        """Return the largest change of the function when the quantities change by so much."""
+        total = Fraction(0)
+        for name, slope in self.slopes:
+            if errors[name]:
+                total += self.most if slope is None else slope * errors[name]
+        return min(total, self.most)
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a fixed-point program, exactly.
-
-    Parameters
-    ----------
-    name : str
-    definition : Definition
-        The stored part: the quantity less its offset and what stands beside it.
-    offset : Fraction
-        Constant that is not stored.
-    range : Interval
-        Proved range of the stored part.
-    meaning : str
-        The comment where a named stage of the algorithm begins; "" elsewhere.
-    guarded : bool
-        Whether the range holds because it is checked when the code runs.
-    beside : tuple
-        Exact words, each with a power of two: the quantity is the sum of its stored part, its offset and these.
-    inexact : Fraction
-        Bound of how far the definition is from the quantity: what a series leaves out, or a rational number for an
-        irrational one.
-    follows : ErrorPropagation or None
-        What becomes of the errors of quantities whose computed values were taken as exact on the way.
-    """
+    """A quantity of a fixed-point program, exactly."""
 
     name: str
-    definition: Definition
-    offset: Fraction
-    range: Interval
-    meaning: str = ""
-    guarded: bool = False
+    definition: Definition  # the stored part: the quantity less its offset and what stands beside it
+    offset: Fraction  # the constant that is not stored
+    range: Interval  # proved range of the stored part
+    meaning: str = ""  # the comment where a named stage of the algorithm begins; "" elsewhere
+    guarded: bool = False  # whether the range holds because it is checked when the code runs
+    #: Exact words, each with a power of two: the quantity is the sum of its stored part, its offset and these.
     beside: tuple[tuple[Monomial, Fraction], ...] = ()
+    #: Bound of the distance of the definition from the quantity: a truncated series, or a rounded irrational number.
     inexact: Fraction = Fraction(0)
     follows: ErrorPropagation | None = None
 
 
 @dataclass
 class Quantities:
-    """All quantities of a program in order, and which of them hold its results.
-
-    Parameters
-    ----------
-    items : dict of str to Quantity
-    results : dict of str to tuple
-        For each output signal, and the transition, the quantity or constant that holds each element.
-    """
+    """All quantities of a program in order, and which of them hold its results."""
 
     items: dict[str, Quantity] = field(default_factory=dict)
+    #: For each output signal, and the transition, the quantity or constant that holds each element.
     results: dict[str, tuple[Operand, ...]] = field(default_factory=dict)
 
     def distance(self, name: str, number: Fraction) -> Fraction:
-        """Return a bound of how far a quantity can be from a number."""
+        """Return a bound of the distance of a quantity from a number."""
         quantity = self.items[name]
         shift = quantity.offset - number
         ends = (quantity.range.lowest + shift, quantity.range.highest + shift)
@@ -178,8 +153,6 @@ def is_power_of_two(value: Fraction) -> bool:
 def exponent(value: Fraction) -> int:
     """Return the exponent of a power of two or its negative.
 
-    Examples
-    --------
     >>> exponent(Fraction(-1, 8))
     -3
     """

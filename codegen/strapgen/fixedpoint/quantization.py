@@ -175,7 +175,7 @@ def _is_worse(one: FixedProgram, other: FixedProgram) -> bool:
 
 
 def _fixed_program(context: Quantization) -> FixedProgram:
-    """Return what has been lowered as a program."""
+    """Return the lowered values as a program."""
     outputs = tuple(_output(context, result.signal) for result in context.program.outputs)
     interface = Interface(context.settings, context.plan.inputs, outputs, _feedbacks(context), None)
     _require_last(context)

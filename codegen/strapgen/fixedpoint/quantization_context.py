@@ -22,44 +22,22 @@ _LARGEST_PART = Fraction(1, 2)
 
 @dataclass
 class Quantization:
-    """The state of a walk over the exact quantities of a program.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-    quantities : Quantities
-    plan : FormatPlan
-    most : mapping of str to int
-        Most fraction bits of quantities that need not be finer.
-    feedback_names : mapping of str to str
-        The name of the error feedback of every quantity whose rounding error goes into the next call.
-    word : int
-        Bits of a word.
-    rounding_error : Fraction
-        Largest error of a rounding, in units of the last place.
-    values : dict of str to Value
-        The integers so far, those of the inputs included.
-    body : list of Value
-        The integers so far, in the order of the code.
-    resets : set of str
-        Quantities whose computed value is taken as exact from there on.
-    checked : dict of str to Fraction
-        Largest magnitudes of quantities in calls that pass the checks so far, where these bound them.
-    """
+    """The state of a walk over the exact quantities of a program."""
 
     program: Program
     settings: Settings
     quantities: Quantities
     plan: FormatPlan
-    most: Mapping[str, int]
-    feedback_names: Mapping[str, str]
-    word: int = field(init=False)
-    rounding_error: Fraction = field(init=False)
-    values: dict[str, Value] = field(init=False)
-    body: list[Value] = field(default_factory=list)
-    resets: set[str] = field(default_factory=set)
-    checked: dict[str, Fraction] = field(default_factory=dict)
+    most: Mapping[str, int]  # most fraction bits of quantities that need not be finer
+    feedback_names: Mapping[str, str]  # error feedbacks by the quantity whose rounding error they hand on
+    word: int = field(init=False)  # bits
+    rounding_error: Fraction = field(init=False)  # largest error of a rounding, in units of the last place
+    values: dict[str, Value] = field(init=False)  # the integers so far, those of the inputs included
+    body: list[Value] = field(default_factory=list)  # the integers so far, in the order of the code
+    resets: set[str] = field(default_factory=set)  # quantities whose computed value is exact from there on
+    checked: dict[str, Fraction] = field(
+        default_factory=dict
+    )  # largest magnitudes in calls that pass the checks
 
     def __post_init__(self) -> None:
         self.word, self.rounding_error = self.settings.word, ROUNDINGS[self.settings.rounding]
@@ -97,28 +75,10 @@ def integer_value(
     wide: bool = False,
     followed: Fraction = Fraction(0),
 ) -> Value:
-    """Return a value with the range of its integer: that of the quantity, and what rounding adds.
+    """Return a value with the range of its integer: that of the quantity, widened by the error.
 
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : IntegerDefinition
-    fraction : int
-        Fraction bits of the integer.
-    error : Fraction
-        Bound of what rounding, and the errors of what it is computed from, do to the value.
-    peak : int
-        Bound of the magnitude of every partial sum.
-    wide : bool, optional
-        Whether it takes a wide number.
-    followed : Fraction, optional
-        Bound of what the errors do of quantities that were taken as exact on the way.
-
-    Raises
-    ------
-    InputError
-        If the range is checked, and the error may be as large as the value.
+    `error` is due to rounding and to operands, `followed` to quantities that were taken as exact on the way; `peak`
+    bounds every partial sum.
     """
     unit = Fraction(2) ** fraction
     local = up(error + quantity.inexact)

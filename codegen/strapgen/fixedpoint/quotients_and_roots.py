@@ -16,19 +16,7 @@ from strapgen.ir.integer_program import IntegerQuotient, IntegerRoot, Scaled
 
 
 def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotient) -> None:
-    """Lower a quotient to a word of the finest format for which the numerator has room.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : Quotient
-
-    Raises
-    ------
-    InputError
-        If the word is too short.
-    """
+    """Lower a quotient to a word of the finest format for which the numerator has room."""
     word, values = context.word, context.values
     denominator, numerator = definition.denominator, definition.numerator
     if values[denominator].error:  # what is exact, a wide number too, stays so
@@ -62,19 +50,7 @@ def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotie
 
 
 def lower_root(context: Quantization, quantity: Quantity, definition: SquareRoot) -> None:
-    """Lower a square root: as many places below the argument as a wide number has room for, an even number in all.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : SquareRoot
-
-    Raises
-    ------
-    InputError
-        If the word is too short.
-    """
+    """Lower a square root: as many places below the argument as a wide number has room for, an even number in all."""
     argument = context.values[definition.argument]
     inside = context.quantities.items[definition.argument].range
     shift = 2 * context.word - 3 - max(1, argument.high).bit_length()

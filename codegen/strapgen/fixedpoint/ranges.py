@@ -22,15 +22,7 @@ SumOfTerms = Iterable[tuple[Monomial, Fraction]]
 
 
 class Ranges:
-    """Proves the ranges of quantities one after another, as they are derived.
-
-    Parameters
-    ----------
-    items : dict of str to Quantity
-        The quantities so far; the caller adds each after its range is proved.
-    box : mapping of str to Interval
-        Range of every element of an input.
-    """
+    """Proves the ranges of quantities one after another; the caller adds each to `items` after its range is proved."""
 
     def __init__(self, items: dict[str, Quantity], box: Mapping[str, Interval]) -> None:
         self.items, self.box = items, dict(box)
@@ -169,15 +161,7 @@ class _Parts:
     """Evaluates a sum on parts of the inputs' box.
 
     There are thousands of them: ends of intervals are plain integers here, in units of 2**-GRID, and a half takes from
-    the whole what does not depend on the side that is cut.
-
-    Parameters
-    ----------
-    box : mapping of str to Interval
-        Range of every element of an input.
-    steps : sequence of Quantity
-        Elements of inputs and sums that lead to the sum, each after those that it is made from.
-    definition : Sum
+    the whole what does not depend on the side that is cut. `steps` lead to the sum, each after those it is made from.
     """
 
     def __init__(self, box: Mapping[str, Interval], steps: Sequence[Quantity], definition: Sum) -> None:
@@ -220,7 +204,7 @@ class _Parts:
         return _Part([r.low for r in ranges], [r.high for r in ranges], sums)
 
     def widest(self, part: _Part, names: Iterable[str]) -> str:
-        """Return the widest side, each measured against what it was."""
+        """Return the widest side, relative to that of the whole box."""
 
         def share(name: str) -> Fraction:
             place, side = self._places[name], self._box[name]

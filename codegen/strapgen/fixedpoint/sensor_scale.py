@@ -51,18 +51,6 @@ def counted(program: Program) -> tuple[Signal, ...]:
 def in_counts(program: Program, sensor: Sensor) -> Program:
     """Return a program whose increments are counts times a power of two, where they were angles in rad.
 
-    Parameters
-    ----------
-    program : Program
-    sensor : Sensor
-
-    Returns
-    -------
-    Program
-        The program itself if the angle of a count is a power of two, or nothing is counted.
-
-    Examples
-    --------
     >>> from strapgen.ir.signals import Signal
     >>> d, y = Signal("increments", (1,), ("d",)), Signal.scalar("y")
     >>> half = Operation("multiply", (Constant(Fraction(1, 2)), Reference("d")))
@@ -141,17 +129,10 @@ def _total_cost(program: Program, weights: Mapping[str, int]) -> int:
 
 @dataclass(frozen=True)
 class _Scaling:
-    """Writes nodes in counts.
-
-    Parameters
-    ----------
-    scale : Fraction
-    weights : mapping of str to int
-        By name, the k for which the program in counts holds the value divided by scale**k.
-    """
+    """Writes nodes in counts."""
 
     scale: Fraction
-    weights: Mapping[str, int]
+    weights: Mapping[str, int]  # by name, the k for which the program in counts holds the value over scale**k
 
     def assigned(self, assignment: Assignment) -> Node:
         """Return the right side of an assignment in counts."""

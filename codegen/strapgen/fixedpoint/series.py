@@ -20,30 +20,14 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Series:
-    """A polynomial, and a bound of its distance from the function that it approximates.
+    """A polynomial, and a bound of its distance from the function that it approximates."""
 
-    Parameters
-    ----------
-    terms : dict of int to dict of Monomial to int
-        Coefficients by degree and product.
-    rest : Fraction
-        Bound of the distance, wherever the variables lie.
-    """
-
-    terms: dict[int, dict[Monomial, int]]
-    rest: Fraction
+    terms: dict[int, dict[Monomial, int]]  # coefficients by degree and product
+    rest: Fraction  # bound of the distance
 
 
 class Truncated:
-    """Arithmetic of truncated series.
-
-    Parameters
-    ----------
-    sizes : sequence of Fraction
-        Largest magnitude of every variable.
-    most : int
-        Largest number of terms of a series, from which the degree follows.
-    """
+    """Arithmetic of series in variables of at most these magnitudes, truncated to at most `most` terms."""
 
     def __init__(self, sizes: Sequence[Fraction], most: int) -> None:
         self.sizes = list(sizes)

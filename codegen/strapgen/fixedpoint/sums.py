@@ -21,19 +21,7 @@ from strapgen.ir.signed_digits import from_digits, signed_digits
 
 
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:
-    """Lower a sum of products to a word, or to a wide number where no word is needed.
-
-    Parameters
-    ----------
-    context : Quantization
-    quantity : Quantity
-    definition : Sum
-
-    Raises
-    ------
-    InputError
-        If a format that the user states does not hold it, or the word is too short.
-    """
+    """Lower a sum of products to a word, or to a wide number where no word is needed."""
     value = _lowered(context, quantity, definition)
     if (
         quantity.guarded
@@ -67,7 +55,7 @@ def _lowered(context: Quantization, quantity: Quantity, definition: Sum) -> Valu
 
 
 def _note_squares(context: Quantization, quantity: Quantity, definition: Sum) -> bool:
-    """Note how large squared quantities can be where the sum of their squares has passed its check; False of others."""
+    """Note bounds of quantities where the sum of their squares has passed its check; False of other sums."""
     terms = dict(definition.terms)
     room = quantity.range.highest + quantity.inexact - terms.pop((), Fraction(0))
     if not terms or any(len({*m}) != 1 or len(m) != 2 or c <= 0 for m, c in terms.items()):
@@ -168,25 +156,13 @@ def _constant_term(constant: Fraction, places: Sequence[int], word: int) -> Plac
 
 @dataclass(frozen=True)
 class _FineTerms:
-    """The terms of a sum that are rounded, as they are added up.
-
-    Parameters
-    ----------
-    aligned : Aligned
-    shift : int
-        Places that the rounding drops.
-    added : int
-        Bound of what is added before: half a unit, or the error feedback.
-    feedback : ErrorFeedback or None
-    error : Fraction
-        Bound of the error before rounding.
-    """
+    """The terms of a sum that are rounded, as they are added up."""
 
     aligned: Aligned
-    shift: int
-    added: int
+    shift: int  # places that the rounding drops
+    added: int  # bound of what is added before it: half a unit, or the error feedback
     feedback: ErrorFeedback | None
-    error: Fraction
+    error: Fraction  # bound of the error before rounding
 
     @property
     def peak(self) -> int:
@@ -322,12 +298,8 @@ def _known_limit(context: Quantization, name: str) -> Fraction | None:
 
 
 def _followed_error(context: Quantization, quantity: Quantity) -> Fraction:
-    """Return what the errors of quantities add that were taken as exact on the way to this one."""
-    follows, total = quantity.follows, Fraction(0)
-    if follows is None:
-        return total
-    for name, slope in follows.slopes:
-        error = context.values[word_of(context, name)].error
-        if error:
-            total += follows.most if slope is None else slope * error
-    return up(min(total, follows.most))
+    """Return the error inherited from quantities that were taken as exact on the way to this one."""
+    if quantity.follows is None:
+        return Fraction(0)
+    errors = {name: context.values[word_of(context, name)].error for name, _ in quantity.follows.slopes}
+    return up(quantity.follows.bound(errors))

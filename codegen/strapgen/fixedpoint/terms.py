@@ -1,4 +1,4 @@
-"""Aligns the terms of sums as integers of one scale, and bounds their partial sums and what shifts lose."""
+"""Aligns the terms of sums as integers of one scale, and bounds their partial sums and the bits that shifts drop."""
 
 from __future__ import annotations
 
@@ -13,38 +13,20 @@ from strapgen.ir.integer_program import Term, Value
 
 @dataclass(frozen=True)
 class Placed:
-    """A term that is not shifted yet.
-
-    Parameters
-    ----------
-    term : Term
-    place : int
-        Its fraction bits.
-    error : Fraction
-        Bound of its distance from the exact term.
-    """
+    """A term that is not shifted yet."""
 
     term: Term
-    place: int
-    error: Fraction
+    place: int  # its fraction bits
+    error: Fraction  # bound of its distance from the exact term
 
 
 @dataclass(frozen=True)
 class Aligned:
-    """Terms at one place.
-
-    Parameters
-    ----------
-    terms : tuple of Term
-    peak : int
-        Bound of the magnitude of their partial sums.
-    error : Fraction
-        Bound of the error of their sum, with what shifts lose.
-    """
+    """Terms at one place."""
 
     terms: tuple[Term, ...]
-    peak: int
-    error: Fraction
+    peak: int  # bound of the magnitude of their partial sums
+    error: Fraction  # bound of the error of their sum, with what shifts lose
 
     def fits(self, word: int, values: Mapping[str, Value], added: int = 0) -> bool:
         """Tell whether every term, and every partial sum with so much added, fits into a wide number."""
@@ -74,8 +56,6 @@ def in_units(bound: Fraction) -> int:
 def binary(integer: int, fraction: int) -> Fraction:
     """Return an integer with so many fraction bits as a number.
 
-    Examples
-    --------
     >>> binary(3, 2), binary(3, -1)
     (Fraction(3, 4), Fraction(6, 1))
     """
@@ -83,21 +63,7 @@ def binary(integer: int, fraction: int) -> Fraction:
 
 
 def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str, Value]) -> Aligned:
-    """Return terms at one place.
-
-    Parameters
-    ----------
-    terms : iterable of Placed
-    place : int
-        Fraction bits of the sum.
-    word : int
-    values : mapping of str to Value
-        The values in the terms.
-
-    Returns
-    -------
-    Aligned
-    """
+    """Return terms shifted to one place: the fraction bits of their sum."""
     shifted: list[Term] = []
     peak, error = 0, Fraction(0)
     inherited = cut = 0  # errors of terms in units of the grid, and terms that are shifted down

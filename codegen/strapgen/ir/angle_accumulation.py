@@ -1,4 +1,4 @@
-"""How rounding turns the attitude over the steps of a run: a bound that is linear in their number."""
+"""The angle by which rounding turns the attitude over a run: a bound that is linear in the number of steps."""
 
 from __future__ import annotations
 
@@ -19,53 +19,29 @@ class AngleAccumulation:
     It is at most ``once + per_step N + per_normalization M`` after N steps and M normalizations, while the state stays
     proper. A vector of parameters is proper while its length is at least `shortest`; a matrix while its singular values
     lie between `shortest` and the root of 2 - `shortest`**2. The attitude of a matrix is the nearest rotation.
-
-    Parameters
-    ----------
-    once : Fraction
-        The part that does not depend on the number of steps, in rad.
-    per_step : Fraction
-        What every step adds, in rad.
-    input_rounding : Fraction
-        What every step adds if increments are rounded to their format first, in rad.
-    per_normalization : Fraction
-        What a normalization adds that multiplies the words of the state by one factor and rounds each of them once; an
-        orthonormalization of a matrix adds it too, in rad.
-    per_element : Fraction or None
-        What an orthonormalization adds beside, times the error of an element of its result; None where nothing is
-        proved. It multiplies the matrix C by a symmetric expansion of the inverse root of C'C.
-    shortest : Fraction
-        Length, or singular value, from which the bound holds.
-    start : Fraction
-        Least length of the state from which `proved_steps` counts; of a matrix, least singular value, the largest being
-        at most the root of 2 - `start`**2.
-    proved_steps : int
-        Number of steps in which the state is proved to stay proper.
-    beyond : Fraction
-        Factor of the bound of a run of more steps in which the state stays proper all the same.
-    orthonormalized : Fraction
-        Factor of what the steps add to a run with orthonormalizations.
-    dual_rows_apart : int
-        Most steps from one orthonormalization by dual rows to the next; 0 where nothing is proved of that scheme.
-    dual_rows_growth : Fraction
-        With that scheme, every orthonormalization stretches the error before it by 1 and this much at most.
-    added : Fraction, optional
-        What rounding adds to a proper state in a step, as the length of all its elements together.
     """
 
-    once: Fraction
-    per_step: Fraction
-    input_rounding: Fraction
+    once: Fraction  # rad
+    per_step: Fraction  # rad
+    input_rounding: Fraction  # rad a step, if increments are rounded to their format first
+    #: Rad a normalization that multiplies the words of the state by one factor and rounds each of them once, and rad
+    #: an orthonormalization of a matrix.
     per_normalization: Fraction
+    #: More rad an orthonormalization, by the error of an element of its result; None where nothing is proved. It
+    #: multiplies the matrix C by a symmetric expansion of the inverse root of C'C.
     per_element: Fraction | None
-    shortest: Fraction
+    shortest: Fraction  # length, or singular value, from which the bound holds
+    #: Least length of the state from which `proved_steps` counts; of a matrix, least singular value, the largest
+    #: being at most the root of 2 - `start`**2.
     start: Fraction
-    proved_steps: int
-    beyond: Fraction
-    orthonormalized: Fraction
-    dual_rows_apart: int
-    dual_rows_growth: Fraction
-    added: Fraction = Fraction(0)
+    proved_steps: int  # those in which the state is proved to stay proper
+    beyond: (
+        Fraction  # factor of the bound of a run of more steps in which the state stays proper all the same
+    )
+    orthonormalized: Fraction  # factor of the steps' part of a run with orthonormalizations
+    dual_rows_apart: int  # most steps between orthonormalizations by dual rows; 0 where nothing is proved
+    dual_rows_growth: Fraction  # such an orthonormalization stretches the error by at most 1 and this
+    added: Fraction = Fraction(0)  # rounding of a proper state in a step, as the length of all its elements
 
     @property
     def dual_rows_error(self) -> Fraction:
@@ -74,7 +50,7 @@ class AngleAccumulation:
 
     @property
     def dual_rows_start(self) -> Fraction:
-        """How far from 1 the squared singular values of a matrix may be where a run with dual rows begins."""
+        """Largest distance from 1 of a matrix's squared singular values where a run with dual rows begins."""
         return (1 - self.shortest) / 65
 
     def bound(
@@ -87,22 +63,10 @@ class AngleAccumulation:
     ) -> float:
         """Return a bound of the angle after a number of steps, in rad; inf where nothing is proved.
 
-        Parameters
-        ----------
-        steps : int
-        normalizations : int, optional
-            Number of normalizations, or of orthonormalizations, among them; at most `proved_steps` apart, and those by
-            dual rows `dual_rows_apart`.
-        error : number, optional
-            Error bound of an element of an orthonormalization's result, up to `LARGEST_ERROR`; of no effect on a vector
-            of parameters.
-        rounded_inputs : bool, optional
-            Whether increments are rounded to their format first.
-        dual_rows : bool, optional
-            Whether the scheme of dual rows orthonormalizes.
+        Normalizations, or orthonormalizations, count among the steps and are at most `proved_steps` apart, or
+        `dual_rows_apart` if it is that scheme; `error` bounds an element of an orthonormalization's result, up to
+        `LARGEST_ERROR`. With `rounded_inputs` increments are rounded to their format first.
 
-        Examples
-        --------
         >>> one, unit = Fraction(1), Fraction(1, 1000)
         >>> run = AngleAccumulation(4 * unit, unit, unit, 2 * unit, 0 * one, one / 2, one, 100, one, one, 0, 0 * one)
         >>> round(run.bound(10, normalizations=1), 6)

@@ -16,40 +16,21 @@ _ROOT_BITS = 64
 
 @dataclass(frozen=True)
 class Truncation:
-    """What the transition leaves out of the exponential of its rotation vector, whose series it cuts off.
+    """The truncation of the exponential series by which a transition follows from its rotation vector.
 
-    Parameters
-    ----------
-    order : int
-        Highest power of the rotation vector that it has.
-    scale : Fraction
-        Length of the generator by that of the rotation vector: 1/2 for parameters of half the angle, 1 for matrices.
-    square : str
-        Name of the value that is the square of the rotation vector's length, in rad^2.
-
-    Examples
-    --------
     >>> cut = Truncation(12, Fraction(1, 2), "angle_square")
     >>> float(cut.bound(Fraction(1, 4))) < 3e-18, cut.bound(Fraction(0))
     (True, Fraction(0, 1))
     """
 
-    order: int
-    scale: Fraction
-    square: str
+    order: int  # the highest power of the rotation vector
+    scale: Fraction  # 1/2 for parameters of half the angle, 1 for matrices
+    square: str  # name of the value that is the square of the rotation vector's length, in rad^2
 
     def bound(self, square: Fraction) -> Fraction | None:
-        """Return a bound of what is left out, as the length of a quaternion or the largest singular value of a matrix.
+        """Return a bound of the error for a squared angle in rad^2; None where the terms do not shrink at once.
 
-        Parameters
-        ----------
-        square : Fraction
-            Largest square of the rotation vector's length, in rad^2.
-
-        Returns
-        -------
-        Fraction or None
-            None where the angle is so large that the terms do not shrink at once.
+        It is the length of a quaternion, or the largest singular value of a matrix.
         """
         # A power of a length that is rounded up: its root is rational again.
         x = self.scale * Fraction(math.isqrt(math.ceil(square * 4**_ROOT_BITS)) + bool(square), 2**_ROOT_BITS)

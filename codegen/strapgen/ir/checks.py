@@ -27,33 +27,7 @@ _MARKS = ("/*", "*/", '"""', "\\")
 
 
 def choice(what: str, value: str, allowed: Iterable[str], also: str = "", section: str = "") -> str:
-    """Return `value` if it is one of `allowed`.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : str
-    allowed : iterable of str
-    also : str, optional
-        What else is allowed, in words for the message.
-    section : str, optional
-        Section of ``strapgen list`` that shows all names, where there are many; by default that of the kind.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        If it is not; the message says what was perhaps meant, and what is allowed.
-
-    Examples
-    --------
-    >>> choice("method", "rk4", ["rk1", "rk4"])
-    'rk4'
-    """
+    """Return `value` if it is one of `allowed`; `also` and `section` complete the message of a refusal."""
     names = allowed if isinstance(allowed, Container) else list(allowed)  # a mapping may know other names
     if not isinstance(value, str) or value not in names:
         raise InputError(unknown(what, value, list(names), also, section))
@@ -65,8 +39,6 @@ def double(text: str) -> float:
 
     Every number that a file or a command line holds is read here or by `whole`: digits are 0 to 9, without underscores.
 
-    Examples
-    --------
     >>> double(" -2.5e3 "), double("1_0")
     (-2500.0, nan)
     """
@@ -79,18 +51,7 @@ def double(text: str) -> float:
 
 
 def whole(what: str, text: str) -> int:
-    """Return the whole number that a text holds.
-
-    Raises
-    ------
-    InputError
-        If it writes none.
-
-    Examples
-    --------
-    >>> whole("increments", "12")
-    12
-    """
+    """Return the whole number that a text holds."""
     try:
         if _is_plain(text):
             return int(text)
@@ -100,7 +61,7 @@ def whole(what: str, text: str) -> int:
 
 
 def _is_plain(text: str) -> bool:
-    """Return whether a text holds none of the characters that Python alone takes for parts of a number."""
+    """Tell whether a text holds none of the characters that Python alone takes for parts of a number."""
     return "_" not in text and text.strip().isascii()
 
 
@@ -109,26 +70,6 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
 
     A float stands for its shortest decimal form, so that 0.1 means 1/10. A number too small for a double is read as 0.
 
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : str, float or Fraction
-        A decimal, a fraction such as "1/8", or a number.
-    positive : bool, optional
-        Whether the number must be above 0.
-
-    Returns
-    -------
-    Fraction
-
-    Raises
-    ------
-    InputError
-        If it is no number, not finite, or not positive although `positive` is true.
-
-    Examples
-    --------
     >>> number("step", "0.125", positive=True)
     Fraction(1, 8)
     """
@@ -147,25 +88,7 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
 
 
 def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = None) -> int:
-    """Return `value` as a whole number from `smallest` to `largest`.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : int
-    smallest, largest : int, optional
-        Allowed range, ends included; without `largest` there is no upper end.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InputError
-        If it is not one.
-    """
+    """Return `value` as a whole number from `smallest` to `largest`."""
     limit = f"at least {smallest}" if largest is None else f"from {smallest} to {largest}"
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or value < smallest or (largest is not None and value > largest):
@@ -174,28 +97,7 @@ def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = Non
 
 
 def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
-    """Return ``value / unit``, which must be a whole number from 1 to `MOST`.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : Fraction
-        A time in s.
-    of : str
-        Name of the unit in an error message.
-    unit : Fraction
-        The time in s that must divide it.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InputError
-        If `unit` does not divide `value`, or goes into it too many times.
-    """
+    """Return `value` / `unit`, two times in s, which must be a whole number from 1 to `MOST`."""
     ratio = value / unit
     if ratio > MOST:
         raise InputError(
@@ -210,28 +112,7 @@ def multiple(what: str, value: Fraction, of: str, unit: Fraction) -> int:
 
 
 def text(what: str, value: Any) -> str:
-    """Return `value` if it is one line of text that is safe in a comment of generated code.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : str
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        If it is no text, too long, or holds characters with a meaning in generated code.
-
-    Examples
-    --------
-    >>> text("source", "W. Kutta, 1901")
-    'W. Kutta, 1901'
-    """
+    """Return `value` if it is one line of text that is safe in a comment of generated code."""
     if not isinstance(value, str) or not value.isprintable() or len(value) > MOST_TEXT:
         raise InputError(f"{what} is no text of one line and at most {MOST_TEXT} characters")
     for mark in _MARKS:
@@ -241,35 +122,7 @@ def text(what: str, value: Any) -> str:
 
 
 def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float) -> NDArray[Any]:
-    """Return `value` as a finite array of `dtype` whose last axes have the shape `tail`.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : array_like
-    tail : tuple of int
-        Shape of the last axes; any axes may come before them.
-    dtype : dtype, optional
-        Of the result.
-
-    Returns
-    -------
-    array, (..., *tail)
-        In C order.
-
-    Raises
-    ------
-    InputTypeError
-        If it does not hold real numbers.
-    InputError
-        If its last axes have another shape, or a value is not finite.
-
-    Examples
-    --------
-    >>> real_array("increments", [[1e-3, 0.0, 0.0]], (3,)).shape
-    (1, 3)
-    """
+    """Return `value` as a finite array of `dtype`, in C order, whose last axes have the shape `tail`."""
     import numpy as np  # imported here, since most commands do not need numpy and start faster without it
 
     if np.ma.isMaskedArray(value):
@@ -297,32 +150,7 @@ def real_array(what: str, value: Any, tail: tuple[int, ...], dtype: Any = float)
 
 
 def numbers(what: str, value: Any, tail: tuple[int | None, ...] = ()) -> NDArray[Any]:
-    """Return `value` as an array of doubles whose last axes have the shape `tail`; whole numbers are converted.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : array_like
-    tail : tuple of int or None, optional
-        Shape of the last axes, None for any length.
-
-    Returns
-    -------
-    array, (..., *tail)
-
-    Raises
-    ------
-    InputTypeError
-        If it does not hold numbers.
-    InputError
-        If its rows differ in length, or its last axes have another shape.
-
-    Examples
-    --------
-    >>> numbers("increments", [[1, 0, 0]], (3,))
-    array([[1., 0., 0.]])
-    """
+    """Return `value` as an array of doubles whose last axes have the shape `tail`, None standing for any length."""
     import numpy as np
 
     try:
@@ -340,28 +168,7 @@ def numbers(what: str, value: Any, tail: tuple[int | None, ...] = ()) -> NDArray
 
 
 def path(what: str, value: Any) -> Path:
-    """Return `value` as a path.
-
-    Parameters
-    ----------
-    what : str
-        Name of the value in an error message.
-    value : path
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputTypeError
-        If it is none.
-
-    Examples
-    --------
-    >>> path("path", "gyro.csv").name
-    'gyro.csv'
-    """
+    """Return `value` as a path."""
     if not isinstance(value, str | os.PathLike):
         raise InputTypeError(f"{what} is {shown(value)}; the path of a file is needed")
     return Path(value)

@@ -1,4 +1,4 @@
-"""Writes bounds with few digits on the safe side: what is at most a number is rounded up, what is at least one down."""
+"""Writes bounds with few digits on the safe side: upper bounds are rounded up, lower ones down."""
 
 from __future__ import annotations
 
@@ -8,18 +8,8 @@ from fractions import Fraction
 
 
 def above(value: Fraction, digits: int = 6, style: str = "g") -> str:
-    """Return a decimal number that is not below a value.
+    """Return a decimal number that is not below a value; the style "e" has a power of ten in any case.
 
-    Parameters
-    ----------
-    value : Fraction
-    digits : int, optional
-        Significant digits, at most 15.
-    style : str, optional
-        "g", or "e" for a power of ten in any case.
-
-    Examples
-    --------
     >>> above(Fraction(2, 3)), above(Fraction(-2, 3), 2), above(Fraction(1, 3000), 3, "e")
     ('0.666667', '-0.66', '3.34e-04')
     """
@@ -27,13 +17,7 @@ def above(value: Fraction, digits: int = 6, style: str = "g") -> str:
 
 
 def below(value: Fraction, digits: int = 6, style: str = "g") -> str:
-    """Return a decimal number that is not above a value; parameters are those of `above`.
-
-    Examples
-    --------
-    >>> below(Fraction(2, 3)), below(Fraction(1, 8))
-    ('0.666666', '0.125')
-    """
+    """Return a decimal number that is not above a value, see `above`."""
     return _rounded(value, digits, style, ROUND_FLOOR)
 
 
@@ -43,24 +27,12 @@ def _rounded(value: Fraction, digits: int, style: str, rounding: str) -> str:
 
 
 def places_above(value: Fraction, places: int = 4) -> str:
-    """Return a number with so many decimal places that is not below a value.
-
-    Examples
-    --------
-    >>> places_above(Fraction(1, 3)), places_above(Fraction(1, 2))
-    ('0.3334', '0.5000')
-    """
+    """Return a number with so many decimal places that is not below a value."""
     return f"{Decimal(math.ceil(value * 10**places)).scaleb(-places):.{places}f}"
 
 
 def float_above(value: Fraction) -> float:
-    """Return a float that is not below a value.
-
-    Examples
-    --------
-    >>> Fraction(float_above(Fraction(1, 3))) > Fraction(1, 3), float_above(Fraction(1, 4))
-    (True, 0.25)
-    """
+    """Return a float that is not below a value."""
     near = float(value)
     return near if Fraction(near) >= value else math.nextafter(near, math.inf)
 

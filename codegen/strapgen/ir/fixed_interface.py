@@ -1,4 +1,4 @@
-"""The interface of fixed-point code: formats, ranges and error bounds of its arguments, and how rounding adds up."""
+"""The interface of fixed-point code: formats, ranges and error bounds of its arguments, and the error of a run."""
 
 from __future__ import annotations
 
@@ -22,58 +22,35 @@ class ErrorFeedback:
     The sum starts from it in place of a constant for rounding, and the low bits of the sum are the next error feedback.
     A run starts from half a unit of the last place for rounding to the nearest, and from zero for truncation; every
     other word is allowed too.
-
-    Parameters
-    ----------
-    name : str
-    fraction : int
-        Fraction bits.
-    shift : int
-        Places from its fraction to that of the sum, at most 0: ``word * 2**shift`` is added, which drops bits.
-    fresh : int
-        The word that a run starts from.
     """
 
     name: str
-    fraction: int
-    shift: int
-    fresh: int
+    fraction: int  # bits
+    shift: int  # to the fraction of the sum, at most 0: `word * 2**shift` is added, which drops bits
+    fresh: int  # the word that a run starts from
 
 
 @dataclass(frozen=True)
 class Argument:
-    """An input or an output of a fixed-point function.
-
-    Parameters
-    ----------
-    signal : Signal
-    format : Format
-    values : tuple of str
-        The value that holds each element.
-    low, high : int
-        Range of the integers: an input outside is refused, an output is proved to lie inside.
-    errors : tuple of Fraction
-        Error bound of each element of an output after one call; of an input, zeros.
-    sensor : Sensor or None
-        The scale of the gyro whose counts these are.
-    """
+    """An input or an output of a fixed-point function."""
 
     signal: Signal
     format: Format
-    values: tuple[str, ...]
+    values: tuple[str, ...]  # the value that holds each element
+    #: The range of the integers: an input outside is refused, an output is proved to lie inside.
     low: int
     high: int
-    errors: tuple[Fraction, ...]
-    sensor: Sensor | None = None
+    errors: tuple[Fraction, ...]  # bound for each element of an output after one call; zeros for an input
+    sensor: Sensor | None = None  # the scale of the gyro whose counts these are
 
     @property
     def unit(self) -> Fraction:
-        """What the integer 1 stands for, in the unit of the signal."""
+        """The value of the integer 1, in the unit of the signal."""
         return self.format.unit if self.sensor is None else self.sensor.count
 
     @property
     def saturates(self) -> bool:
-        """Whether it is an attitude in -1 to 1 less a unit: what lies beyond is stored as the nearer end."""
+        """Whether it is an attitude in -1 to 1 less a unit: a number beyond is stored as the nearer end."""
         return bool(self.signal.constraint) and self.format.fraction == self.format.word - 1
 
     def as_dict(self) -> dict[str, Any]:
@@ -105,39 +82,19 @@ class Argument:
 
 @dataclass(frozen=True)
 class RoundingAccumulation:
-    """How rounding adds up over the steps of a run, in the length of a state (of a row, for a matrix).
-
-    Parameters
-    ----------
-    once : Fraction
-        The part of the bound that does not depend on the number of steps.
-    per_step : Fraction
-        The part that every step adds.
-    input_rounding : Fraction
-        What every step adds if increments are rounded to their format first.
-    growth : Fraction
-        Largest factor by which a step stretches the error before it.
-    """
+    """The error of a run due to rounding, as the length of a state or of a row of a matrix."""
 
     once: Fraction
     per_step: Fraction
-    input_rounding: Fraction
-    growth: Fraction
+    input_rounding: Fraction  # for each step, if increments are rounded to their format first
+    growth: Fraction  # largest factor by which a step stretches the error before it
 
     def bound(self, steps: int, rounded_inputs: bool = False, stretch: float | None = None) -> float:
         """Return a bound of the error after a number of steps; inf where no useful bound is known.
 
-        Parameters
-        ----------
-        steps : int
-        rounded_inputs : bool, optional
-            Whether increments are rounded to their format first.
-        stretch : float, optional
-            Largest factor by which all transitions of the run together stretch a difference, if a smaller one is known
-            than `growth` tells.
+        With `rounded_inputs` increments are rounded to their format first; `stretch` is the largest factor by which all
+        transitions together stretch a difference, where it is known better than by `growth`.
 
-        Examples
-        --------
         >>> RoundingAccumulation(Fraction(1), Fraction(2), Fraction(0), Fraction(1)).bound(10)
         21.0
         """
@@ -153,10 +110,8 @@ class RoundingAccumulation:
         return stretched * (float(self.once) + steps * float(per_step))
 
     def calls_within(self, allowance: Fraction) -> int:
-        """Return for how many steps at least the length of a state, 1 at first, exceeds 1 by no more than an allowance.
+        """Return the number of calls in which a state of length 1 is proved not to exceed 1 by more than an allowance.
 
-        Examples
-        --------
         >>> a_step = RoundingAccumulation(Fraction(0), Fraction(1, 2**10), Fraction(0), Fraction(1))
         >>> a_step.calls_within(Fraction(1, 16))
         63
@@ -173,33 +128,18 @@ class RoundingAccumulation:
 
 @dataclass(frozen=True)
 class Interface:
-    """The facts that a caller of fixed-point code must know.
-
-    Parameters
-    ----------
-    settings : Settings
-    inputs, outputs : tuple of Argument
-    residuals : tuple of ErrorFeedback
-        Error feedback, from call to call.
-    accumulation : RoundingAccumulation or None
-        How the rounding of a step adds up; None for other kernels.
-    angle_accumulation : AngleAccumulation or None
-        How it adds up as an angle; None where that is not proved.
-    """
+    """What a caller of fixed-point code must know."""
 
     settings: Settings
     inputs: tuple[Argument, ...]
     outputs: tuple[Argument, ...]
     residuals: tuple[ErrorFeedback, ...]
-    accumulation: RoundingAccumulation | None
-    angle_accumulation: AngleAccumulation | None = None
+    accumulation: RoundingAccumulation | None  # of a step
+    angle_accumulation: AngleAccumulation | None = None  # None where nothing is proved
 
     @property
     def normalized_within(self) -> int:
-        """The most steps from a normalization to the next that are proved to be accepted and to keep the state proper.
-
-        It is 0 where nothing is proved.
-        """
+        """The most steps between normalizations that are proved to be accepted and to keep the state proper, or 0."""
         if self.accumulation is None or self.angle_accumulation is None:
             return 0
         return min(

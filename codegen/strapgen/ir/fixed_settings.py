@@ -249,7 +249,7 @@ class Settings:
         return replace(self, largest_angle=angle, stated="")
 
     def without_counts(self) -> Settings:
-        """Return the settings of what takes no increments from the gyro."""
+        """Return the settings for a kernel that takes no increments from the gyro."""
         if self.input_bits is None:
             return self
         return replace(self, sensor=None, input_bits=None, largest_angle=DEFAULT_ANGLE, stated="")

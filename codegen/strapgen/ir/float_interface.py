@@ -1,4 +1,4 @@
-"""What is proved of the rounding of floating-point code: error bounds of a call and of a run, and their conditions."""
+"""Proved rounding of floating-point code: error bounds of a call and of a run, and their conditions."""
 
 from __future__ import annotations
 
@@ -14,17 +14,9 @@ from strapgen.ir.notebook_display import short_repr
 
 @dataclass(frozen=True)
 class Condition:
-    """A value that must lie in a range for a bound to hold.
+    """A value that must lie in a range for a bound to hold."""
 
-    Parameters
-    ----------
-    value : str
-        What it is: the name of an input, for each of its elements, or a value on the way.
-    low, high : Fraction
-        Its range.
-    """
-
-    value: str
+    value: str  # the name of an input, for each of its elements, or a value on the way in words
     low: Fraction
     high: Fraction
 
@@ -40,23 +32,11 @@ class Condition:
 
 @dataclass(frozen=True)
 class StepRounding:
-    """What one call of an attitude step adds to the error of a run, element by element.
+    """The errors r and d that one call of an attitude step adds to a run, which computes x T + x d + r."""
 
-    From the state x the code computes x T + x d + r, with T the exact transition.
-
-    Parameters
-    ----------
-    local : tuple of Fraction
-        Error bounds r of the elements of the state after the step, beside what comes from the transition.
-    transition : tuple of Fraction
-        Error bounds d of the elements of the transition.
-    away : tuple of Fraction
-        Bounds of the distance of the exact transition from the identity.
-    """
-
-    local: tuple[Fraction, ...]
-    transition: tuple[Fraction, ...]
-    away: tuple[Fraction, ...]
+    local: tuple[Fraction, ...]  # bounds of r, by element of the state
+    transition: tuple[Fraction, ...]  # bounds of d, by element of the transition
+    away: tuple[Fraction, ...]  # bounds of the distance of T from the identity
 
     def as_dict(self) -> dict[str, list[str]]:
         """Return the errors as plain JSON data."""
@@ -70,7 +50,7 @@ class StepRounding:
 
 @dataclass(frozen=True)
 class RoundingBounds:
-    """Bounds of how far the generated code is from exact arithmetic on the same inputs.
+    """Bounds of the distance of generated code from exact arithmetic on the same inputs.
 
     They hold in arithmetic of IEEE 754 with rounding to the nearest and with subnormal numbers, where every operation
     is rounded to the type and no product and sum are contracted.
@@ -90,11 +70,11 @@ class RoundingBounds:
     errors : mapping of str to tuple of Fraction
         Error bound of each element by the name of the output, row-major; empty where no bound is known.
     step : StepRounding or None
-        What one call of an attitude step adds to the error of a run; None for other kernels.
+        The errors that one call of an attitude step adds to a run; None for other kernels.
     accumulation : RoundingAccumulation or None
-        How that adds up; None for other kernels.
+        Their accumulation over a run; None for other kernels.
     reason : str
-        Why no bound is known; "" where there is one.
+        The reason why no bound is known; "" where there is one.
     """
 
     number: str

@@ -99,13 +99,7 @@ def _exceeds(largest: Fraction, fraction: int, top: int) -> bool:
 
 
 def check_word(word: int) -> int:
-    """Return a length of word if the integer model has it.
-
-    Raises
-    ------
-    InputError
-        If it has not.
-    """
+    """Return a length of word in bits if the integer model has it."""
     if isinstance(word, bool) or not isinstance(word, int) or not SHORTEST_WORD <= word <= LONGEST_WORD:
         raise InputError(
             f"word is {word!r}; a whole number of bits from {SHORTEST_WORD} to {LONGEST_WORD} is needed"
@@ -114,11 +108,5 @@ def check_word(word: int) -> int:
 
 
 def check_rounding(rounding: str) -> str:
-    """Return the name of a rounding if there is one of that name.
-
-    Raises
-    ------
-    InputError
-        If it is not known.
-    """
+    """Return the name of a rounding if it is known."""
     return checks.choice("rounding", rounding, ROUNDINGS)

@@ -1,4 +1,4 @@
-"""What an object shows of itself: a `repr` of a few lines, formulas and tables in a notebook, data frames.
+"""Objects in a notebook: a `repr` of a few lines, formulas and tables, data frames.
 
 `strapgen.results.display` writes formulas, tables and plots, and the module ``display`` of an application does for its
 objects. They stand above the objects that they show, and are loaded when a notebook or a user first asks.
@@ -29,12 +29,6 @@ def short_repr(value: Any) -> str:
 
     A class that has a method ``_in_words`` says with it what stands after the name of the class, a line or several. Any
     other is a dataclass, and shows its fields that differ from their defaults.
-
-    Examples
-    --------
-    >>> from strapgen.ir.recursion import Recursion
-    >>> short_repr(Recursion((("sum", "next_sum"),)))
-    "Recursion(states=(('sum', 'next_sum'),))"
     """
     name = type(value).__name__.lstrip("_")
     if hasattr(value, "_in_words"):
@@ -45,14 +39,7 @@ def short_repr(value: Any) -> str:
 
 
 def full_text(value: Any) -> str:
-    """Return the text of a value with all fields in full, whatever its ``__repr__`` leaves out.
-
-    Examples
-    --------
-    >>> from strapgen.ir.formats import Format
-    >>> full_text((Format(16, 14), "a"))
-    "(Format(word=16, fraction=14), 'a')"
-    """
+    """Return the text of a value with all fields in full, whatever its ``__repr__`` leaves out."""
     if is_dataclass(value) and not isinstance(value, type):
         parts = (f"{f.name}={full_text(getattr(value, f.name))}" for f in fields(value) if f.repr)
         return f"{type(value).__name__}({', '.join(parts)})"
@@ -78,62 +65,25 @@ def notebook_html(value: Any) -> str | None:
 
 
 def to_pandas(value: Any) -> Any:
-    """Return an object as a data frame of pandas, the units in the names of its columns.
-
-    Raises
-    ------
-    MissingExtraError
-        If pandas is not installed.
-    """
+    """Return an object as a data frame of pandas, the units in the names of its columns."""
     return _display(value, "frames").pandas_frame(value)
 
 
 class Records:
-    """What objects with records along a time have in common: a plot, and the forms of other libraries."""
+    """Records along a time: a plot, and the forms of other libraries."""
 
     __slots__ = ()
 
     def plot(self, path: Any = None, title: str = "") -> Any:
-        """Return a plot of the records against time as a figure of matplotlib, or write it to a file.
-
-        Parameters
-        ----------
-        path : path, optional
-            File for the image, whose ending says the kind; by default none is written.
-        title : str, optional
-
-        Returns
-        -------
-        Figure or Path
-            The path if one is named.
-
-        Raises
-        ------
-        MissingExtraError
-            If matplotlib is not installed.
-        InputError
-            If the kind of image is unknown.
-        """
+        """Return a plot of the records against time as a figure of matplotlib, or write it to a file."""
         return _display(self, "objects").plot(self, path, title)
 
     def to_pandas(self) -> Any:
-        """Return the records as a data frame of pandas, one row each, the units in the names of the columns.
-
-        Raises
-        ------
-        MissingExtraError
-            If pandas is not installed.
-        """
+        """Return the records as a data frame of pandas, one row each, the units in the names of the columns."""
         return to_pandas(self)
 
     def to_xarray(self) -> Any:
-        """Return the records as a dataset of xarray along the time in s, the units in names and attributes.
-
-        Raises
-        ------
-        MissingExtraError
-            If xarray is not installed.
-        """
+        """Return the records as a dataset of xarray along the time in s, the units in names and attributes."""
         return _display(self, "frames").xarray_dataset(self)
 
 
@@ -169,7 +119,7 @@ def _stated(value: Any) -> list[tuple[str, Any]]:
 
 
 def _differs(content: Any, default: Any) -> bool:
-    """Return whether a value is another than a default of its type; both may be arrays of numpy."""
+    """Tell whether a value is another than a default of its type; both may be arrays of numpy."""
     if hasattr(content, "tolist"):
         return bool(content.tolist() != default.tolist())
     return bool(content != default)

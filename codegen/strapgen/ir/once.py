@@ -13,26 +13,6 @@ class once(Generic[T]):  # noqa: N801 - a decorator
 
     It is `functools.cached_property` without the lock that Python 3.11 takes for every value; where threads read one
     at once, each may work it out.
-
-    Parameters
-    ----------
-    function : callable
-        Works the value out from the object, whose `__dict__` then holds it.
-
-    Examples
-    --------
-    >>> class Square:
-    ...     def __init__(self, side):
-    ...         self.side = side
-    ...
-    ...     @once
-    ...     def area(self):
-    ...         print("worked out")
-    ...         return self.side**2
-    >>> square = Square(3)
-    >>> square.area, square.area
-    worked out
-    (9, 9)
     """
 
     def __init__(self, function: Callable[[Any], T]) -> None:

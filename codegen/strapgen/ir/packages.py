@@ -1,4 +1,4 @@
-"""Code that others bring: where it lies, what it holds, and how its failures are told in one line."""
+"""Code that others bring: its place, its contents, and its failures told in one line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _entry_points(group: str, state: Hashable) -> tuple[metadata.EntryPoint, ...
 
 
 def _state_of_path() -> Hashable:
-    """Return what changes when other packages can be found: the path, the times of its entries, and other finders."""
+    """Return a value that changes with the packages to be found: the path, the times of its entries, other finders."""
     times: list[tuple[str, int | None]] = []
     for entry in sys.path:
         there = Path(entry).absolute()
@@ -86,21 +86,9 @@ def belongs_to(module: str) -> Callable[[Path], bool]:
 
 @contextlib.contextmanager
 def guarded(label: str, duty: str, belongs: Callable[[Path], bool]) -> Iterator[None]:
-    """Run a user's code: a failure becomes one line with its place, and what the code prints goes to stderr.
+    """Run a user's code, which must do its `duty`, such as "return a Kernel", and not end the program.
 
-    Parameters
-    ----------
-    label : str
-        What the line begins with; it names the file, or the line does.
-    duty : str
-        What the code must do and not end the program, such as "return a Kernel".
-    belongs : callable
-        Returns whether a file is the user's; the last line of such a file that ran is the place.
-
-    Raises
-    ------
-    InputError
-        If the code fails.
+    A failure becomes one line, with the last place in a file that `belongs` to the user; prints go to stderr.
     """
     try:
         with contextlib.redirect_stdout(sys.stderr):

@@ -15,26 +15,8 @@ def parameters(
     settings: Mapping[str, Any],
     defaults: Mapping[str, float],
 ) -> dict[str, float]:
-    """Return the parameters that settings state, in SI units.
+    """Return the parameters that settings state, in SI units; `known` has the factor of every key that sets one.
 
-    Parameters
-    ----------
-    what : str
-        What they belong to, for messages: "motion coning".
-    known : mapping of str to mapping of str to float
-        For every parameter the keys that set it, each with its factor to SI units.
-    settings : mapping of str to number
-        Numbers by key; one is needed.
-    defaults : mapping of str to float
-        The values, in SI units, of parameters that may be left out.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown, a parameter is missing or set twice, or a number is not finite.
-
-    Examples
-    --------
     >>> parameters("motion turn", {"z": {"z_deg_s": 0.5, "z_rad_s": 1.0}}, {"z_deg_s": "3"}, {})
     {'z': 1.5}
     """

@@ -23,45 +23,19 @@ class Sensor:
     A count c stands for the angle ``c * count``. Code computes with ``u = c * 2**-fraction``, so that
     ``c * count = scale * u``; the scale is above 1/2 and at most 1.
 
-    Parameters
-    ----------
-    count : Fraction
-        Angle of one count in rad.
-    unit : str
-        That angle in the user's words.
-    stated : str
-        The options of the command line that it follows from.
-
-    Examples
-    --------
     >>> Sensor.of("0.0175dps", Fraction(1, 100)).fraction
     18
     >>> Sensor.of("1/1000rad").scale
     Fraction(64, 125)
     """
 
-    count: Fraction
-    unit: str
-    stated: str
+    count: Fraction  # angle of one count in rad
+    unit: str  # that angle in the user's words
+    stated: str  # the options of the command line that it follows from
 
     @classmethod
     def of(cls, lsb: Any, interval: Fraction | None = None, heard: str = "") -> Sensor:
-        """Return the scale that a user states.
-
-        Parameters
-        ----------
-        lsb : str
-            Rate a count with its unit, "0.0175dps", "17.5mdps" or "3e-4rad/s"; or angle a count, "3e-6rad".
-        interval : Fraction, optional
-            Time of a count in s; a rate needs it.
-        heard : str, optional
-            The options of the command line that the interval follows from.
-
-        Raises
-        ------
-        InputError
-            If it is no number with one of these units, or a rate comes without an interval.
-        """
+        """Return the scale of an lsb: "0.0175dps" or "3e-4rad/s" with the time of a count in s, or "3e-6rad"."""
         text = str(lsb).strip()
         digits, unit = units.split(text)
         name = units.spelled(unit)
@@ -87,7 +61,7 @@ class Sensor:
 
     @property
     def scale(self) -> Fraction:
-        """What that number is multiplied with in exact arithmetic, above 1/2 and at most 1."""
+        """The factor of that number in exact arithmetic, above 1/2 and at most 1."""
         return self.count * Fraction(2) ** self.fraction
 
     @property

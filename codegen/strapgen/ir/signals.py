@@ -159,16 +159,6 @@ class Signal:
 def after(signal: Signal) -> Signal:
     """Return the signal of a state after a call, whose names begin with ``next_``.
 
-    Parameters
-    ----------
-    signal : Signal
-
-    Returns
-    -------
-    Signal
-
-    Examples
-    --------
     >>> after(Signal.vector("sum", "s")).elements
     ('next_s_x', 'next_s_y', 'next_s_z')
     """

@@ -10,21 +10,10 @@ MULTIPLICATIONS = {
 
 
 def signed_digits(value: int, most: int = 0) -> tuple[tuple[int, int], ...]:
-    """Return the canonical signed digits of an integer, of which no two are neighbours, the largest first.
+    """Return the canonical signed digits of an integer, of which no two are neighbours: the `most` largest, 0 for all.
 
-    Parameters
-    ----------
-    value : int
-    most : int, optional
-        Digits that are kept, the largest ones; 0 for all.
+    Each has a sign and a power of two.
 
-    Returns
-    -------
-    tuple of (int, int)
-        A sign, 1 or -1, and a power of two for each digit that is not zero.
-
-    Examples
-    --------
     >>> signed_digits(7), signed_digits(-11), signed_digits(1365, 2)
     (((1, 3), (-1, 0)), ((-1, 4), (1, 2), (1, 0)), ((1, 10), (1, 8)))
     """
@@ -42,11 +31,5 @@ def signed_digits(value: int, most: int = 0) -> tuple[tuple[int, int], ...]:
 
 
 def from_digits(digits: tuple[tuple[int, int], ...]) -> int:
-    """Return the integer that digits stand for.
-
-    Examples
-    --------
-    >>> from_digits(signed_digits(-11))
-    -11
-    """
+    """Return the integer that digits stand for."""
     return sum(sign << power for sign, power in digits)

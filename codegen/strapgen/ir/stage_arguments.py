@@ -44,25 +44,8 @@ _TAKERS = {
 
 
 def require(function: str, value: Any, *classes: type) -> None:
-    """Check that an argument has a class that a stage takes.
+    """Refuse an argument of a class that a stage does not take, with the call that makes the right one.
 
-    Parameters
-    ----------
-    function : str
-        Name of the stage, as a user calls it.
-    value : object
-        The argument.
-    *classes : type
-        The classes that the stage takes.
-
-    Raises
-    ------
-    InputTypeError
-        If the argument is of another class; the message names the call that makes the right one.
-
-    Examples
-    --------
-    >>> require("derive", "euler", str)
     >>> require("derive", 3, str)
     Traceback (most recent call last):
         ...
@@ -78,13 +61,7 @@ def require(function: str, value: Any, *classes: type) -> None:
 
 
 def describe(value: Any) -> str:
-    """Return a value in a few words: a short one itself, another one by its class.
-
-    Examples
-    --------
-    >>> describe("euler"), describe(None), describe({})
-    ("'euler'", 'None', 'a dict')
-    """
+    """Return a value in a few words: a short one itself, another one by its class."""
     if value is None or isinstance(value, str | int | float):
         return reprlib.repr(value)
     return _with_article(_stage_class(value))

@@ -92,22 +92,8 @@ SYNONYMS["reference"] = SYNONYMS["backend"]
 
 
 def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
-    """Return the allowed names that were perhaps meant, the likeliest first.
+    """Return the allowed names that were perhaps meant, the likeliest first: at most three, by synonym or by likeness.
 
-    Parameters
-    ----------
-    what : str
-        Kind of the name, by which synonyms are known; any other text where there are none.
-    value : str
-    allowed : iterable of str
-
-    Returns
-    -------
-    list of str
-        At most three.
-
-    Examples
-    --------
     >>> suggestions("algorithm", "Euler parameters", ["dcm", "euler"])
     ['euler']
     >>> suggestions("target", "numpi", ["numpy", "c"])
@@ -126,25 +112,8 @@ def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
 
 
 def unknown(what: str, value: object, allowed: Iterable[str], also: str = "", section: str = "") -> str:
-    """Return the message that a name is not known.
+    """Return the message that a name is not known; `also` and `section` say where others are.
 
-    Parameters
-    ----------
-    what : str
-        Kind of the name.
-    value : object
-    allowed : iterable of str
-    also : str, optional
-        What is allowed beside the names, for instance "a Python file".
-    section : str, optional
-        Section of ``strapgen list`` that shows all names; by default that of the kind.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> unknown("target", "numpi", ["numpy", "c"])
     "target 'numpi' is not known (did you mean numpy?); allowed: numpy, c"
     """
@@ -166,18 +135,12 @@ def shown(value: object) -> str:
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """Return a number with its noun.
-
-    Examples
-    --------
-    >>> counted(1, "row"), counted(2, "row"), counted(2, "entry", "entries")
-    ('1 row', '2 rows', '2 entries')
-    """
+    """Return a number with its noun, in the plural unless it is 1."""
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
 def needed(number: int) -> str:
-    """Return that so many are needed."""
+    """Return "1 is needed", "2 are needed"."""
     return f"{number} {'is' if number == 1 else 'are'} needed"
 
 
@@ -191,8 +154,6 @@ def some(names: Iterable[str]) -> str:
 def alternatives(names: list[str]) -> str:
     """Return names as alternatives in words.
 
-    Examples
-    --------
     >>> alternatives(["rk1", "rk2", "rk3"])
     'rk1, rk2 or rk3'
     """

@@ -1,4 +1,4 @@
-"""Logs how long the generator's stages take, to the logger "strapgen" at level INFO; ``strapgen --verbose`` shows it.
+"""Logs the times of the generator's stages, to the logger "strapgen" at level INFO; ``strapgen --verbose`` shows it.
 
 Each record is one line, and has the fields ``stage``, ``what`` and ``seconds`` for programs that read the log.
 """
@@ -15,15 +15,7 @@ LOGGER = logging.getLogger("strapgen")
 
 @contextmanager
 def timed(stage: str, what: str) -> Iterator[None]:
-    """Log how long the block takes; a block that raises logs nothing.
-
-    Parameters
-    ----------
-    stage : str
-        The stage: "derive", "lower", "quantize", "generate", "compile" or "build".
-    what : str
-        What it works on, for instance a kernel and a target.
-    """
+    """Log the time of a block, unless it raises."""
     start = time.perf_counter()
     yield
     seconds = time.perf_counter() - start

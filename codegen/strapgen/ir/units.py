@@ -53,8 +53,6 @@ _SPELLINGS = {
 def split(text: str) -> tuple[str, str]:
     """Return the number and the unit of a quantity, as texts.
 
-    Examples
-    --------
     >>> split("17.5mdps"), split("3e-4 rad/s"), split("1/1000rad")
     (('17.5', 'mdps'), ('3e-4', 'rad/s'), ('1/1000', 'rad'))
     """
@@ -65,8 +63,6 @@ def split(text: str) -> tuple[str, str]:
 def spelled(text: str) -> str:
     """Return a unit in one spelling; an unknown one as it is, simplified.
 
-    Examples
-    --------
     >>> [spelled(text) for text in ("rad s^-1", "°/s", "dps", "deg/sec", "µs", "m/s²")]
     ['rad/s', 'deg/s', 'deg/s', 'deg/s', 'us', 'm/s^2']
     """

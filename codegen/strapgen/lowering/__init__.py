@@ -30,25 +30,6 @@ _MANY_ELEMENTS = 400
 def lower(kernel: Kernel) -> Program:
     """Turn a kernel into straight-line code; of several candidates the one with the fewest operations.
 
-    Parameters
-    ----------
-    kernel : Kernel
-
-    Returns
-    -------
-    Program
-        With the inputs, outputs and transition of the kernel, in its units and frames, and with the programs of the
-        kernels that it brings.
-
-    Raises
-    ------
-    NotImplementedError
-        If an expression uses a function for which programs have no operation.
-    ArithmeticError
-        If a canonical form differs from the transition it was derived from.
-
-    Examples
-    --------
     >>> from strapgen import derive
     >>> program = lower(derive("euler", method="rk4", increments=2))
     >>> program.operations["multiply"], program.operations["add"]
@@ -69,20 +50,10 @@ def lower(kernel: Kernel) -> Program:
 
 
 def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]:
-    """Yield programs for a kernel on which no pass has run yet.
+    """Yield programs for a kernel on which no pass has run yet; without a core, of the formulas as they stand.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    core : Core or None
-        The kernel's transition for canonical forms; None for programs of the formulas as they stand.
-
-    Yields
-    ------
-    Program
-        First the formulas with common subexpressions shared; then the formulas without sharing if there is no core,
-        otherwise one program for each canonical form. Without a core, formulas of many elements are not shared: they
-        stand in small stages already, and the passes find what is common to them in less time and operations.
+    The first shares common subexpressions; the others do not, or are one for each canonical form. Formulas of many
+    elements are never shared without a core: they stand in small stages already, and the passes take less time.
     """
     if core is None:
         if sum(stage.signal.size for stage in kernel.stages) < _MANY_ELEMENTS:

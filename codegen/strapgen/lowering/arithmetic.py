@@ -84,30 +84,10 @@ def expanded(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
 
 
 def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
-    """Write a polynomial by Horner's scheme in several variables.
+    """Write a polynomial by Horner's scheme in several variables; `node` returns the node of an atom.
 
     The atom that occurs in most terms is factored out, and both the factor and the remaining terms are treated in the
     same way. In a short polynomial, all atoms that occur equally often are tried and the fewest operations win.
-
-    Parameters
-    ----------
-    polynomial : Polynomial
-        Its atoms can be of any kind that can be ordered.
-    node : callable
-        ``node(atom)`` returns the node that stands for an atom.
-
-    Returns
-    -------
-    Term
-        The sign and the tree of operations.
-
-    Examples
-    --------
-    >>> from strapgen.ir.program import Reference
-    >>> p = {("x", "x"): Fraction(1, 2), ("x", "y"): Fraction(1), (): Fraction(1)}
-    >>> positive, tree = horner(p, Reference)
-    >>> operation_count(tree)
-    4
     """
     seen: dict[frozenset[Any], list[Term]] = {}
 

@@ -31,24 +31,7 @@ _FUNCTIONS = {
 
 
 def gate(kernel: Kernel, shared: Shared) -> Program:
-    """Return the program of a kernel whose common subexpressions have names.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        Its name, inputs, outputs and notes go into the program.
-    shared : Shared
-        Its formulas, from `share`.
-
-    Returns
-    -------
-    Program
-
-    Raises
-    ------
-    NotImplementedError
-        If an expression uses a function, a power or a condition for which programs have no operation.
-    """
+    """Return the program of a kernel from its formulas, whose common subexpressions have names."""
     reserved = {name for signal in kernel.signals for name in signal.elements}
     writer = _Writer(reserved | {definition.symbol.name for definition in shared.definitions})
     for definition in shared.definitions:

@@ -12,7 +12,7 @@ from strapgen.lowering.names import SHARED
 
 
 @dataclass(frozen=True)
-class Definition:
+class _Definition:
     """One line of a computation: ``symbol = expression``."""
 
     symbol: sp.Symbol
@@ -22,38 +22,21 @@ class Definition:
 
 @dataclass(frozen=True)
 class Shared:
-    """A kernel's formulas with every common subexpression named.
+    """A kernel's formulas with every common subexpression named."""
 
-    Parameters
-    ----------
-    definitions : list of Definition
-        Stages, outputs and common subexpressions, each before its first use.
-    values : dict of Symbol to Expr
-        Elements that need no computation: each is a number or another symbol, inside the kernel possibly negated.
-    """
-
-    definitions: list[Definition]
+    definitions: list[_Definition]  # stages, outputs and common subexpressions, each before its first use
+    #: Elements that are numbers or other symbols, inside the kernel possibly negated: they need no computation.
     values: dict[sp.Symbol, sp.Expr]
 
 
 def share(kernel: Kernel, common: bool = True) -> Shared:
-    """Name the common subexpressions of a kernel.
+    """Name the common subexpressions of a kernel, unless its formulas shall stay as they are.
 
     Elements are visited in the order of their names, so that two kernels that differ only in the order in
     which they store a state get the same arithmetic.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    common : bool, optional
-        Whether common subexpressions are named; if not, the formulas stay as they are.
-
-    Returns
-    -------
-    Shared
     """
     values: dict[sp.Symbol, sp.Expr] = {}
-    definitions: list[Definition] = []
+    definitions: list[_Definition] = []
     for stage in (*kernel.stages, *kernel.outputs):
         meaning = stage.signal.meaning
         result = stage in kernel.outputs or stage.signal.name == kernel.transition
@@ -62,7 +45,7 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
             if expression.is_Symbol or expression.is_Rational or (not result and (-expression).is_Symbol):
                 values[symbol] = expression
             else:
-                definitions.append(Definition(symbol, expression, meaning))
+                definitions.append(_Definition(symbol, expression, meaning))
                 meaning = ""
     if not common:
         return Shared(definitions, values)
@@ -74,18 +57,18 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
     conditions = {symbol: expression for symbol, expression in common_parts if expression.is_Relational}
     pending = {s: e.xreplace(conditions) for s, e in common_parts if s not in conditions}
     reduced = [expression.xreplace(conditions) for expression in reduced]
-    ordered: list[Definition] = []
+    ordered: list[_Definition] = []
 
-    def needed(expression: sp.Expr) -> Iterator[Definition]:
+    def needed(expression: sp.Expr) -> Iterator[_Definition]:
         for symbol in sorted(
             expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(SHARED) :])
         ):
             if symbol in pending:
                 definition = pending.pop(symbol)
                 yield from needed(definition)
-                yield Definition(symbol, definition)
+                yield _Definition(symbol, definition)
 
     for definition, expression in zip(definitions, reduced, strict=True):
         ordered.extend(needed(expression))
-        ordered.append(Definition(definition.symbol, expression, definition.meaning))
+        ordered.append(_Definition(definition.symbol, expression, definition.meaning))
     return Shared(ordered, values)

@@ -41,13 +41,7 @@ def system_targets() -> tuple[str, ...]:
 
 
 def require(target: str, settings: Settings | None = None) -> None:
-    """Check that a target exists, and that settings of fixed point go with it.
-
-    Raises
-    ------
-    InputError
-        If the target is unknown or cannot be used, takes no settings, or does not have their word.
-    """
+    """Refuse a target that is unknown or cannot be used, takes no fixed-point settings, or does not have their word."""
     entry = _entry(target)
     if entry.fixed:
         _require_word(entry, (settings or Settings()).word)
@@ -57,25 +51,7 @@ def require(target: str, settings: Settings | None = None) -> None:
 
 
 def emit(program: Program | FixedProgram, target: str) -> Sources:
-    """Print a program as source text.
-
-    Parameters
-    ----------
-    program : Program or FixedProgram
-        A `FixedProgram` for the targets of fixed point, a `Program` for all others.
-    target : str
-        A key of `TARGETS`.
-
-    Returns
-    -------
-    Sources
-
-    Raises
-    ------
-    InputError
-        If the target is unknown, takes the other kind of program, or does not have its word; or if it is an entry
-        point's, and its code fails.
-    """
+    """Print a program as source text: a `FixedProgram` for the targets of fixed point, a `Program` for all others."""
     entry = _entry(target)
     if not isinstance(program, entry.program):
         if entry.fixed:

@@ -1,4 +1,4 @@
-"""Writes in words what headers and docstrings of generated code promise about arguments, ranges and errors."""
+"""Writes in words the contract of generated code on arguments, ranges and errors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def argument_text(argument: Argument) -> str:
 
 
 def _counts_text(argument: Argument, sensor: Sensor) -> str:
-    """Return in words what a count of a gyro is."""
+    """Return the scale of a gyro's counts in words."""
     exact = Fraction(f"{float(sensor.count):.17g}") == sensor.count
     return (
         f"counts of the gyro in {argument.format.word} bits; 1 count = {float(sensor.count):.{7 if exact else 17}g} "
@@ -105,21 +105,7 @@ def accumulation_text(accumulation: RoundingAccumulation, program: Program, stat
 
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
-    """Return in words how often the state of a step is normalized, and what to do after an error code.
-
-    Parameters
-    ----------
-    program : Program
-    interface : Interface, optional
-        That of fixed-point code.
-    target : str, optional
-        Name of the target.
-
-    Returns
-    -------
-    str
-        "" for a kernel that is no step.
-    """
+    """Return how to normalize the state of a step, and what to do after an error code; "" for another kernel."""
     if program.companions is None or program.companions.orthonormalize is None:
         return ""
     kernel = program.companions.orthonormalize

@@ -29,30 +29,14 @@ _KINDS = ("strapgen", "digest", "function", "requires", "otherwise", "let", "ens
 
 @dataclass(frozen=True)
 class Contract:
-    r"""The contract of a generated function.
+    """The contract of a generated function."""
 
-    Parameters
-    ----------
-    version : str
-        Version of strapgen.
-    digest : str
-        Hash of the command, of the requirements and of the formulas.
-    function : str
-        Name of the function.
-    items : tuple of (str, str)
-        Kind and text of the lines "requires", "otherwise", "let" and "ensures", in order.
-
-    Examples
-    --------
-    >>> contract = Contract("0.1.0", "00ff", "half", (("requires", "0 <= x[0] <= 4"), ("ensures", "y = x[0] / 2")))
-    >>> Contract.read("/* " + HEAD + "\n * " + "\n * ".join(contract.lines()) + "\n */") == contract
-    True
-    """
-
-    version: str
-    digest: str
+    version: str  # of strapgen
+    digest: str  # hash of the command, of the requirements and of the formulas
     function: str
-    items: tuple[tuple[str, str], ...]
+    items: tuple[
+        tuple[str, str], ...
+    ]  # kind and text of the lines "requires", "otherwise", "let" and "ensures"
 
     #: The sentence that begins it in a header.
     head: ClassVar[str] = HEAD
@@ -80,18 +64,7 @@ class Contract:
 
 
 def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[str, str]) -> Contract:
-    """Return the contract of fixed-point code, whose arguments hold integers.
-
-    Parameters
-    ----------
-    fixed : FixedProgram
-    function : str
-        Name of the function in the file.
-    command : str
-        The command that generates it, with all options.
-    memory : mapping of str to str
-        The name of every argument in the file, by its signal's name.
-    """
+    """Return the contract of fixed-point code, whose arguments hold integers under the names of `memory`."""
     interface = fixed.interface
 
     def name(argument: Argument) -> str:
@@ -121,18 +94,9 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
 
 
 def of_program(program: Program, function: str, command: str, rounding: RoundingBounds) -> Contract:
-    """Return the contract of floating-point code: the exact values of its outputs, and how far it is from them.
+    """Return the contract of floating-point code: the exact values of its outputs, and their largest errors.
 
     Where no bound is known, or it depends on values on the way, an output is the exact value, rounded.
-
-    Parameters
-    ----------
-    program : Program
-        With the names that are printed.
-    function, command
-        As for `of_fixed`.
-    rounding : RoundingBounds
-        Its error bounds.
     """
     proved = rounding.errors and not rounding.conditions
     limits = {condition.value: condition.high for condition in rounding.inputs}
@@ -157,7 +121,7 @@ def of_program(program: Program, function: str, command: str, rounding: Rounding
 
 
 def _summand(text: str) -> str:
-    """Return an expression as it stands behind a minus sign."""
+    """Return an expression for the place behind a minus sign."""
     return text if re.fullmatch(r"\w+", text) else f"({text})"
 
 
@@ -204,7 +168,7 @@ def _results(program: Program) -> list[list[str]]:
 
 
 def _unit(argument: Argument) -> str:
-    """Return what turns an integer into the number that it stands for."""
+    """Return the factor from an integer to the number that it stands for."""
     fraction = argument.format.fraction
     if argument.sensor is not None:
         return f" * {_LinePrinter().constant(argument.sensor.count)}"

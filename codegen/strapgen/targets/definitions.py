@@ -18,16 +18,13 @@ _IDENTITY = "the state of zero rotation"
 
 @dataclass(frozen=True)
 class Macro:
-    """A name that a header defines, its value as C text, and what it is.
-
-    The type is that of C, "" for the floating-point type of the file; the size is 0 for a single number.
-    """
+    """A name that a header defines."""
 
     name: str
-    value: str
+    value: str  # C text
     meaning: str
-    type: str = ""
-    size: int = 0
+    type: str = ""  # of C; "" for the floating-point type of the file
+    size: int = 0  # that of an array; 0 for a number
 
 
 def of_fixed(fixed: FixedProgram, function: str, literal: Callable[..., str] | None = None) -> list[Macro]:
@@ -69,8 +66,6 @@ def of_program(program: Program, function: str, printer: Printer) -> list[Macro]
 def word_literal(value: int, bits: int, signed: bool = True) -> str:
     """Return an integer as a constant of C that has at least so many bits on every machine.
 
-    Examples
-    --------
     >>> word_literal(-5, 16), word_literal(-(2**31), 32)
     ('-INT16_C(5)', '(-INT32_C(2147483647) - 1)')
     """

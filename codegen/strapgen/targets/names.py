@@ -53,21 +53,11 @@ _IDENTIFIER = re.compile(rf"(?<![\w.])[A-Za-z_{_MARK}]\w*")
 
 @dataclass(frozen=True)
 class Language:
-    """The rules of a language for names.
+    """The rules of a language for names."""
 
-    Parameters
-    ----------
-    allows : callable
-        Returns whether an identifier can name a quantity.
-    scopes : callable
-        Returns the identifiers of each scope of some files.
-    most : int, optional
-        Characters of a value's name above which words in it are abbreviated; None for never.
-    """
-
-    allows: Callable[[str], bool]
-    scopes: Callable[[Iterable[str]], list[set[str]]]
-    most: int | None = None
+    allows: Callable[[str], bool]  # tells whether an identifier can name a quantity
+    scopes: Callable[[Iterable[str]], list[set[str]]]  # returns the identifiers of each scope of some files
+    most: int | None = None  # characters of a value's name above which words in it are abbreviated
 
 
 def _c_allows(name: str) -> bool:
@@ -172,15 +162,6 @@ def external(name: str, ending: str = "") -> str:
 
     A name that has a short word itself, and could be what a longer name is shortened to, is marked.
 
-    Parameters
-    ----------
-    name : str
-        Name of the kernel, with underscores.
-    ending : str, optional
-        What the target puts behind it.
-
-    Examples
-    --------
     >>> external("euler_rk4_2"), external("hypot"), external("dcm_orthonormalize_optimal", "_float")
     ('euler_rk4_2', 'hypot_Kernel', 'dcm_orth_optimal_float')
     >>> external("dcm_orth_optimal"), external("mrp_norm")
@@ -196,30 +177,17 @@ def external(name: str, ending: str = "") -> str:
 
 
 def function_name(program: Program, ending: str = "") -> str:
-    """Return the name of a program's function in C: what the user chose, or else `external`."""
+    """Return the name of a program's function in C: that chosen by the user, or else `external`."""
     default = external(program.name, ending)
     return program.function.format(default) if program.function else default
 
 
 @dataclass(frozen=True)
 class Naming:
-    """A name that the user chooses for a function in C and for its files.
+    """The name that the user chooses for a function in C and for its files."""
 
-    Parameters
-    ----------
-    name : str or None
-        The whole name.
-    prefix : str or None
-        What the target's name has in front.
-
-    Raises
-    ------
-    InputError
-        If both are chosen, or one is no name.
-    """
-
-    name: str | None = None
-    prefix: str | None = None
+    name: str | None = None  # the whole name
+    prefix: str | None = None  # in front of the target's name
 
     def __post_init__(self) -> None:
         if self.name is not None and self.prefix is not None:
@@ -239,13 +207,7 @@ class Naming:
         return self.name or self.prefix or ""
 
     def of(self, program: Program) -> Program:
-        """Return a program with the name.
-
-        Raises
-        ------
-        InputError
-            If the name is too long, or C, C++ or the C library has it.
-        """
+        """Return a program with the name."""
         if not self.option:
             return program
         chosen = replace(
@@ -275,20 +237,8 @@ def printed(
 ) -> tuple[_P, dict[str, str]]:
     """Print a program with names that collide neither with the language nor with the template.
 
-    Parameters
-    ----------
-    program : Program or FixedProgram
-    text : callable
-        ``text(program, names)`` prints a program into files; `names` has the kernel's name of every changed one.
-    language : Language
-    joined : iterable of str
-        Signals that have one name with their only element.
-
-    Returns
-    -------
-    program : Program or FixedProgram
-        With the names that are printed.
-    files : dict of str to str
+    `text` prints the files of a renamed program; it gets the kernel's name of every changed one. Signals that are
+    `joined` have one name with their only element.
     """
     from strapgen.targets.renaming import keys, renamed  # what is in the cache is printed already
 

@@ -34,7 +34,7 @@ RESERVED = ("interface.json", "manifest.json")
 
 @dataclass(frozen=True)
 class Target:
-    """A kind of code: how it is printed, and what others ask of it.
+    """A kind of code: its printer, and the properties that others ask of it.
 
     Parameters
     ----------
@@ -211,13 +211,7 @@ def identity(name: str) -> str:
 
 
 def run(name: str, program: Program | FixedProgram) -> Sources:
-    """Return a program as a target prints it.
-
-    Raises
-    ------
-    InputError
-        If the code of an entry point fails, or returns something else; the message names it.
-    """
+    """Return a program as a target prints it; an InputError names an entry point whose code fails."""
     function = TARGETS[name].function
     if name in BUILT_IN:
         return function()(program, name)
@@ -256,7 +250,7 @@ def _label(point: EntryPoint) -> str:
 def _loaded(point: EntryPoint) -> tuple[Target, str]:
     """Return the target of an entry point and the hash of its code as it is when it is imported.
 
-    The code is all files of its package, the version of its distribution, and what else that installed.
+    The code is all files of its package, the version of its distribution, and all else that this installed.
     """
     label = f"target {_label(point)}"
     if not point.pattern.match(point.value):

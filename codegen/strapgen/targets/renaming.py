@@ -33,14 +33,7 @@ class Key(NamedTuple):
 
 
 def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Key]:
-    """Return the named parts of a program, each once: the function, signals, then values.
-
-    Parameters
-    ----------
-    program : Program or FixedProgram
-    joined : iterable of str
-        Signals that share their name with their only element.
-    """
+    """Return the named parts of a program, each once: the function, signals but those joined to an element, values."""
     plain = program if isinstance(program, Program) else program.program
     signals = [*plain.inputs, *(result.signal for result in plain.results)]
     names = [Key("function", plain.name)]
@@ -55,16 +48,7 @@ def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Ke
 
 
 def renamed(program: _P, names: Mapping[Key, str], joined: Iterable[str] = ()) -> _P:
-    """Return a program with other names.
-
-    Parameters
-    ----------
-    program : Program or FixedProgram
-    names : mapping of Key to str
-        Names by what they stand for; a name that is missing stays.
-    joined : iterable of str
-        As for `keys`.
-    """
+    """Return a program with other names; a part that has none keeps its own."""
     work = _Renaming(names, frozenset(joined))
     return work.program(program) if isinstance(program, Program) else work.fixed(program)
 

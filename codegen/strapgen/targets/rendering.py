@@ -22,18 +22,7 @@ PROPAGATE = ("size_t runs", "size_t steps", "size_t record_every", "size_t ortho
 
 @cache
 def environment(folder: Path | None = None) -> jinja2.Environment:
-    """Return the environment of templates.
-
-    Parameters
-    ----------
-    folder : Path, optional
-        Folder of the templates; by default `templates/`. A package that brings a target has one of its own.
-
-    Returns
-    -------
-    jinja2.Environment
-        With the filters that the templates of all targets share; an undefined name is an error.
-    """
+    """Return the environment of the templates in a folder, by default `templates/`."""
     import jinja2  # what only reads sources from the cache does without it
 
     shared = jinja2.Environment(
@@ -66,22 +55,7 @@ def render(template: str, **values: Any) -> str:
 
 
 def render_c(folder: str, name: str, **values: Any) -> dict[str, str]:
-    """Return the files of a function in C: the function alone, then its loops over samples and runs.
-
-    Parameters
-    ----------
-    folder : str
-        Folder of the templates.
-    name : str
-        Name of the function.
-    **values
-        What the templates are filled with.
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name; `runs_of` names those of the loops.
-    """
+    """Return the files of a function in C: the function alone, then its loops over samples and runs."""
     files = {f"{name}.h": "header.h", f"{name}.c": "source.c"} | dict(
         zip(runs_of(name), ("runs.h", "runs.c"), strict=True)
     )

@@ -1,4 +1,4 @@
-"""Writes in words what a header promises about the rounding of a run: a formula in its steps, and examples."""
+"""Writes a header's bound of the rounding of a run in words: a formula in its steps, and examples."""
 
 from __future__ import annotations
 
@@ -22,13 +22,7 @@ _UNITS = 4
 
 
 def run_paragraphs(interface: Interface, program: Program) -> list[str]:
-    """Return the bound of a run of N steps in words, and for some N; empty for a kernel that is no step.
-
-    Parameters
-    ----------
-    interface : Interface
-    program : Program
-    """
+    """Return the bound of a run of N steps in words, and for some N; empty for a kernel that is no step."""
     angles = interface.angle_accumulation
     if angles is not None:
         is_matrix = len(program.inputs[0].shape) == 2

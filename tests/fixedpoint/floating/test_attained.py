@@ -10,10 +10,10 @@ from gathering import each
 from small_programs import EXACT, node, program
 
 from strapgen.fixedpoint.floating import rounding_bounds
-from strapgen.fixedpoint.floating.errors import ComputedNumber, ComputedNumbers, _root, _root_share
+from strapgen.fixedpoint.floating.errors import ComputedNumbers, _ComputedNumber, _root_share
 from strapgen.fixedpoint.floating.expressions import Expression, Expressions
 from strapgen.fixedpoint.floating.number_formats import NUMBERS, NumberFormat, exponent
-from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.intervals import Interval, root
 from strapgen.ir.program import Operation, Program
 
 FLOAT = NUMBERS["float"]
@@ -200,7 +200,7 @@ def relative(kind: str, ranges: list[Interval], rounding: Fraction) -> tuple[Fra
     numbers = ComputedNumbers(Expressions(), ranges, COARSE)
     for (share, rest), largest, known in zip(PAIRS, LARGEST, ranges, strict=True):
         numbers.items.append(
-            ComputedNumber(known, share * largest + rest, Fraction(0), relative=(share, rest))
+            _ComputedNumber(known, share * largest + rest, Fraction(0), relative=(share, rest))
         )
     return numbers._relative(2, expression, rounding)
 
@@ -240,5 +240,5 @@ def test_the_relative_error_of_a_literal_is_all_of_it():
 def test_a_root_is_off_by_no_larger_share_than_its_bound(share):
     """The largest change of a root is that of a smaller radicand: 1 - root(1 - share)."""
     assert (1 - _root_share(share)) ** 2 <= 1 - share
-    assert _root_share(share) <= Fraction(5, 4) * (1 - _root(1 - share)) if share <= Fraction(1, 4) else True
-    assert _root(share) ** 2 >= share
+    assert _root_share(share) <= Fraction(5, 4) * (1 - root(1 - share)) if share <= Fraction(1, 4) else True
+    assert root(share) ** 2 >= share

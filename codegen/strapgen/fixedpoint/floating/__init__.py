@@ -1,4 +1,4 @@
-"""`rounding_bounds` proves how far generated floating-point code is from exact arithmetic."""
+"""`rounding_bounds` bounds the distance of generated floating-point code from exact arithmetic."""
 
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
 

@@ -12,11 +12,10 @@ from functools import lru_cache
 
 from strapgen.fixedpoint.floating import proved
 from strapgen.fixedpoint.floating.errors import ComputedNumbers
-from strapgen.fixedpoint.floating.expressions import Expressions
-from strapgen.fixedpoint.floating.no_bound import NoBoundError
+from strapgen.fixedpoint.floating.expressions import Expressions, NoBoundError
 from strapgen.fixedpoint.floating.number_formats import NUMBERS
 from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
-from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.intervals import Interval, norm
 from strapgen.fixedpoint.limits import largest_magnitude
 from strapgen.fixedpoint.terms import up
 from strapgen.ir import checks
@@ -30,7 +29,7 @@ _LIBRARY = {"sin": "sin", "cos": "cos", "sinc": "sin"}
 
 
 class _Analysis:
-    """What the two types of numbers share: the exact program."""
+    """The exact ranges, conditions and derivatives of a program, which both types of numbers share."""
 
     def __init__(self, program: Program, limits: tuple[tuple[str, Fraction], ...]) -> None:
         largest = dict(limits)
@@ -48,7 +47,7 @@ class _Analysis:
         self._moves: dict[tuple[str, tuple[int, ...]], list[dict[int, Fraction]]] = {}
 
     def moves(self, result: Result, held: Collection[int] = ()) -> list[dict[int, Fraction]]:
-        """Return for every element of a result how far it moves with every operation, see `sensitivities`."""
+        """Return for every element of a result its `sensitivities` to all operations."""
         key = result.signal.name, tuple(held)
         if key not in self._moves:
             places = self.expressions.results[result.signal.name]
@@ -72,7 +71,7 @@ def _analysis(program: Program, limits: tuple[tuple[str, Fraction], ...]) -> _An
 def rounding_bounds(
     program: Program, number: str = "double", settings: Settings | None = None
 ) -> RoundingBounds:
-    """Bound how far generated C in floating point is from exact arithmetic on the same inputs.
+    """Bound the distance of generated C in floating point from exact arithmetic on the same inputs.
 
     The bounds hold for the operations in the order in which the targets `c` and `c-float` print them, with literals
     rounded to the nearest number, in arithmetic of IEEE 754 without contraction (``-ffp-contract=off``).
@@ -84,13 +83,13 @@ def rounding_bounds(
         Type of the numbers: "double" or "float".
     settings : Settings, optional
         States the largest angle increment in rad, the allowance by which an element of a state may exceed 1, and ranges
-        of other inputs; what else it has does not count. By default 1/8 rad and 1/16.
+        of other inputs; its other fields do not count. By default 1/8 rad and 1/16.
 
     Returns
     -------
     RoundingBounds
         With `errors` for every element of every output, in the unit of the output. They are empty where no bound is
-        known, and `reason` says why; where numpy is missing, nothing is known but what `proved.load` was told.
+        known, and `reason` says why; where numpy is missing, only bounds given to `proved.load` are known.
 
     Raises
     ------
@@ -167,7 +166,7 @@ def _has_numpy() -> bool:
 
 
 def _left_out(program: Program, analysis: _Analysis) -> Fraction | None:
-    """Return a bound of what the transition leaves out of a series; None where it is not known."""
+    """Return a bound of the truncation error of the transition's series; None where it is not known."""
     if program.companions is None or program.companions.truncation is None:
         return Fraction(0)
     truncation = program.companions.truncation
@@ -176,7 +175,7 @@ def _left_out(program: Program, analysis: _Analysis) -> Fraction | None:
 
 
 def _errors(moves: Iterable[Mapping[int, Fraction]], added: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Return the error bound of every element of a result from what every operation adds to it."""
+    """Return the error bound of every element of a result from those that every operation adds."""
     return tuple(up(sum((move * added[k] for k, move in element.items()), Fraction(0))) for element in moves)
 
 
@@ -187,7 +186,7 @@ def _library_functions(program: Program) -> tuple[str, ...]:
 
 
 def _step_rounding(program: Program, analysis: _Analysis, added: Sequence[Fraction]) -> StepRounding | None:
-    """Return what a call of an attitude step adds to the error of a run; None for other kernels."""
+    """Return the errors that a call of an attitude step adds to a run; None for other kernels."""
     transition = program.transition
     if program.companions is None or transition is None or len(program.outputs) > 1:
         return None
@@ -206,24 +205,19 @@ def _step_rounding(program: Program, analysis: _Analysis, added: Sequence[Fracti
 def _accumulation(
     program: Program, largest: Mapping[str, Fraction], step: StepRounding, errors: Sequence[Fraction]
 ) -> RoundingAccumulation:
-    """Return how the errors of an attitude step add up: each call adds its error, and stretches that before it.
+    """Return the accumulation of an attitude step's errors: each call adds its error, and stretches that before it.
 
     Lengths are those of a state, or of a row of a matrix.
     """
     state, transition = program.inputs[0], program.transition
     assert transition is not None
     width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
-    length = largest[state.name] * _length([Fraction(1)] * width)
+    length = largest[state.name] * norm([Fraction(1)] * width)
     rows = range(0, state.size, width)
-    whole = max(_length(errors[k : k + width]) for k in rows)
-    parts = max(_length(step.local[k : k + width]) for k in rows) + length * _length(step.transition)
+    whole = max(norm(errors[k : k + width]) for k in rows)
+    parts = max(norm(step.local[k : k + width]) for k in rows) + length * norm(step.transition)
     sizes = tuple(largest[signal.name] for signal in program.inputs[1:] for _ in signal.elements)
     from strapgen.fixedpoint.runs.accumulation import transition_growth
 
-    growth = transition_growth(program, transition, sizes, width, 1 + _length(step.away))
+    growth = transition_growth(program, transition, sizes, width, 1 + norm(step.away))
     return RoundingAccumulation(Fraction(0), up(min(whole, parts)), Fraction(0), growth)
-
-
-def _length(values: Sequence[Fraction]) -> Fraction:
-    """Return a length that is not below that of a vector."""
-    return Interval.of(sum((value * value for value in values), Fraction(0))).sqrt().highest

@@ -1,4 +1,4 @@
-"""Bounds what the generated code computes: ranges of the computed numbers, the rounding of every operation, its error.
+"""Bounds the computed numbers of generated code: their ranges, the rounding of every operation, its error.
 
 The error e of an operation f on operands with errors obeys e = f' e_operands + q + r at the exact values: r is its
 rounding, and q, of second order, is what the derivative f' leaves out. Only r and q are new at an operation.
@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions
-from strapgen.fixedpoint.floating.no_bound import NoBoundError
+from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions, NoBoundError
 from strapgen.fixedpoint.floating.number_formats import NumberFormat, exponent
 from strapgen.fixedpoint.floating.sensitivities import sinc_slope
-from strapgen.fixedpoint.intervals import GRID, Interval, maximum
+from strapgen.fixedpoint.intervals import GRID, Interval, maximum, root
 from strapgen.fixedpoint.quantities import is_power_of_two
 from strapgen.fixedpoint.terms import up
 
@@ -22,61 +21,36 @@ _ZERO = Fraction(0)
 
 
 @dataclass(frozen=True)
-class ComputedNumber:
-    """What the code computes for an operation.
+class _ComputedNumber:
+    """The number that the code computes for an operation."""
 
-    Parameters
-    ----------
-    range : Interval
-        Range of the computed number.
-    error : Fraction
-        Bound of its distance from the exact value.
-    added : Fraction
-        The part of the error that is new here: the rounding, and what is of second order in the errors of operands.
-    places : int or None
-        The exponent of a power of two of which the number is a multiple, if one is known.
-    relative : tuple of Fraction or None
-        Bounds a and b of the distance, as a times the exact value plus b, if it is known so.
-    """
-
-    range: Interval
-    error: Fraction
+    range: Interval  # range of the computed number
+    error: Fraction  # bound of its distance from the exact value
+    #: The part of the error that is new here: the rounding, and what is of second order in the errors of operands.
     added: Fraction
+    #: The exponent of a power of two of which the number is a multiple, if one is known.
     places: int | None = None
+    #: Bounds a and b of the distance, as a times the exact value plus b, if it is known so.
     relative: tuple[Fraction, Fraction] | None = None
 
 
 @dataclass
 class ComputedNumbers:
-    """What the code computes for all operations of a program.
-
-    Parameters
-    ----------
-    expressions : Expressions
-    ranges : sequence of Interval
-        Exact range of every operation.
-    number : NumberFormat
-
-    Raises
-    ------
-    NoBoundError
-        If a comparison may turn out otherwise than in exact arithmetic, or a number may overflow or leave the domain
-        of an operation.
-    """
+    """The computed numbers of all operations; NoBoundError where one may overflow, or a comparison may turn."""
 
     expressions: Expressions
-    ranges: Sequence[Interval]
+    ranges: Sequence[Interval]  # exact range of every operation
     number: NumberFormat
-    items: list[ComputedNumber] = field(default_factory=list)
+    items: list[_ComputedNumber] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         for place, expression in enumerate(self.expressions.items):
             self.items.append(self._computed(place, expression))
 
-    def _computed(self, place: int, expression: Expression) -> ComputedNumber:
+    def _computed(self, place: int, expression: Expression) -> _ComputedNumber:
         exact = self.ranges[place]
         if expression.kind == INPUT:
-            return ComputedNumber(exact, _ZERO, _ZERO, relative=(_ZERO, _ZERO))
+            return _ComputedNumber(exact, _ZERO, _ZERO, relative=(_ZERO, _ZERO))
         if expression.kind == CONSTANT:
             return self._literal(expression.value)
         carried, second = self._propagated(place, expression)
@@ -85,7 +59,7 @@ class ComputedNumbers:
         after = before.widened(rounding).meet(self._rounded(before, expression.kind))
         if after.magnitude >= Fraction(2) ** self.number.overflow:
             raise NoBoundError(f"{self.expressions.labels[place]} may overflow")
-        return ComputedNumber(
+        return _ComputedNumber(
             after,
             up(carried + rounding),
             up(second + rounding),
@@ -93,16 +67,16 @@ class ComputedNumbers:
             self._relative(place, expression, rounding),
         )
 
-    def _literal(self, value: Fraction) -> ComputedNumber:
+    def _literal(self, value: Fraction) -> _ComputedNumber:
         near = self.number.rounded(value)
         error = up(abs(near - value))
         relative = (error / value, _ZERO) if value > 0 else None
-        return ComputedNumber(Interval.of(near), error, error, _lowest_bit(near), relative)
+        return _ComputedNumber(Interval.of(near), error, error, _lowest_bit(near), relative)
 
     # Errors of operands
 
     def _propagated(self, place: int, expression: Expression) -> tuple[Fraction, Fraction]:
-        """Return what the errors of the operands make of an operation: all of it, and the part of second order."""
+        """Return the error that those of the operands make in an operation, and its part of second order."""
         operands = [self.items[k] for k in expression.arguments]
         errors = [operand.error for operand in operands]
         match expression.kind:
@@ -151,32 +125,24 @@ class ComputedNumbers:
                 up(error / (least + computed)),
                 up(error * error / (2 * least * (least + computed) ** 2)),
             )
-        error = _root(radicand.error)
+        error = root(radicand.error)
         if radicand.relative is not None:
             share, rest = radicand.relative
-            error = min(error, up(_root_share(share) * exact.magnitude) + _root(rest))
+            error = min(error, up(_root_share(share) * exact.magnitude) + root(rest))
         return error, error
 
     def _check_comparison(self, condition: int, place: int) -> None:
-        """Refuse a comparison that rounding may turn.
-
-        Raises
-        ------
-        NoBoundError
-        """
+        """Refuse a comparison that rounding may turn."""
         expression = self.expressions.items[condition]
         if expression.kind == "at_least":
             left, right = (self.items[k] for k in expression.arguments)
             if not left.error and not right.error:
                 return
-            low, high = left.range - right.range, self._exact_difference(expression)
-            if min(low.low, high.low) >= 0 or max(low.high, high.high) < 0:
+            exact_left, exact_right = (self.ranges[k] for k in expression.arguments)
+            computed, exact = left.range - right.range, exact_left - exact_right
+            if min(computed.low, exact.low) >= 0 or max(computed.high, exact.high) < 0:
                 return
         raise NoBoundError(f"rounding may turn a comparison in {self.expressions.labels[place]}")
-
-    def _exact_difference(self, expression: Expression) -> Interval:
-        left, right = (self.ranges[k] for k in expression.arguments)
-        return left - right
 
     # Rounding
 
@@ -268,7 +234,7 @@ class ComputedNumbers:
     def _relative(
         self, place: int, expression: Expression, rounding: Fraction
     ) -> tuple[Fraction, Fraction] | None:
-        """Return the bounds of the error relative to the exact value, for products and sums of what is not negative."""
+        """Return bounds of the error relative to the exact value, for products and sums of no negative numbers."""
         known = [self.items[k].relative for k in expression.arguments]
         if any(pair is None for pair in known) or expression.kind not in ("multiply", "add"):
             return None
@@ -301,11 +267,6 @@ def _least_magnitude(interval: Interval) -> Fraction:
     return Fraction(min(abs(interval.low), abs(interval.high)), 1 << GRID)
 
 
-def _root(value: Fraction) -> Fraction:
-    """Return a number that is not below a square root."""
-    return Interval.of(value).sqrt().highest
-
-
 def _root_share(share: Fraction) -> Fraction:
-    """Return a bound of the relative error of a root, from that of what is under it, which is at most 1/2."""
+    """Return a bound of the relative error of a root, from that of its radicand, which is at most 1/2."""
     return share / 2 + share * share / 2 if share <= Fraction(1, 2) else share

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.fixedpoint.derivation_context import samples
-from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions
-from strapgen.fixedpoint.floating.no_bound import NoBoundError
+from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions, NoBoundError
 from strapgen.fixedpoint.floating.number_formats import exponent
 from strapgen.fixedpoint.intervals import Interval, maximum
 from strapgen.fixedpoint.quantities import Definition, InputElement, Maximum, Quantity, Sum, Terms, combined
@@ -48,25 +47,11 @@ _SUMS = ("add", "subtract", "multiply", "negate")
 
 @dataclass
 class ExactRanges:
-    """The range of every operation.
-
-    Parameters
-    ----------
-    program : Program
-    expressions : Expressions
-        Its operations.
-    box : mapping of str to Interval
-        Range of every element of an input.
-
-    Raises
-    ------
-    NoBoundError
-        If an operation is not defined everywhere in the box, or jumps.
-    """
+    """The range of every operation; NoBoundError where one is not defined everywhere in the box, or jumps."""
 
     program: Program
     expressions: Expressions
-    box: Mapping[str, Interval]
+    box: Mapping[str, Interval]  # range of every element of an input
     ranges: list[Interval] = field(default_factory=list)
     conditions: list[Condition] = field(default_factory=list)
 

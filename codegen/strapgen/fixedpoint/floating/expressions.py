@@ -13,47 +13,31 @@ from strapgen.ir.program import RESOLUTION, Constant, Node, Program, Reference
 INPUT, CONSTANT = "input", "constant"
 
 
+class NoBoundError(Exception):
+    """No bound of the rounding can be proved; the text says why."""
+
+
 @dataclass(frozen=True)
 class Expression:
-    """A single operation, a literal or an element of an input.
+    """A single operation, a literal or an element of an input."""
 
-    Parameters
-    ----------
-    kind : str
-        An operation of `strapgen.ir.program.OPERATIONS`, `INPUT` or `CONSTANT`.
-    arguments : tuple of int
-        Places of the operands.
-    name : str
-        Name of an element of an input.
-    value : Fraction
-        Value of a literal.
-    """
-
-    kind: str
-    arguments: tuple[int, ...] = ()
-    name: str = ""
-    value: Fraction = Fraction(0)
+    kind: str  # an operation of `strapgen.ir.program.OPERATIONS`, `INPUT` or `CONSTANT`
+    arguments: tuple[int, ...] = ()  # places of the operands
+    name: str = ""  # name of an element of an input
+    value: Fraction = Fraction(0)  # value of a literal
 
 
 @dataclass
 class Expressions:
-    """The operations of a program, each after its operands.
-
-    Parameters
-    ----------
-    items : list of Expression
-    names : dict of str to int
-        Places of the inputs' elements and of what is assigned to a name.
-    labels : dict of int to str
-        The name of the assignment in which an operation stands.
-    results : dict of str to list of int
-        Places of the elements of every result.
-    """
+    """The operations of a program, each after its operands."""
 
     items: list[Expression] = field(default_factory=list)
+    #: Places of the inputs' elements and of what is assigned to a name.
     names: dict[str, int] = field(default_factory=dict)
-    labels: dict[int, str] = field(default_factory=dict)
-    results: dict[str, list[int]] = field(default_factory=dict)
+    labels: dict[int, str] = field(
+        default_factory=dict
+    )  # name of the assignment in which an operation stands
+    results: dict[str, list[int]] = field(default_factory=dict)  # places of the elements of every result
     _places: dict[Expression, int] = field(default_factory=dict)
 
     @classmethod
@@ -79,7 +63,7 @@ class Expressions:
         return self._place(Expression(node.kind, arguments), label)
 
     def squared(self, place: int) -> list[int]:
-        """Return the places of what an operation is the sum of squares of; none if it is no such sum."""
+        """Return the places of the numbers of whose squares an operation is the sum; none if it is no such sum."""
         expression = self.items[place]
         if expression.kind == "add":
             parts = [self.squared(k) for k in expression.arguments]

@@ -1,4 +1,4 @@
-"""The floating-point formats of generated C, and how far rounding to the nearest can be off in them."""
+"""The floating-point formats of generated C, and their largest errors of rounding to the nearest."""
 
 from __future__ import annotations
 
@@ -13,24 +13,13 @@ from strapgen.fixedpoint.terms import binary
 class NumberFormat:
     """A binary floating-point format of IEEE 754.
 
-    Parameters
-    ----------
-    precision : int
-        Bits of the significand, the leading one included.
-    smallest : int
-        Exponent of the smallest positive number: 2**smallest.
-    overflow : int
-        Exponent of the power of two that all numbers are below.
-
-    Examples
-    --------
     >>> NUMBERS["float"].rounded(Fraction(1, 3)) * 2**25
     Fraction(11184811, 1)
     """
 
-    precision: int
-    smallest: int
-    overflow: int
+    precision: int  # bits of the significand, the leading one included
+    smallest: int  # exponent of the smallest positive number: 2**smallest
+    overflow: int  # exponent of the power of two that all numbers are below
 
     @property
     def unit(self) -> Fraction:
@@ -55,8 +44,6 @@ class NumberFormat:
 
         Just above a power of two no number is farther from the nearest one than from that power.
 
-        Examples
-        --------
         >>> NUMBERS["double"].half_ulp(Fraction(1)) * 2**54
         Fraction(1, 1)
         """
@@ -83,8 +70,6 @@ NUMBERS = {"double": NumberFormat(53, -1074, 1024), "float": NumberFormat(24, -1
 def exponent(value: Fraction) -> int:
     """Return the exponent of the largest power of two that is not above a positive number.
 
-    Examples
-    --------
     >>> exponent(Fraction(5, 16)), exponent(Fraction(8))
     (-2, 3)
     """

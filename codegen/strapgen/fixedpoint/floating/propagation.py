@@ -1,4 +1,4 @@
-"""Bounds how far the results of a program move when its inputs do, anywhere in the box of the inputs."""
+"""Bounds the changes of a program's results when its inputs change, anywhere in the box of the inputs."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
-from strapgen.fixedpoint.floating.expressions import Expression, Expressions
-from strapgen.fixedpoint.floating.no_bound import NoBoundError
+from strapgen.fixedpoint.floating.expressions import Expression, Expressions, NoBoundError
 from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
@@ -18,30 +17,11 @@ from strapgen.ir.program import Program
 def moved(
     program: Program, limits: Mapping[str, Fraction], errors: Mapping[str, tuple[Fraction, ...]]
 ) -> dict[str, tuple[Fraction, ...]]:
-    """Bound how far every output moves when inputs move by at most some errors.
+    """Bound the change of every output when elements of inputs change by at most `errors`, or not at all.
 
-    The bounds hold under the conditions that `rounding_bounds` states for the program, such as a norm near 1.
+    `limits` bound the inputs, changed and not. The bounds hold under the conditions that `rounding_bounds` states for
+    the program, such as a norm near 1.
 
-    Parameters
-    ----------
-    program : Program
-    limits : mapping of str to Fraction
-        Largest magnitude of the elements of every input, with its error and without.
-    errors : mapping of str to tuple of Fraction
-        Errors of the elements of inputs, by the name of the input; those that are exact can be left out.
-
-    Returns
-    -------
-    dict of str to tuple of Fraction
-        For each output a bound for each element.
-
-    Raises
-    ------
-    InputError
-        If there is no bound: a function jumps, an error may turn a comparison, or a divisor may be zero.
-
-    Examples
-    --------
     >>> from strapgen import derive, lower
     >>> product = lower(derive("euler-product"))
     >>> bounds = moved(product, dict.fromkeys(("state", "transition"), Fraction(1)), {"state": (Fraction(1, 100),) * 4})
@@ -85,7 +65,7 @@ def _move(
     place: int,
     errors_at: Mapping[int, Fraction],
 ) -> Fraction:
-    """Return how far an operation moves with the errors of inputs, which are known by their places."""
+    """Return the change of an operation due to the errors of inputs, which are known by their places."""
     moves = sensitivities(expressions, derivatives, place)
     return sum((moves.get(k, Fraction(0)) * error for k, error in errors_at.items()), Fraction(0))
 
@@ -93,14 +73,9 @@ def _move(
 def _with_lengths(
     expressions: Expressions, ranges: Sequence[Interval]
 ) -> tuple[Expressions, list[tuple[Interval, ...]]]:
-    """Return operations and their slopes, where a root that may be zero is the length of what is squared under it.
+    """Return operations and their slopes, where a root that may be zero is the length of the numbers squared under it.
 
     The root has no derivative at zero; a length moves by no more than its parts do.
-
-    Raises
-    ------
-    NoBoundError
-        If what is under such a root is no sum of squares.
     """
     items, derivatives = [*expressions.items], slopes(expressions, ranges)
     for place, item in enumerate(items):
@@ -120,12 +95,7 @@ def _require_settled(
     derivatives: Sequence[tuple[Interval, ...]],
     errors_at: Mapping[int, Fraction],
 ) -> None:
-    """Refuse a comparison that the errors of inputs may turn: another value is selected then.
-
-    Raises
-    ------
-    NoBoundError
-    """
+    """Refuse a comparison that the errors of inputs may turn: another value is selected then."""
     for place, item in enumerate(expressions.items):
         if item.kind != "select":
             continue

@@ -27,12 +27,6 @@ def key(program: Program, number: str) -> str:
 def load(data: Mapping[str, Mapping[str, Any]]) -> None:
     """Add bounds, as `RoundingBounds.as_dict` writes them, by their keys.
 
-    Parameters
-    ----------
-    data : mapping of str to mapping
-
-    Examples
-    --------
     >>> from strapgen import derive, lower, rounding_bounds
     >>> program = lower(derive("euler", method="rk1"))
     >>> load({key(program, "double"): rounding_bounds(program).as_dict()})

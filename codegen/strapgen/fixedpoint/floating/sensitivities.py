@@ -1,4 +1,4 @@
-"""Bounds how far every operation moves a result: derivatives by interval arithmetic over the box of the inputs."""
+"""Bounds the derivatives of results by every operation, in interval arithmetic over the box of the inputs."""
 
 from __future__ import annotations
 
@@ -19,12 +19,6 @@ def slopes(expressions: Expressions, ranges: Sequence[Interval]) -> list[tuple[I
 
     A maximum and a selection move with one operand, or between both. A root that may be zero has the slope 0: its error
     is bounded as a whole.
-
-    Parameters
-    ----------
-    expressions : Expressions
-    ranges : sequence of Interval
-        Exact range of every operation.
     """
     return [
         _slopes(expression, [ranges[k] for k in expression.arguments], ranges[place])
@@ -71,20 +65,10 @@ def sensitivities(
     place: int,
     held: Collection[int] = (),
 ) -> dict[int, Fraction]:
-    """Return by how much one result moves at most when an operation moves by one, for all that it is made from.
+    """Return bounds of the derivatives of one result by all operations that it is made from.
 
     The chain rule is followed back from the result, so that what comes by several ways is added before its magnitude is
-    taken.
-
-    Parameters
-    ----------
-    expressions : Expressions
-    derivatives : sequence of tuple of Interval
-        What `slopes` returned.
-    place : int
-        Place of the result.
-    held : collection of int, optional
-        Places of values that are taken as they are: what leads to them moves the result only by other ways.
+    taken. It stops at the places that are `held`.
     """
     adjoints = {place: _ONE}
     for k in range(place, -1, -1):

@@ -1,1 +1,1 @@
-"""How the errors of one call add up over the steps of a run."""
+"""Accumulation of the errors of single calls over the steps of a run."""

@@ -1,4 +1,4 @@
-"""Bounds how the rounding errors of single steps add up over a run.
+"""Bounds the accumulation of rounding errors over a run.
 
 The computed state obeys x' = x T + x d + r: T the exact transition, d the error of the computed one, r the rounding of
 the state. A step stretches an error by at most the norm of T. With error feedback, what is rounded off in one step is
@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
-from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.intervals import Interval, norm, root
 from strapgen.fixedpoint.quantities import (
     Computed,
-    ErrorPropagation,
     InputElement,
     NearestInteger,
     Quantities,
@@ -36,46 +35,21 @@ _MOST_TERMS = 1000
 
 @dataclass(frozen=True)
 class StepErrors:
-    """What one call adds to the error of a run, element by element.
+    """The errors that one call adds to a run, element by element."""
 
-    Parameters
-    ----------
-    local : tuple of Fraction
-        Error bounds of the elements of the state, less those of the transition and less what is fed back.
-    transition : tuple of Fraction
-        Error bounds of the elements of the transition, less what is fed back.
-    transition_feedback : tuple of Fraction
-        Bounds of what is fed back of the elements of the transition.
-    state_feedback : Fraction
-        Bound of what is fed back of an element of the state.
-    away : tuple of Fraction
-        Bounds of the distance of the transition from the identity.
-    moves : tuple of Fraction
-        How far the elements of the transition move when increments are rounded to their format.
-    saturation : Fraction
-        What a state that saturates loses of an element of 1.
-    """
-
+    #: Error bounds of the elements of the state, less those of the transition and less what is fed back.
     local: tuple[Fraction, ...]
-    transition: tuple[Fraction, ...]
-    transition_feedback: tuple[Fraction, ...]
-    state_feedback: Fraction
-    away: tuple[Fraction, ...]
+    transition: tuple[Fraction, ...]  # error bounds of the elements of the transition, less what is fed back
+    transition_feedback: tuple[Fraction, ...]  # bounds of what is fed back of the elements of the transition
+    state_feedback: Fraction  # bound of what is fed back of an element of the state
+    away: tuple[Fraction, ...]  # bounds of the distance of the transition from the identity
+    #: How far the elements of the transition move when increments are rounded to their format.
     moves: tuple[Fraction, ...]
-    saturation: Fraction = Fraction(0)
+    saturation: Fraction = Fraction(0)  # what a state that saturates loses of an element of 1
 
 
 def step_errors(context: Quantization, transition: Result, result: Argument) -> StepErrors | None:
-    """Return what one call adds to the error of a run; None where it calls more than sums, roots, sines and cosines.
-
-    Parameters
-    ----------
-    context : Quantization
-        The step, with all its values.
-    transition : Result
-    result : Argument
-        The state after the step.
-    """
+    """Return the errors that a call adds to a run; None where it calls more than sums, roots, sines and cosines."""
     quantities = context.quantities
     elements = [name for name in quantities.results[transition.signal.name] if isinstance(name, str)]
     rounded = [context.values[name] for name in elements if name in context.values]
@@ -95,16 +69,9 @@ def step_errors(context: Quantization, transition: Result, result: Argument) -> 
 
 
 def accumulation(context: Quantization, transition: Result, errors: StepErrors) -> RoundingAccumulation:
-    """Return how the errors of a step add up.
+    """Return the accumulation of a step's errors over a run.
 
     Lengths are those of a state, or of a row of a matrix: the norm in which a transition stretches least.
-
-    Parameters
-    ----------
-    context : Quantization
-        The step, with all its values.
-    transition : Result
-    errors : StepErrors
     """
     quantities, state = context.quantities, context.program.inputs[0]
     width = state.size // (state.shape[0] if len(state.shape) == 2 else 1)
@@ -130,15 +97,7 @@ def accumulation(context: Quantization, transition: Result, errors: StepErrors) 
 
 
 def stretch(context: Quantization, transition: Result, width: int) -> Interval | None:
-    """Return bounds of the squared singular values of any transition, less 1; None where none are known.
-
-    Parameters
-    ----------
-    context : Quantization
-    transition : Result
-    width : int
-        Number of elements of a row; of a vector, all.
-    """
+    """Return bounds of the squared singular values, less 1, of a transition with rows of `width`; None if unknown."""
     program, quantities = context.program, context.quantities
     if program.companions is not None and program.companions.isometry:
         return Interval.of(0)
@@ -151,7 +110,7 @@ def stretch(context: Quantization, transition: Result, width: int) -> Interval |
 
 
 def _away(context: Quantization, transition: Result) -> tuple[Fraction, ...]:
-    """Return how far every element of the transition can be from that of the identity."""
+    """Return a bound of the distance of every element of the transition from that of the identity."""
     quantities, kernels = context.quantities, context.program.companions
     identity = kernels.identity if kernels is not None else ()
     distances = []
@@ -175,7 +134,7 @@ def _feedback_rounding(context: Quantization, value: Value) -> Fraction:
 def _local_errors(
     context: Quantization, transition: Sequence[str], result: Argument, saturates: bool
 ) -> tuple[list[Fraction], Fraction]:
-    """Return what the elements of the state lose beside the errors of the transition, and what is fed back of it."""
+    """Return the errors of the state's elements beside those of the transition, and a bound of those fed back."""
     items, values = context.quantities.items, context.values
     local, fed_back = [], Fraction(0)
     for name in result.values:
@@ -194,7 +153,7 @@ def _local_errors(
 
 
 def _moves(quantities: Quantities, by: Mapping[str, Fraction]) -> dict[str, Fraction] | None:
-    """Return how far every quantity can move when the elements of inputs, by name, move by so much; None if unknown."""
+    """Return bounds of the changes of quantities when inputs, by name, change by so much; None if unknown."""
     moves: dict[str, Fraction] = {}
     for name, quantity in quantities.items.items():
         match quantity.definition:
@@ -210,12 +169,12 @@ def _moves(quantities: Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
             case _:
                 return None
         if quantity.follows is not None:
-            moves[name] += _function_move(quantity.follows, moves)
+            moves[name] += quantity.follows.bound(moves)
     return moves
 
 
 def _sum_move(total: Sum, quantities: Quantities, moves: Mapping[str, Fraction]) -> Fraction:
-    """Return how far a sum of products can move."""
+    """Return a bound of the change of a sum of products."""
     move = Fraction(0)
     for monomial, coefficient in total.terms:
         if len(monomial) == 1:
@@ -227,27 +186,8 @@ def _sum_move(total: Sum, quantities: Quantities, moves: Mapping[str, Fraction])
     return move
 
 
-def _function_move(follows: ErrorPropagation, moves: Mapping[str, Fraction]) -> Fraction:
-    """Return how far a function can move."""
-    total = Fraction(0)
-    for name, slope in follows.slopes:
-        if moves[name]:
-            total += follows.most if slope is None else slope * moves[name]
-    return min(total, follows.most)
-
-
-def norm(values: Sequence[Fraction]) -> Fraction:
-    """Return a length that is not below that of a vector."""
-    return root(sum((value * value for value in values), Fraction(0)))
-
-
-def root(value: Fraction) -> Fraction:
-    """Return a number that is not below a square root."""
-    return Interval.of(value).sqrt().highest
-
-
 def _growth(context: Quantization, transition: Result, width: int) -> Fraction:
-    """Return a number that is not below the norm of any transition."""
+    """Return an upper bound of the norm of any transition."""
     stretched = stretch(context, transition, width)
     if stretched is not None:
         return root(1 + stretched.highest)
@@ -258,19 +198,7 @@ def _growth(context: Quantization, transition: Result, width: int) -> Fraction:
 def transition_growth(
     program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int, coarse: Fraction
 ) -> Fraction:
-    """Return a number that is not below the norm of any transition.
-
-    Parameters
-    ----------
-    program : Program
-    transition : Result
-    sizes : tuple of Fraction
-        Largest magnitude of every element of the inputs behind the state.
-    width : int
-        Elements of a row of the state.
-    coarse : Fraction
-        Such a number for a transition that calls functions.
-    """
+    """Return an upper bound of the norm of any transition: `coarse` if it calls functions."""
     if program.companions is not None and program.companions.isometry:
         return Fraction(1)
     try:
@@ -283,13 +211,7 @@ def transition_growth(
 def _proved_stretch(
     program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int
 ) -> Interval:
-    """Return what `stretch` does, which no word and no rounding changes.
-
-    Raises
-    ------
-    NotImplementedError
-        If the transition calls functions.
-    """
+    """Return `stretch` for any word and rounding; NotImplementedError if the transition calls functions."""
     known = _expanded_stretch(program, transition, sizes, width)
     return singular_value_bounds(program, transition, sizes, width, known)
 

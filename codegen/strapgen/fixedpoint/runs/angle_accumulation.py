@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.intervals import Interval, norm, root
 from strapgen.fixedpoint.quantization_context import Quantization
-from strapgen.fixedpoint.runs.accumulation import StepErrors, norm, root, stretch
+from strapgen.fixedpoint.runs.accumulation import StepErrors, stretch
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
@@ -33,35 +33,23 @@ _LARGEST_SINE = Fraction(1, 2)
 
 @dataclass(frozen=True)
 class _Sizes:
-    """The errors of a step and the sizes of what they act on, as lengths of all elements together.
+    """The errors of a step, and the sizes of state and transition, as lengths of all elements together."""
 
-    Parameters
-    ----------
-    local, transition : Fraction
-        Error of a call beside that of the transition, and that of the transition.
-    state_feedback, transition_feedback : Fraction
-        What is fed back of the state and of the transition.
-    away : Fraction
-        Distance of the exact transition from the identity.
-    shortest, longest : Fraction
-        Bounds of the length of the state; of a matrix, of its singular values.
-    contraction, expansion : Fraction
-        The same of the exact transition.
-    """
-
-    local: Fraction
-    transition: Fraction
-    state_feedback: Fraction
-    transition_feedback: Fraction
-    away: Fraction
+    local: Fraction  # error of a call beside that of the transition
+    transition: Fraction  # error of the transition
+    state_feedback: Fraction  # part of the state that is fed back
+    transition_feedback: Fraction  # part of the transition that is fed back
+    away: Fraction  # distance of the exact transition from the identity
+    #: Bounds of the length of the state; of a matrix, of its singular values.
     shortest: Fraction
     longest: Fraction
+    #: The same of the exact transition.
     contraction: Fraction
     expansion: Fraction
 
     @property
     def added(self) -> Fraction:
-        """What a step adds to the state and to what will be fed back, at most."""
+        """A bound of what a step adds to the state and to what will be fed back."""
         unsteady = 2 * self.away + self.transition + 2 * self.transition_feedback
         error = self.local + self.longest * self.transition + self.state_feedback * self.away
         return error + self.transition_feedback * (
@@ -70,23 +58,16 @@ class _Sizes:
 
     @property
     def fed_back(self) -> Fraction:
-        """What will be fed back, at most."""
+        """A bound of what will be fed back."""
         return self.state_feedback + self.longest * self.transition_feedback
 
 
 def angle_accumulation(
     context: Quantization, transition: Result, errors: StepErrors
 ) -> AngleAccumulation | None:
-    """Return how the errors of a step add up as an angle.
+    """Return the accumulation of a step's errors as an angle.
 
     None stands for a step that is no product of attitudes, saturates, or is too coarse.
-
-    Parameters
-    ----------
-    context : Quantization
-        The step, with all its values.
-    transition : Result
-    errors : StepErrors
     """
     terms = _products(context.program, transition)
     if terms is None or errors.saturation:  # what saturates shortens one element alone
@@ -182,7 +163,7 @@ def _lost(sizes: _Sizes) -> Fraction:
 
 
 def _length_before(sizes: _Sizes) -> Fraction:
-    """Return how many times as long the state before a step can be; ValueError if nothing is known."""
+    """Return the largest ratio of the state's lengths before and after a step; ValueError if nothing is known."""
     smallest = sizes.contraction - sizes.transition - 2 * sizes.transition_feedback
     if smallest <= 0:
         raise ValueError
@@ -246,14 +227,9 @@ def _matrix_angles(sizes: _Sizes, errors: StepErrors) -> AngleAccumulation:
 
 
 def turning_of_matrices(shortest: Fraction) -> Fraction:
-    """Return the angle that the nearest rotation turns as a proper matrix changes, per length of the change.
+    """Return the angle by which the nearest rotation turns, per length of a change of a proper matrix.
 
     The angle is told in the stretch of the matrix: it has to be divided by the smallest singular value on the way.
-
-    Parameters
-    ----------
-    shortest : Fraction
-        The smallest singular value of a proper matrix.
     """
     return _turning(_unevenness(shortest, _longest(shortest)))
 
@@ -264,7 +240,7 @@ def _unevenness(shortest: Fraction, longest: Fraction) -> Fraction:
 
 
 def _turning(uneven: Fraction) -> Fraction:
-    """Return the angle that the nearest rotation turns for a change of M, by its symmetric part in so small a share.
+    """Return the angle by which the nearest rotation turns for a change of M, with `uneven` of its symmetric part.
 
     Of an element and its mirror image the axis has half the difference; sums of squares follow by Cauchy and Schwarz.
     """
@@ -287,7 +263,7 @@ def _unsteadiness(shortest: Fraction, start: Fraction) -> Fraction | None:
 
 
 def _dual_rows(sizes: _Sizes, unsteady: Fraction | None) -> tuple[int, Fraction]:
-    """Return the most steps between orthonormalizations by dual rows, and how much each stretches an error.
+    """Return the most steps between orthonormalizations by dual rows, and the factor by which each stretches an error.
 
     Let singular values differ from 1 by at most e. Adding dual rows makes F = Q f(S) of Q S, with f = s_i + s_j s_k:
     F F' is a multiple of 1 + H, and H at most 9/8 e^2. A change of M has a skew part w and a symmetric one y; F turns
@@ -310,12 +286,12 @@ def _dual_rows(sizes: _Sizes, unsteady: Fraction | None) -> tuple[int, Fraction]
 
 
 def _steps(room: Fraction, lost: Fraction) -> int:
-    """Return the number of steps that a room is enough for."""
+    """Return the number of steps for which there is room."""
     return max(0, int(room / lost)) if lost else 0
 
 
 def _root_below(value: Fraction) -> Fraction:
-    """Return a number that is not above a square root."""
+    """Return a lower bound of a square root."""
     return Interval.of(value).sqrt().lowest
 
 

@@ -17,7 +17,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.intervals import Interval, norm
 from strapgen.ir.program import Program, Result
 from strapgen.kernel.bernstein import Cube, Powers, eigenvalue_bounds
 from strapgen.kernel.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
@@ -34,27 +34,14 @@ _LONGER = 1 + 2.0**-40
 _LENGTH_BITS = 40
 
 
-class TooLongError(ValueError):
+class _TooLongError(ValueError):
     """A transition is no polynomial, or one that is too long to bound it."""
 
 
 def singular_value_bounds(
     program: Program, transition: Result, sizes: Sequence[Fraction], width: int, known: Fraction
 ) -> Interval:
-    """Return bounds of the squared singular values of a transition, less 1.
-
-    Parameters
-    ----------
-    program : Program
-    transition : Result
-    sizes : sequence of Fraction
-        Largest magnitude of every element of the inputs behind the state.
-    width : int
-        Elements of a row of the state.
-    known : Fraction
-        Bound of their magnitude, which counts where no closer one is proved: that needs a polynomial, not too long,
-        that turns with one or two vectors.
-    """
+    """Return bounds of the squared singular values of a transition, less 1, which `known` bounds already."""
     coarse = Interval.symmetric(known)
     vectors = len(sizes) // _SPACE
     parts = [signal.size % _SPACE for signal in program.inputs[1:]]
@@ -63,7 +50,7 @@ def singular_value_bounds(
         return coarse
     try:
         elements = _polynomials(program, transition)
-    except TooLongError:
+    except _TooLongError:
         return coarse
     if not _turns_with_vectors(elements):
         return coarse
@@ -77,7 +64,7 @@ def singular_value_bounds(
 
 
 def _polynomials(program: Program, transition: Result) -> list[Polynomial]:
-    """Return the elements of a transition as polynomials of (vector, axis); TooLongError if they are none."""
+    """Return the elements of a transition as polynomials of (vector, axis); _TooLongError if they are none."""
     part = program.transition_program()
     names = [name for signal in program.inputs[1:] for name in signal.elements]
     left = _MOST_PRODUCTS
@@ -86,7 +73,7 @@ def _polynomials(program: Program, transition: Result) -> list[Polynomial]:
         nonlocal left
         left -= len(p) * len(q)
         if left < 0:
-            raise TooLongError
+            raise _TooLongError
         return multiply(p, q)
 
     try:
@@ -96,7 +83,7 @@ def _polynomials(program: Program, transition: Result) -> list[Polynomial]:
             {**OPERATIONS, "multiply": product},
         ).values()
     except KeyError as error:  # an operation that is no polynomial
-        raise TooLongError from error
+        raise _TooLongError from error
     return elements
 
 
@@ -123,7 +110,7 @@ def _turns_with_vectors(elements: Sequence[Polynomial]) -> bool:
 
 
 def _turned(p: Polynomial, i: int, j: int) -> Polynomial:
-    """Return how fast a polynomial changes when all vectors turn from axis i to axis j."""
+    """Return the derivative of a polynomial when all vectors turn from axis i to axis j."""
     change: Polynomial = {}
     for monomial, coefficient in p.items():
         for place, (vector, axis) in enumerate(monomial):
@@ -136,8 +123,7 @@ def _turned(p: Polynomial, i: int, j: int) -> Polynomial:
 
 def _length(elements: Sequence[Fraction]) -> Fraction:
     """Return the largest length of a vector, rounded up to few digits."""
-    length = Interval.of(sum((x * x for x in elements), Fraction(0))).sqrt().highest
-    return Fraction(math.ceil(length * (1 << _LENGTH_BITS)), 1 << _LENGTH_BITS)
+    return Fraction(math.ceil(norm(elements) * (1 << _LENGTH_BITS)), 1 << _LENGTH_BITS)
 
 
 def _in_plane(

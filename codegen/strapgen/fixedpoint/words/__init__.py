@@ -1,1 +1,1 @@
-"""How numbers become words: coefficients that are rounded together, formats whose products need no shifts."""
+"""Numbers as words: coefficients that are rounded together, formats whose products need no shifts."""

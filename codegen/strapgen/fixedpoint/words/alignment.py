@@ -17,18 +17,7 @@ _FED_BACK = 4
 def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Container[str]) -> dict[str, int]:
     """Return, by name, the most fraction bits of values that are finer than the sums that use them can tell.
 
-    Parameters
-    ----------
-    body : iterable of Value
-        The code, with every value in its finest format.
-    values : mapping of str to Value
-        The same by name, and the elements of the inputs.
-    fixed : container of str
-        Values whose format must stay.
-
-    Returns
-    -------
-    dict of str to int
+    In `body` every value has its finest format; values in `fixed` keep theirs.
     """
     useful: dict[str, int] = {}
     allowed: dict[str, int] = {}
@@ -80,11 +69,7 @@ def _room(term: Term, place: int, value: Value, factor: Value, others: list[Valu
         size, bits = other.magnitude, other.fraction
     if not size:  # a product with what is always zero
         return place
-    fraction = value.fraction + (_FED_BACK if _is_fed_back(value) else 0)
+    is_fed_back = isinstance(value.definition, IntegerSum) and value.definition.residual is not None
+    fraction = value.fraction + (_FED_BACK if is_fed_back else 0)
     units = factor.fraction + bits - fraction - _PART
     return max(0, ((1 << units) // size).bit_length() - 1) if units > 0 else 0
-
-
-def _is_fed_back(value: Value) -> bool:
-    """Return whether what is rounded off a sum comes with the next call, so that only other errors add up."""
-    return isinstance(value.definition, IntegerSum) and value.definition.residual is not None

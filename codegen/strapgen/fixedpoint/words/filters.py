@@ -33,14 +33,6 @@ Moments = tuple[Fraction, Fraction]
 def nearest_word(value: Fraction, word: int) -> Factor:
     """Return the nearest word to a number that is no power of two, and its fraction bits.
 
-    Parameters
-    ----------
-    value : Fraction
-    word : int
-        Bits of a word.
-
-    Examples
-    --------
     >>> nearest_word(Fraction(3, 8), 16), nearest_word(Fraction(1, 3), 8)
     ((3, 3), (85, 8))
     """
@@ -51,17 +43,7 @@ def nearest_word(value: Fraction, word: int) -> Factor:
 def filter_words(
     quantities: Quantities, inputs: Sequence[Signal], definition: Sum, word: int
 ) -> Mapping[Monomial, Factor]:
-    """Return the words for the coefficients of a sum that filters samples; an empty mapping for any other sum.
-
-    Parameters
-    ----------
-    quantities : Quantities
-    inputs : sequence of Signal
-        Those of the program; samples are the rows of one of shape (n, 3).
-    definition : Sum
-    word : int
-        Bits of a word.
-    """
+    """Return the words for the coefficients of a sum that filters samples; an empty mapping for any other sum."""
     linear = [(monomial, c) for monomial, c in definition.terms if len(monomial) == 1]
     if sum(not is_power_of_two(c) for _, c in linear) < _FEWEST:
         return {}
@@ -107,24 +89,9 @@ def rounded_together(
 ) -> tuple[Factor, ...]:
     """Return coefficients as words whose sums with the moments are exact, or as near as their units allow.
 
-    Two of the coefficients take up what the rounding of all leaves: those with which the errors are smallest.
+    Powers of two are exact. Two of the other coefficients take up the rounding errors of all: those with which the
+    errors are smallest.
 
-    Parameters
-    ----------
-    coefficients : tuple of Fraction
-        Powers of two are exact.
-    moments : tuple of (Fraction, Fraction)
-        Of what each of them multiplies: whole numbers.
-    word : int
-        Bits of a word.
-
-    Returns
-    -------
-    tuple of (int, int)
-        Each a word and its fraction bits.
-
-    Examples
-    --------
     >>> thirds = (Fraction(-1, 3), Fraction(2, 3), Fraction(-1, 3))
     >>> rounded_together(thirds, tuple((Fraction(1), Fraction(k)) for k in range(3)), 8)
     ((-85, 8), (85, 7), (-85, 8))
@@ -135,7 +102,7 @@ def rounded_together(
 
 @dataclass(frozen=True)
 class _Filter:
-    """The coefficients of a filter and the moments of what they multiply."""
+    """The coefficients of a filter, each with the moments of the quantity that it multiplies."""
 
     coefficients: tuple[Fraction, ...]
     moments: tuple[Moments, ...]

@@ -15,7 +15,7 @@ from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.canonical.core import Core, decompose, extract, verify
 from strapgen.lowering.canonical.search import plans
 from strapgen.lowering.canonical.vectors import independent
-from strapgen.lowering.canonical.writing import NameClashError, Writer
+from strapgen.lowering.canonical.writing import write
 
 __all__ = ["Core", "expansion", "extract_core", "forms", "verify"]
 
@@ -27,16 +27,7 @@ _MOST_TERMS = {"few": 320, "many": 120}
 
 
 def extract_core(kernel: Kernel) -> Core | None:
-    """Return the transition of a kernel as a polynomial of vectors; None if it is not one.
-
-    Parameters
-    ----------
-    kernel : Kernel
-
-    Returns
-    -------
-    Core or None
-    """
+    """Return the transition of a kernel as a polynomial of vectors; None if it is not one."""
     if kernel.transition is None:
         return None
     try:
@@ -52,19 +43,6 @@ def expansion(core: Core) -> str:
 
     The number of terms follows from the number n of vectors and the degree: n vectors have n (n + 1) / 2 scalar
     products, and the terms are all products of these up to the degree, with each vector and each cross product.
-
-    Parameters
-    ----------
-    core : Core
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    NotCovariantError
-        If the transition is no polynomial.
     """
     vectors, degree = len(core.base()), core.degree()
     products = vectors * (vectors + 1) // 2
@@ -84,31 +62,16 @@ def expansion(core: Core) -> str:
 
 
 def forms(core: Core) -> list[list[Assignment]]:
-    """Return code for a transition in canonical form, in several bases.
-
-    Parameters
-    ----------
-    core : Core
-
-    Returns
-    -------
-    list of list of Assignment
-        Each assigns all elements of the transition; empty if it does not commute with rotations of its inputs.
-    """
+    """Return code for a transition in several bases; none if it does not commute with rotations of its inputs."""
     try:
         ranked = plans(core, decompose(core))
     except NotCovariantError:
         return []
-    base, elements = core.base(), core.transition.elements
+    base = core.base()
     written = []
     for plan in ranked[:_WRITTEN]:
-        vectors = plan.pool.vectors.values()
-        writer = Writer(plan, [v.name for v in vectors if len(independent([*base, v.form])) == len(base)])
-        try:
-            if core.transition.shape == (3, 3):
-                written.append(writer.matrix(elements))
-            else:
-                written.append(writer.quaternion({element[-1]: element for element in elements}))
-        except NameClashError:  # another basis has other names, and the stages have their own
-            continue
-    return written
+        offered = [
+            v.name for v in plan.pool.vectors.values() if len(independent([*base, v.form])) == len(base)
+        ]
+        written.append(write(plan, offered, core.transition))
+    return [form for form in written if form is not None]

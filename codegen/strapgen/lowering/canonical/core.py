@@ -18,23 +18,12 @@ from strapgen.lowering.canonical.vectors import Form, components, independent
 
 @dataclass(frozen=True)
 class Core:
-    """A transition as a function of vectors.
+    """A transition as a function of vectors."""
 
-    Parameters
-    ----------
-    inputs : list of str
-        Names of the input vectors.
-    vectors : dict of str to (Signal, Form)
-        The vectors that the transition needs, by name: the signal, and the coefficients along the inputs.
-    stages : list of Stage
-        Stages that lead from these vectors to the transition, which is the last.
-    whole : Form or None
-        The sum of the increments of the step if the inputs are increments in the order of time.
-    """
-
-    inputs: list[str]
-    vectors: dict[str, tuple[Signal, Form]]
-    stages: list[Stage]
+    inputs: list[str]  # names of the input vectors
+    vectors: dict[str, tuple[Signal, Form]]  # those that the transition needs, along the inputs
+    stages: list[Stage]  # lead from these vectors to the transition, which is the last
+    #: The sum of the increments of the step if the inputs are increments in the order of time.
     whole: Form | None = None
 
     @property
@@ -48,13 +37,7 @@ class Core:
         return [known[name] for name in self.transition.elements]
 
     def degree(self) -> int:
-        """Return an upper bound of the degree of the transition in the vectors.
-
-        Raises
-        ------
-        NotCovariantError
-            If the transition is no polynomial.
-        """
+        """Return an upper bound of the degree of the transition in the vectors."""
         elements = [name for signal, _ in self.vectors.values() for name in signal.elements]
         highest = degree(self.stages, elements, self.transition.elements)
         if highest is None:
@@ -68,22 +51,7 @@ class Core:
 
 
 def extract(kernel: Kernel) -> Core:
-    """Separate the stages of a kernel that are linear in its input vectors from the rest.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        With a transition; all its inputs but the first, the state, are increments or rates.
-
-    Returns
-    -------
-    Core
-
-    Raises
-    ------
-    NotCovariantError
-        If an input of the transition is no vector, or the transition is neither a quaternion nor a matrix.
-    """
+    """Separate the stages of a kernel that are linear in its input vectors, all inputs but the first, from the rest."""
     columns: list[list[sp.Symbol]] = [[], [], []]
     inputs: dict[str, Signal] = {}
     for signal in kernel.inputs[1:]:
@@ -133,19 +101,6 @@ def decompose(core: Core) -> Decomposition:
     """Return the covariant decomposition of a core's transition in the vectors of its base.
 
     The coefficients are solved for in a rotated frame, where many coordinates are zero, and checked in all coordinates.
-
-    Parameters
-    ----------
-    core : Core
-
-    Returns
-    -------
-    Decomposition
-
-    Raises
-    ------
-    NotCovariantError
-        If the transition does not commute with rotations of its vectors, or is no polynomial.
     """
     base = core.base()
     frame = Frame(len(base))
@@ -166,19 +121,9 @@ def decompose(core: Core) -> Decomposition:
 
 
 def verify(core: Core, program: Program) -> None:
-    """Check that a program computes the transition of a core, as an identity between polynomials.
+    """Require that a program computes the transition of a core, as an identity between polynomials.
 
     The identity covers all elements of all inputs, in coordinates of which the transition needs as few as possible.
-
-    Parameters
-    ----------
-    core : Core
-    program : Program
-
-    Raises
-    ------
-    ArithmeticError
-        If the two differ.
     """
     count = len(core.inputs)
     units = [tuple(Fraction(int(j == k)) for j in range(count)) for k in range(count)]

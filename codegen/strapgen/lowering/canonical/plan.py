@@ -50,7 +50,7 @@ class Sides(Enum):
 
 
 @dataclass(frozen=True)
-class Outer:
+class _Outer:
     """Outer products of a vector of the basis and its partner, as one part of a matrix."""
 
     vector: str
@@ -60,27 +60,18 @@ class Outer:
 
 @dataclass
 class Plan:
-    """The vectors, weights and outer products from which a transition is computed.
+    """The vectors, weights and outer products from which a transition is computed."""
 
-    Parameters
-    ----------
-    pool : Pool
-        Vectors that are linear in the inputs.
-    basis : list of str
-        Names of the vectors to which the products in the weights refer.
-    definitions : list of Cross or Weighted
-        Cross products and weighted sums, in the order of computation.
-    scalars : dict of str to (Polynomial, str)
-        The scalar part of a quaternion or the diagonal of a matrix, with its meaning.
-    outers : list of Outer
-        The outer products of a matrix; empty for a quaternion.
-    """
-
-    pool: Pool
-    basis: list[str]
-    definitions: list[Cross | Weighted] = field(default_factory=list)
+    pool: Pool  # vectors that are linear in the inputs
+    basis: list[str]  # names of the vectors to which the products in the weights refer
+    #: Before a cross product, weights save cross products with a common factor; after it, sums can share them.
+    weighted_first: bool
+    opened: Opened = Opened.NONE
+    definitions: list[Cross | Weighted] = field(default_factory=list)  # in the order of computation
+    #: The scalar part of a quaternion or the diagonal of a matrix, with its meaning.
     scalars: dict[str, tuple[Polynomial, str]] = field(default_factory=dict)
-    outers: list[Outer] = field(default_factory=list)
+    outers: list[_Outer] = field(default_factory=list)  # those of a matrix
+    _degrees: Counter[int] = field(default_factory=Counter)
 
     def polynomials(self) -> list[Polynomial]:
         """Return all weights and scalars."""
@@ -91,37 +82,16 @@ class Plan:
         """Return the forms of the basis."""
         return [self.pool.vectors[name].form for name in self.basis]
 
-
-class Planner:
-    """Writes the plan of one decomposition.
-
-    Parameters
-    ----------
-    plan : Plan
-        Holds a pool and a basis; the rest is filled in.
-    weighted : bool
-        If true, weights are applied before cross products that share a factor, which saves cross products; if
-        false, they are applied after, so that sums can share the cross products.
-    opened : Opened, optional
-        Which cross products in the skew part of a matrix move into its outer products.
-    """
-
-    def __init__(self, plan: Plan, weighted: bool, opened: Opened = Opened.NONE) -> None:
-        self.plan = plan
-        self._weighted = weighted
-        self._opened = opened
-        self._degrees: Counter[int] = Counter()
-
     def quaternion(self, decomposition: Decomposition, name: str) -> None:
         """Plan the vector part of a quaternion, under the name of the quaternion, and its scalar part."""
         self._count_edges([decomposition.vector])
-        self.plan.scalars["scalar"] = (decomposition.scalar or {}, "its scalar part")
+        self.scalars["scalar"] = (decomposition.scalar or {}, "its scalar part")
         self._sum(name, decomposition.vector, "the step applied to the identity: its vector part")
 
     def matrix(self, decomposition: Decomposition) -> None:
         """Plan the vector of the skew part of a matrix, and outer products of vectors and their partners."""
         symmetric, skew = decomposition.symmetric, dict(decomposition.vector)
-        names = self.plan.basis
+        names = self.basis
         chosen = _axes(symmetric)
         partners: dict[int, Coefficients] = {i: {} for i in chosen}
         for covariant, coefficient in symmetric.items():
@@ -132,13 +102,13 @@ class Planner:
             rest.remove(i)
             partners[i][tuple(rest)] = coefficient
         levers: dict[int, Coefficients] = {i: {} for i in chosen}
-        if self._opened is not Opened.NONE:
+        if self.opened is not Opened.NONE:
             for i, partner in partners.items():
                 levers[i] = _take_lever(skew, i)
-                if self._opened is not Opened.PLAIN:
-                    levers[i] |= _take_triple(skew, i, partner, 1 if self._opened is Opened.RIGHT else -1)
+                if self.opened is not Opened.PLAIN:
+                    levers[i] |= _take_triple(skew, i, partner, 1 if self.opened is Opened.RIGHT else -1)
         self._count_edges([skew, *partners.values()])
-        self.plan.scalars["diagonal"] = (symmetric.get((), {}), "multiple of the unit matrix")
+        self.scalars["diagonal"] = (symmetric.get((), {}), "multiple of the unit matrix")
         if skew:
             self._sum("skew", skew, "vector of the skew part")
         for i, partner in partners.items():
@@ -151,7 +121,7 @@ class Planner:
             if alone:
                 partner = {c: scale(p, 2) for c, p in partner.items()}
             self._sum(name, partner, f"of {vector} in outer products")
-            self.plan.outers.append(Outer(vector, name, Sides.PARALLEL if alone else Sides.BOTH))
+            self.outers.append(_Outer(vector, name, Sides.PARALLEL if alone else Sides.BOTH))
             return
         common = {c: p for c, p in partner.items() if c not in lever}
         sides: list[Coefficients] = []
@@ -171,7 +141,7 @@ class Planner:
                     f"{kind.name.lower()} of {vector} in an outer product",
                     shared,
                 )
-                self.plan.outers.append(Outer(vector, partner_name, kind))
+                self.outers.append(_Outer(vector, partner_name, kind))
 
     def _count_edges(self, vectors: Iterable[Coefficients]) -> None:
         for coefficients in vectors:
@@ -196,8 +166,8 @@ class Planner:
                     levers.setdefault(j, {})[i] = polynomial
         for centre, lever in levers.items():
             groups = self._grouped(lever)
-            right = self.plan.basis[centre]
-            if len(groups) > 1 and self._weighted:
+            right = self.basis[centre]
+            if len(groups) > 1 and self.weighted_first:
                 left = f"{name}_lever" if len(levers) == 1 else f"{name}_lever_{right}"
                 self._define(
                     Weighted(left, tuple(groups), f"its cross product with {right} goes into {name}")
@@ -212,8 +182,8 @@ class Planner:
         return name
 
     def _define(self, definition: Cross | Weighted) -> None:
-        if definition not in self.plan.definitions:
-            self.plan.definitions.append(definition)
+        if definition not in self.definitions:
+            self.definitions.append(definition)
 
     def _grouped(self, columns: dict[int, Polynomial]) -> list[tuple[Polynomial, str]]:
         """Return weights and vectors, with vectors of proportional weights summed first where that saves operations."""
@@ -227,19 +197,19 @@ class Planner:
             else:
                 groups.append((polynomial, [(Fraction(1), index)]))
         terms: list[tuple[Polynomial, str]] = []
-        forms = self.plan.forms()
+        forms = self.forms()
         for polynomial, members in groups:
             if len(members) > 1:
                 whole = tuple(
                     sum((c * forms[i][k] for c, i in members), Fraction(0)) for k in range(len(forms[0]))
                 )
-                known = self.plan.pool.find(whole)
+                known = self.pool.find(whole)
                 if known is None and all(abs(c) == 1 for c, _ in members):
-                    known = self.plan.pool.define(whole)
+                    known = self.pool.define(whole)
                 if known is not None:
                     terms.append((scale(polynomial, known[1]), known[0]))
                     continue
-            terms += [(scale(polynomial, c), self.plan.basis[i]) for c, i in members]
+            terms += [(scale(polynomial, c), self.basis[i]) for c, i in members]
         return terms
 
 

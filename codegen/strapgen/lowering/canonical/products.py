@@ -16,24 +16,10 @@ _PRODUCT = 3
 def choose_products(
     polynomials: Sequence[Polynomial], basis: Sequence[tuple[str, Form]], offered: dict[str, Form]
 ) -> list[Polynomial]:
-    """Rewrite polynomials in the scalar products in which they are shortest.
+    """Rewrite polynomials in products (i, j) and (i, j, k) of a basis in the scalar products that make them shortest.
 
-    One product after another is exchanged for another product of the vectors on offer, as long as that saves
-    operations.
-
-    Parameters
-    ----------
-    polynomials : sequence of Polynomial
-        In products (i, j) and (i, j, k) of vectors of the basis.
-    basis : sequence of (str, Form)
-        Names and coefficients of the basis.
-    offered : dict of str to Form
-        Vectors whose products may be used: those of the basis, and others within its span.
-
-    Returns
-    -------
-    list of Polynomial
-        In products (name, name) and (name, name, name), in the order of `polynomials`.
+    One product after another is exchanged for another product of the vectors on offer, those of the basis and others in
+    its span, as long as that saves operations. The result is in products of names, (name, name) and (name, name, name).
     """
     names = [name for name, _ in basis]
     current = [substitute(p, lambda factor: atom(tuple(names[k] for k in factor))) for p in polynomials]

@@ -9,7 +9,7 @@ from fractions import Fraction
 from strapgen.kernel.covariants import Decomposition, transform
 from strapgen.kernel.polynomials import Polynomial, atoms
 from strapgen.lowering.canonical.core import Core
-from strapgen.lowering.canonical.plan import Cross, Opened, Plan, Planner, Sides, without_triples
+from strapgen.lowering.canonical.plan import Cross, Opened, Plan, Sides, without_triples
 from strapgen.lowering.canonical.vectors import (
     Form,
     Pool,
@@ -30,19 +30,7 @@ _MOST_TERMS = 500
 
 
 def plans(core: Core, decomposition: Decomposition) -> list[Plan]:
-    """Return plans for a transition, the one with the lowest estimate first.
-
-    Parameters
-    ----------
-    core : Core
-    decomposition : Decomposition
-        In the vectors of the core's base.
-
-    Returns
-    -------
-    list of Plan
-        Empty if the decomposition has so many terms that the stages must be cheaper.
-    """
+    """Return plans for a transition, the lowest estimate first; none if so many terms make its stages cheaper."""
     base = core.base()
     count = len(base)
     terms = [monomial for p in decomposition.coefficients() for monomial in p]
@@ -117,12 +105,11 @@ def _plans(
                 variant = transform(variant, lengths)
             matrix = core.transition.shape == (3, 3)
             for weighted, opened in itertools.product((False, True), Opened if matrix else (Opened.NONE,)):
-                plan = Plan(pool.copy(), [name for name, _ in named])
-                planner = Planner(plan, weighted, opened)
+                plan = Plan(pool.copy(), [name for name, _ in named], weighted, opened)
                 if matrix:
-                    planner.matrix(variant)
+                    plan.matrix(variant)
                 else:
-                    planner.quaternion(variant, core.transition.elements[0].rsplit("_", 1)[0])
+                    plan.quaternion(variant, core.transition.elements[0].rsplit("_", 1)[0])
                 yield plan
 
 

@@ -25,30 +25,15 @@ Sum = dict[Vector, Polynomial]
 
 @dataclass(frozen=True)
 class VectorForm:
-    """The transition of a step in a few vectors, their scalar products and their cross products.
+    """The transition of a step in a few vectors, their scalar products and their cross products."""
 
-    Parameters
-    ----------
-    inputs : tuple of str
-        Names of the input vectors, increments or rates at nodes times the step, in rad.
-    vectors : dict of str to Form
-        The other vectors, each as coefficients of the inputs.
-    vector : Sum
-        The vector part of a quaternion, or the vector of a matrix's skew part.
-    scalar : Polynomial
-        The scalar part of a quaternion, or the multiple of the unit matrix.
-    outers : dict of str to Sum
-        For a matrix the partner y of each vector u, of which it has u y' + y u'; empty for a quaternion.
-    matrix : bool
-        Whether the transition is a matrix.
-    """
-
-    inputs: tuple[str, ...]
-    vectors: dict[str, Form]
-    vector: Sum
-    scalar: Polynomial
+    inputs: tuple[str, ...]  # names of the input vectors, increments or rates at nodes times the step, in rad
+    vectors: dict[str, Form]  # the other vectors, each as coefficients of the inputs
+    vector: Sum  # the vector part of a quaternion, or the vector of a matrix's skew part
+    scalar: Polynomial  # the scalar part of a quaternion, or the multiple of the unit matrix
+    #: For a matrix the partner y of each vector u, of which it has u y' + y u'; empty for a quaternion.
     outers: dict[str, Sum]
-    matrix: bool
+    matrix: bool  # whether the transition is a matrix
 
     @property
     def products(self) -> list[tuple[str, ...]]:
@@ -57,20 +42,8 @@ class VectorForm:
 
 
 def vector_form(kernel: Kernel) -> VectorForm | None:
-    """Return the vector form of a step.
+    """Return the vector form of a step; None without a covariant transition, or if the form is longer than the stages.
 
-    Parameters
-    ----------
-    kernel : Kernel
-
-    Returns
-    -------
-    VectorForm or None
-        None for a kernel that has no transition, or one that does not turn with its inputs, or one whose form would
-        be longer than its stages.
-
-    Examples
-    --------
     >>> from strapgen import derive
     >>> form = vector_form(derive("euler", "rk4", 2))
     >>> form.vectors, form.products
@@ -92,7 +65,7 @@ def vector_form(kernel: Kernel) -> VectorForm | None:
 
 
 def _length(form: VectorForm) -> int:
-    """Return how much there is to read: terms of the weights, products, and vectors that need a definition."""
+    """Return the length for a reader: terms of the weights, products, and vectors that need a definition."""
     defined = sum(sum(map(bool, coefficients)) for coefficients in form.vectors.values())
     return sum(map(len, _polynomials(form))) + len(form.products) + defined
 

@@ -13,23 +13,12 @@ Form = tuple[Fraction, ...]
 
 
 @dataclass(frozen=True)
-class Vector:
-    """A named vector.
-
-    Parameters
-    ----------
-    name : str
-    form : tuple of Fraction
-        Its coefficients along the input vectors.
-    parts : tuple of (Fraction, str)
-        Coefficients and names of the vectors whose sum it is; empty for an input.
-    meaning : str
-        What it is, for the reader of generated code; "" if there is nothing to say.
-    """
+class _Vector:
+    """A named vector."""
 
     name: str
-    form: Form
-    parts: tuple[tuple[Fraction, str], ...] = ()
+    form: Form  # its coefficients along the input vectors
+    parts: tuple[tuple[Fraction, str], ...] = ()  # the vectors whose sum it is; empty for an input
     meaning: str = ""
 
     @property
@@ -85,23 +74,7 @@ def components(form: Form, basis: Sequence[Form]) -> list[Fraction]:
 
 
 def all_components(forms: Sequence[Form], basis: Sequence[Form]) -> list[list[Fraction]]:
-    """Return the components of each of some forms along a basis.
-
-    Parameters
-    ----------
-    forms : sequence of Form
-    basis : sequence of Form
-        Independent forms.
-
-    Returns
-    -------
-    list of list of Fraction
-
-    Raises
-    ------
-    ValueError
-        If the basis does not span a form.
-    """
+    """Return the components of each of some forms along a basis of independent forms that spans them."""
     rows = [list(row) for row in zip(*basis, *forms, strict=True)]
     count = len(basis)
     for pivot in range(count):
@@ -121,23 +94,15 @@ def all_components(forms: Sequence[Form], basis: Sequence[Form]) -> list[list[Fr
 
 
 class Pool:
-    """The vectors that have a name, each defined once, in the order of computation.
-
-    Parameters
-    ----------
-    inputs : list of str
-        Names of the input vectors.
-    names : dict of Form to (str, str)
-        Name and meaning of the forms that have a name in the field.
-    """
+    """The vectors that have a name, each defined once, in the order of computation."""
 
     def __init__(self, inputs: list[str], names: dict[Form, tuple[str, str]]) -> None:
         self._inputs = inputs
         self._names = names
-        self.vectors: dict[str, Vector] = {}
+        self.vectors: dict[str, _Vector] = {}
         for k, name in enumerate(inputs):
             form = tuple(Fraction(int(k == j)) for j in range(len(inputs)))
-            self.vectors[name] = Vector(name, form)
+            self.vectors[name] = _Vector(name, form)
 
     def copy(self) -> Pool:
         """Return a pool to which vectors can be added without changing this one."""
@@ -195,7 +160,7 @@ class Pool:
 
     def _add(self, form: Form, parts: tuple[tuple[Fraction, str], ...]) -> str:
         name, meaning = self._named(form, parts)
-        self.vectors[name] = Vector(name, form, parts, meaning)
+        self.vectors[name] = _Vector(name, form, parts, meaning)
         return name
 
     def _sum_of_two(self, form: Form) -> tuple[tuple[Fraction, str], ...] | None:

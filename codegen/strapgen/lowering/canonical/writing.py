@@ -1,4 +1,4 @@
-"""Plans are written as straight-line code on scalars."""
+"""Writes plans as straight-line code on scalars."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Reference
+from strapgen.ir.signals import Signal
 from strapgen.kernel.polynomials import Polynomial, ratio
 from strapgen.kernel.rotations import CROSS
 from strapgen.lowering.arithmetic import (
@@ -26,20 +27,25 @@ from strapgen.lowering.canonical.products import choose_products
 _Summand = tuple[Fraction, Reference | None, str]
 
 
-class NameClashError(ValueError):
+class _NameClashError(ValueError):
     """A vector of the kernel has the name of a quantity that canonical forms have."""
 
 
-class Writer:
-    """Writes a plan as assignments.
+def write(plan: Plan, offered: Sequence[str], transition: Signal) -> list[Assignment] | None:
+    """Return the assignments of a transition; None where a name would stand for two quantities.
 
-    Parameters
-    ----------
-    plan : Plan
-    offered : sequence of str
-        Names of vectors whose scalar products may be used: those of the basis, and others within its span.
+    The scalar products are those of the vectors on offer, which lie in the span of the plan's basis.
     """
+    writer = _Writer(plan, offered)
+    try:
+        if transition.shape == (3, 3):
+            return writer.matrix(transition.elements)
+        return writer.quaternion(next(name for name in transition.elements if name.endswith("s")))
+    except _NameClashError:  # another basis has other names, and the stages have their own
+        return None
 
+
+class _Writer:
     def __init__(self, plan: Plan, offered: Sequence[str]) -> None:
         self._plan = plan
         self._body: list[Assignment] = []
@@ -55,18 +61,12 @@ class Writer:
         chosen = choose_products(polynomials, basis, {name: vectors[name].form for name in offered})
         self._chosen = {_key(p): q for p, q in zip(polynomials, chosen, strict=True)}
 
-    def quaternion(self, elements: dict[str, str]) -> list[Assignment]:
-        """Return the assignments of a quaternion.
-
-        Parameters
-        ----------
-        elements : dict of str to str
-            Names of the elements by their labels x, y, z, s.
-        """
+    def quaternion(self, scalar: str) -> list[Assignment]:
+        """Return the assignments of a quaternion, whose scalar part has this name."""
         self._definitions()
         (name,) = self._plan.scalars
         polynomial, meaning = self._plan.scalars[name]
-        self._assign(elements["s"], plain(self._tree(self._chosen[_key(polynomial)])), meaning)
+        self._assign(scalar, plain(self._tree(self._chosen[_key(polynomial)])), meaning)
         return self._body
 
     def matrix(self, elements: Sequence[str]) -> list[Assignment]:
@@ -212,7 +212,7 @@ class Writer:
     def _assign(self, name: str, node: Node, meaning: str = "") -> None:
         known = self._names.setdefault(name, node)
         if known != node:
-            raise NameClashError(f"{name} would stand for two quantities")
+            raise _NameClashError(f"{name} would stand for two quantities")
         if known is node:
             self._body.append(Assignment(name, node, meaning))
 

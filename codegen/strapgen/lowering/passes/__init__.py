@@ -31,17 +31,7 @@ _LONG = 9
 
 
 def optimize(program: Program) -> Program:
-    """Run all passes repeatedly, as long as that saves operations.
-
-    Parameters
-    ----------
-    program : Program
-
-    Returns
-    -------
-    Program
-        With the same results. The outcome of a pass that would add operations is discarded.
-    """
+    """Run all passes repeatedly, as long as that saves operations; one that would add operations is undone."""
     while True:
         before = program
         for run in PASSES:

@@ -12,19 +12,7 @@ _EVEN = ("cos", "sinc")
 
 
 def absorb_negations(program: Program) -> Program:
-    """Move signs up the trees until a sum or a constant absorbs them; a temporary hands its sign to its users.
-
-    Examples
-    --------
-    >>> from strapgen.ir.program import Assignment, Result
-    >>> from strapgen.ir.signals import Signal
-    >>> minus = Operation("negate", (Reference("a"),))
-    >>> body = (Assignment("c", Operation("add", (minus, Reference("b")))),)
-    >>> result = Result(Signal.scalar("c"), (Reference("c"),))
-    >>> signals = (Signal.scalar("a"), Signal.scalar("b"))
-    >>> absorb_negations(Program("p", "p", "", "", "", (), signals, body, (result,))).body[0].value
-    Operation(kind='subtract', arguments=(Reference(name='b'), Reference(name='a')))
-    """
+    """Move signs up the trees until a sum or a constant absorbs them; a temporary hands its sign to its users."""
     values = [_absorbed(assignment.value) for assignment in program.body]
     results = {
         node.name for result in program.results for node in result.nodes if isinstance(node, Reference)

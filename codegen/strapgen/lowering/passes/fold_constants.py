@@ -20,18 +20,7 @@ _EXACT = ("add", "subtract", "multiply", "divide", "negate")
 
 
 def fold_constants(program: Program) -> Program:
-    """Replace operations on constants by their exact values.
-
-    Examples
-    --------
-    >>> from strapgen.ir.program import Assignment, Result
-    >>> from strapgen.ir.signals import Signal
-    >>> third = Operation("divide", (Reference("x"), Constant(Fraction(3))))
-    >>> body = (Assignment("y", Operation("multiply", (Constant(Fraction(6)), third))),)
-    >>> x, y = Signal.scalar("x"), Result(Signal.scalar("y"), (Reference("y"),))
-    >>> fold_constants(Program("p", "p", "", "", "", (), (x,), body, (y,))).body[0].value
-    Operation(kind='multiply', arguments=(Constant(value=Fraction(2, 1)), Reference(name='x')))
-    """
+    """Replace operations on constants by their exact values."""
     return with_values(_scalings_moved(with_values(program, _folded)), _folded)
 
 

@@ -17,20 +17,7 @@ _POLYNOMIAL = ("add", "subtract", "multiply", "negate")
 
 
 def horner_schemes(program: Program) -> Program:
-    """Write every polynomial by Horner's scheme where that takes fewer operations.
-
-    Examples
-    --------
-    >>> from strapgen.ir.program import Assignment, Reference, Result
-    >>> from strapgen.ir.signals import Signal
-    >>> x, y, z = map(Reference, "xyz")
-    >>> value = Operation("add", (Operation("multiply", (x, y)), Operation("multiply", (x, z))))
-    >>> signals = tuple(map(Signal.scalar, "xyz"))
-    >>> result = Result(Signal.scalar("r"), (Reference("r"),))
-    >>> program = Program("p", "p", "", "", "", (), signals, (Assignment("r", value),), (result,))
-    >>> horner_schemes(program).operations["multiply"]
-    1
-    """
+    """Write every polynomial by Horner's scheme where that takes fewer operations."""
     return with_values(program, _written)
 
 

@@ -15,18 +15,7 @@ from strapgen.lowering.names import shared_names
 
 
 def reuse_values(program: Program) -> Program:
-    """Name every operation that occurs more than once and refer to it by its name.
-
-    Examples
-    --------
-    >>> from strapgen.catalogue import choose, derive
-    >>> from strapgen.lowering.gate import gate
-    >>> from strapgen.lowering.share import share
-    >>> kernel = derive(choose("error-matrix"))
-    >>> before = gate(kernel, share(kernel))
-    >>> before.operations["multiply"] - reuse_values(before).operations["multiply"]
-    1
-    """
+    """Name every operation that occurs more than once and refer to it by its name."""
     occurrences = _occurrences(program)
     names = shared_names(program)
     known: dict[Node, Reference] = {}

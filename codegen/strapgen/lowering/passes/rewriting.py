@@ -40,7 +40,7 @@ def with_each(program: Program, values: list[Node]) -> Program:
 
 
 def uses(program: Program) -> Counter[str]:
-    """Count how often each name is used, in assignments and in results."""
+    """Count the uses of each name, in assignments and in results."""
     counts: Counter[str] = Counter()
     for assignment in program.body:
         counts.update(references(assignment.value))

@@ -66,7 +66,7 @@ class _Many:
 
 
 class _Counts:
-    """In how many sums and products each pair occurs; of thousands of pairs the few that occur twice stand apart."""
+    """The number of sums and products in which each pair occurs; of thousands, the few that occur twice stand apart."""
 
     def __init__(self) -> None:
         self.numbers: dict[_Pair, int] = {}
@@ -103,7 +103,7 @@ class _Counts:
 
 
 class _Entry:
-    """An assignment, its value as sums and products, and in how many of these each pair occurs."""
+    """An assignment, its value as sums and products, and the number of these in which each pair occurs."""
 
     def __init__(self, assignment: Assignment, counts: _Counts) -> None:
         self.assignment = assignment
@@ -151,20 +151,7 @@ class _Entry:
 
 
 def share_pairs(program: Program) -> Program:
-    """Name the pairs of terms and of factors that occur more than once.
-
-    Examples
-    --------
-    >>> from strapgen.ir.program import Result
-    >>> from strapgen.ir.signals import Signal
-    >>> a, b, c, d = map(Reference, "abcd")
-    >>> sums = [chain("add", [a, b, c]), chain("add", [a, d, b])]
-    >>> body = tuple(Assignment(name, value) for name, value in zip("rs", sums))
-    >>> results = tuple(Result(Signal.scalar(name), (Reference(name),)) for name in "rs")
-    >>> signals = tuple(map(Signal.scalar, "abcd"))
-    >>> share_pairs(Program("p", "p", "", "", "", (), signals, body, results)).operations["add"]
-    3
-    """
+    """Name the pairs of terms and of factors that occur more than once."""
     inlined = _inlined(program)
     names = shared_names(inlined)
     counts = _Counts()
@@ -243,7 +230,7 @@ def _inside(many: Node | _Many) -> Iterator[_Many]:
 
 @lru_cache(REMEMBERED)
 def _pairs_of(value: Node) -> Counter[_Pair]:
-    """Return in how many sums and products of a value each pair occurs; nobody changes it."""
+    """Return the number of sums and products of a value in which each pair occurs; nobody changes it."""
     counts: Counter[_Pair] = Counter()
     for many in _inside(_flat(value)):
         counts.update(many.pairs)

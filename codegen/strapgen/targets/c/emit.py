@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c.rounding_text import rounding_text, with_names
 from strapgen.targets.lines import fill_expression
-from strapgen.targets.names import C, function_name, printed
+from strapgen.targets.names import C, Language, function_name, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.registry import TARGETS
 from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
@@ -26,23 +26,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Real:
-    """A floating-point type of C.
-
-    Parameters
-    ----------
-    name : str
-        Name of the type.
-    suffix : str
-        Suffix of its literals and of the functions of math.h.
-    infix : str
-        Ending of function and file names, so that the code of both types links into one program.
-    bytes : int
-        Size of a number.
-    """
+    """A floating-point type of C."""
 
     name: str
-    suffix: str
-    infix: str
+    suffix: str  # that of its literals and of the functions of math.h
+    infix: str  # ending of function and file names, so that the code of both types links into one program
     bytes: int
 
 
@@ -106,42 +94,39 @@ def _nearest_single(value: Fraction) -> np.float32:
 
 
 def emit(program: Program, target: str) -> Sources:
-    """Generate a C header and source for a program.
+    """Print a function on one sample (<name>.h and .c), and loops over samples and, of a step, over runs beside it."""
+    name = function_name(program, real_of(target).infix)
+    return sources_of(program, target, name, _files, C, runs_of(name))
 
-    Parameters
-    ----------
-    program : Program
-    target : str
-        A target whose numbers are those of a `Real`.
 
-    Returns
-    -------
-    Sources
-        Two files with the function ``<name>`` on one sample, and two with ``<name>_array`` on many; a step has
-        ``<name>_propagate`` there too, the loop over runs and steps.
-    """
-    real = real_of(target)
-    name = function_name(program, real.infix)
+def sources_of(
+    program: Program,
+    target: str,
+    name: str,
+    text: Callable[[Program, str, str, RoundingBounds], dict[str, str]],
+    language: Language,
+    runs: tuple[str, ...],
+) -> Sources:
+    """Print a program in floating point; `text` returns the files of one with its printed names."""
     # A scalar input has one name, which is that of its argument and of its element.
     scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, real.name)
+    rounding = rounding_bounds(program, TARGETS[target].number)
     _, files = printed(
         program,
-        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
-        C,
+        lambda named, _: text(named, name, target, with_names(rounding, program, named)),
+        language,
         scalars,
     )
-    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
     return Sources(
         program.kernel,
         target,
         files,
-        function,
+        Function(name, program.inputs, tuple(result.signal for result in program.outputs)),
         program.operations,
         program.temporaries,
         program.companions,
         recursion=program.recursion,
-        runs=runs_of(name),
+        runs=runs,
         rounding=rounding,
     )
 
@@ -180,7 +165,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
 
 
 def uses_math(nodes: Iterable[Operation]) -> bool:
-    """Return whether one of some operations is a function of math.h."""
+    """Tell whether one of some operations is a function of math.h."""
     return any(node.kind in FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes)
 
 
@@ -193,8 +178,8 @@ def code_of(
 ) -> dict[str, object]:
     """Return the statements of a program: loads, assignments, stores.
 
-    `places` has where the element of a number stands by the signal's name, if that is not ``name[{}]``; `depth` is the
-    number of blocks around the statements, and `number_type` the type of their numbers, if it is not the printer's.
+    `places` has the element of a signal by its name, if that is not ``name[{}]``; `depth` is the number of blocks
+    around the statements, and `number_type` the type of their numbers, if it is not the printer's.
     """
     kind, used, places = number_type or printer.real.name, program.used(program.outputs), places or {}
 
@@ -279,7 +264,7 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
 
 
 def _in_vectors(program: Program) -> bool:
-    """Return whether each value and output of a program can be a vector of several samples."""
+    """Tell whether each value and output of a program can be a vector of several samples."""
     values = [a.value for a in program.body] + [node for result in program.outputs for node in result.nodes]
     return all(names_in(value) for value in values) and all(
         node.kind in _OF_VECTORS for value in values for node in walk(value) if isinstance(node, Operation)

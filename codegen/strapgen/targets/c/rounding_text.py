@@ -1,4 +1,4 @@
-"""Writes in words what is proved of the rounding of a function in floating point, for the head of its file."""
+"""Writes the proved rounding of a function in floating point in words, for the head of its file."""
 
 from __future__ import annotations
 
@@ -10,14 +10,7 @@ from strapgen.ir.program import Program
 
 
 def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
-    """Return the bounds of a program with the names that are printed.
-
-    Parameters
-    ----------
-    bounds : RoundingBounds
-    program, named : Program
-        The program that they are of, and the same with the printed names.
-    """
+    """Return the bounds of a program with the names that are printed."""
     # A value on the way may have the name of an input or of an output.
     inputs = _renamed([s.name for s in program.inputs], [s.name for s in named.inputs])
     values = _renamed([a.name for a in program.body], [a.name for a in named.body])
@@ -45,21 +38,9 @@ def rounding_text(
     flag: str = "-ffp-contract=off",
     library: str = "the C library",
 ) -> str:
-    """Return the error bounds of a call and of a run, with their conditions.
+    """Return the error bounds of a call and of a run, with their conditions, as sentences without the last full stop.
 
-    Parameters
-    ----------
-    bounds : RoundingBounds
-    program : Program
-    flag : str, optional
-        The flag that keeps a compiler from fusing a product and a sum; "" where none does so.
-    library : str, optional
-        What computes sines and arc tangents.
-
-    Returns
-    -------
-    str
-        Sentences without the last full stop.
+    `flag` keeps a compiler from fusing a product and a sum, "" where none does so; `library` computes the sines.
     """
     if bounds.reason:
         return f"no bound is known, because {bounds.reason}"
@@ -88,7 +69,7 @@ def _errors(bounds: RoundingBounds) -> str:
 
 
 def _conditions(bounds: RoundingBounds, flag: str, library: str) -> str:
-    """Return what the bounds hold for."""
+    """Return the conditions of the bounds."""
     sizes: dict[str, list[str]] = {}
     for condition in bounds.inputs:
         sizes.setdefault(f"up to {below(condition.high)}", []).append(condition.value)

@@ -17,21 +17,7 @@ from strapgen.targets.rendering import PROPAGATE, own_call, render_c, runs_of
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
-    """Print a C header and source for a program.
-
-    Parameters
-    ----------
-    fixed : FixedProgram
-        With a word of `WORDS`.
-    target : str
-        Name of the target.
-
-    Returns
-    -------
-    Sources
-        Two files with the function ``<name>`` on one sample, and two with ``<name>_array`` on many; a step has
-        ``<name>_propagate`` there too, the loop over runs and steps.
-    """
+    """Print a function on one sample (<name>.h and .c), and loops over samples and, of a step, over runs beside it."""
     name = function_name(fixed.program, f"_w{fixed.word}")
     return sources_of(fixed, target, name, _files, C, runs_of(name))
 
@@ -46,21 +32,7 @@ def sources_of(
 ) -> Sources:
     """Print a program in a language whose function on arrays has the interface of C.
 
-    Parameters
-    ----------
-    fixed : FixedProgram
-    target, name : str
-        Names of the target and of the function.
-    files : callable
-        ``files(fixed, name, target)`` returns the text of the files of a program with its printed names.
-    language : Language
-        Its rules for names.
-    runs : tuple of str
-        Names of the files with the loops.
-
-    Returns
-    -------
-    Sources
+    `files` returns the text of the files of a program with its printed names.
     """
     interface = fixed.interface
     arguments = (*interface.inputs, *interface.outputs)
@@ -94,7 +66,7 @@ def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
 
 
 def values_of(fixed: FixedProgram, name: str, target: str, printer: StatementPrinter) -> dict[str, object]:
-    """Return what the templates of fixed point are filled with in every language, the interface of C among it."""
+    """Return the values for the templates of fixed point in every language, those of the C interface among them."""
     interface, word = fixed.interface, WORDS[fixed.word].within(name)
     signals = [(a.signal, f"const {memory_type(a)}") for a in interface.inputs]
     signals += [(a.signal, memory_type(a)) for a in interface.outputs]

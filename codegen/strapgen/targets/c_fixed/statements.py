@@ -94,7 +94,7 @@ class StatementPrinter:
         return f"{self.name}_{name}"
 
     def cast(self, kind: str, text: str = "") -> str:
-        """Return a name, a number or an expression in parentheses in another type; without it what stands before."""
+        """Return a name, a number or an expression in parentheses in another type; without it the cast alone."""
         return f"({kind}){text}"
 
     def read(self, kind: str, source: str, argument: Argument) -> str:
@@ -106,7 +106,7 @@ class StatementPrinter:
         return f"const {kind} {name} = {self.read(kind, source, argument)};"
 
     def start(self, kind: str, name: str, constant: bool = True) -> str:
-        """Return how the declaration of a value starts."""
+        """Return the beginning of a value's declaration."""
         return f"{'const ' * constant}{kind} {name} ="
 
     def unset(self, kind: str, name: str) -> str:

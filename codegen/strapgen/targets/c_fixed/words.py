@@ -9,24 +9,13 @@ from strapgen.ir.fixed_interface import Argument
 
 @dataclass(frozen=True)
 class Word:
-    """The C types for words of one length.
-
-    Parameters
-    ----------
-    bits : int
-    type, residual : str
-        Types of a word in memory, and of an error feedback, which has no sign.
-    fast : str
-        Type of a word in a calculation: the fastest of the processor that is long enough.
-    wide, magnitude : str
-        Types of a product, and of the magnitude of a product. C has none for words of 64 bits: a file defines them
-        under names of its own.
-    """
+    """The C types for words of one length."""
 
     bits: int
-    type: str
-    residual: str
-    fast: str
+    type: str  # of a word in memory
+    residual: str  # of an error feedback, which has no sign
+    fast: str  # of a word in a calculation: the fastest of the processor that is long enough
+    #: Of a product, and of its magnitude. C has none for words of 64 bits: a file defines them under names of its own.
     wide: str
     magnitude: str
 

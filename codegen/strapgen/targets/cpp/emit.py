@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, walk
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c import emit as c
-from strapgen.targets.c.rounding_text import rounding_text, with_names
+from strapgen.targets.c.rounding_text import rounding_text
 from strapgen.targets.cpp.text import CHECK, CPP, constants, result_of, runs_of
-from strapgen.targets.names import function_name, printed
+from strapgen.targets.names import function_name
 from strapgen.targets.rendering import own_call, render
 
 _FUNCTIONS = {kind: f"std::{kind}({{}})" for kind in ("sqrt", "sin", "cos")} | {
@@ -22,7 +21,7 @@ _FUNCTIONS = {kind: f"std::{kind}({{}})" for kind in ("sqrt", "sin", "cos")} | {
 }
 
 
-class CppPrinter(c.CPrinter):
+class _CppPrinter(c.CPrinter):
     """Prints nodes as C++ expressions: those of C, with the functions of the namespace ``std``."""
 
     def function(self, kind: str, arguments: list[str]) -> str:
@@ -33,48 +32,14 @@ class CppPrinter(c.CPrinter):
 
 
 def emit(program: Program, target: str) -> Sources:
-    """Generate a C++ header for a program, with the C interface through which other languages call it.
-
-    Parameters
-    ----------
-    program : Program
-    target : str
-        A target whose numbers are those of a type of C.
-
-    Returns
-    -------
-    Sources
-        One header with the function ``strapgen::<name>``; and two files with ``<name>``, ``<name>_array`` and, for a
-        step, ``<name>_propagate`` for C, the functions of the same names that the target ``c`` has.
-    """
-    real = c.real_of(target)
-    name = function_name(program, real.infix)
-    scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, real.name)
-    _, files = printed(
-        program,
-        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
-        CPP,
-        scalars,
-    )
-    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
-    return Sources(
-        program.kernel,
-        target,
-        files,
-        function,
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-        runs=runs_of(name),
-        rounding=rounding,
-    )
+    """Print a header with ``strapgen::<name>``, and the functions of the target ``c`` as an interface to it."""
+    name = function_name(program, c.real_of(target).infix)
+    return c.sources_of(program, target, name, _files, CPP, runs_of(name))
 
 
 def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
     """Return the header and the C interface of a program with its printed names."""
-    printer = CppPrinter(c.real_of(target), name)
+    printer = _CppPrinter(c.real_of(target), name)
     command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     outputs = [(f"std::array<{printer.real.name}, {r.signal.size}>", r.signal.name) for r in program.outputs]
@@ -112,7 +77,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
 
 
 def interface_values(program: Program, printer: c.CPrinter, name: str, header: str) -> dict[str, object]:
-    """Return what the templates of the C interface are filled with, whatever the language behind it is."""
+    """Return the values for the templates of the C interface, whatever the language behind it is."""
     real = printer.real
     return {
         "program": program,

@@ -13,11 +13,11 @@ from strapgen.targets.names import function_name
 from strapgen.targets.rendering import render
 
 
-class CppStatementPrinter(StatementPrinter):
+class _CppStatementPrinter(StatementPrinter):
     """Prints statements of C++: those of C with named conversions."""
 
     def cast(self, kind: str, text: str = "") -> str:
-        """Return a name, a number or an expression in parentheses in another type; without it what stands before."""
+        """Return a name, a number or an expression in parentheses in another type; without it the cast alone."""
         inside = text[1:-1] if text.startswith("(") else text
         return f"static_cast<{kind}>" + (f"({inside})" if text else "")
 
@@ -27,28 +27,14 @@ class CppStatementPrinter(StatementPrinter):
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
-    """Print a C++ header for a program, with the C interface through which other languages call it.
-
-    Parameters
-    ----------
-    fixed : FixedProgram
-        With a word of the target.
-    target : str
-        Name of the target.
-
-    Returns
-    -------
-    Sources
-        One header with the function ``strapgen::<name>``; and two files with ``<name>``, ``<name>_array`` and, for a
-        step, ``<name>_propagate`` for C, the functions of the same names that the target ``c-fixed`` has.
-    """
+    """Print a header with ``strapgen::<name>``, and the functions of the target ``c-fixed`` as an interface to it."""
     name = function_name(fixed.program, f"_w{fixed.word}")
     return c_fixed.sources_of(fixed, target, name, _files, CPP, runs_of(name))
 
 
 def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     """Return the header and the C interface of a program with its printed names."""
-    printer = CppStatementPrinter(fixed, _word(fixed.word, name), name)
+    printer = _CppStatementPrinter(fixed, _word(fixed.word, name), name)
     header, runs = runs_of(name)
     interface = fixed.interface
     arrays = [

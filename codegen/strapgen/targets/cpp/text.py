@@ -1,4 +1,4 @@
-"""What the C++ of floating point and of fixed point share: names, types, constants, and the C interface."""
+"""The shared parts of C++ in floating point and in fixed point: names, types, constants, and the C interface."""
 
 from __future__ import annotations
 
@@ -49,15 +49,7 @@ def standard(kind: str) -> str:
 
 
 def result_of(name: str, outputs: Sequence[tuple[str, str]]) -> str:
-    """Return the type of what a function returns: that of its output, or a structure of several.
-
-    Parameters
-    ----------
-    name : str
-        Name of the function.
-    outputs : sequence of (str, str)
-        Type and name of every output.
-    """
+    """Return the return type of a function: that of its output, or a structure of several (type, name)."""
     return outputs[0][0] if len(outputs) == 1 else f"{name}_result"
 
 

@@ -22,19 +22,7 @@ from strapgen.targets.rendering import render
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
-    """Print a Python module for a program.
-
-    Parameters
-    ----------
-    fixed : FixedProgram
-    target : str
-        Name of the target.
-
-    Returns
-    -------
-    Sources
-        One file. The function ``<name>`` takes and returns integers, or arrays of them.
-    """
+    """Print a module whose function takes and returns integers, or arrays of them."""
     interface = fixed.interface
     named, files = printed(fixed, lambda part, other: _files(part, other, target), PYTHON)
     function = Function(

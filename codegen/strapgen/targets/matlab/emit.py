@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Sequence
 from fractions import Fraction
 
-from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Constant, Node, Operation, Program, Result, walk
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines
-from strapgen.targets.c.emit import HALF_TURNS
-from strapgen.targets.c.rounding_text import rounding_text, with_names
+from strapgen.targets.c.emit import HALF_TURNS, sources_of
+from strapgen.targets.c.rounding_text import rounding_text
 from strapgen.targets.lines import fill_arguments, fill_expression
 from strapgen.targets.matlab.names import MATLAB, file_name
-from strapgen.targets.names import printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.rendering import render
 
@@ -34,7 +32,7 @@ _FUNCTIONS = {
 _PROPAGATE = ("initial", "samples", "record_every", "restore_every", "restore")
 
 
-class MatlabPrinter(Printer):
+class _MatlabPrinter(Printer):
     """Prints nodes as MATLAB expressions on rows of samples."""
 
     times, over = ".*", "./"
@@ -49,51 +47,15 @@ class MatlabPrinter(Printer):
 
 
 def emit(program: Program, target: str) -> Sources:
-    """Generate a function file of MATLAB for a program.
-
-    Parameters
-    ----------
-    program : Program
-    target : str
-        Name of the target.
-
-    Returns
-    -------
-    Sources
-        One file. Its function takes and returns arrays (shape, samples), so that one sample is a column or a matrix; a
-        step has ``<name>_propagate`` beside it, the loop over steps.
-
-    Raises
-    ------
-    InputError
-        If a user chose a keyword for the name of the function.
-    """
+    """Print a function of arrays (shape, samples), one sample being a column or a matrix, and a loop over steps."""
     name = file_name(program)
-    scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, "double")
-    _, files = printed(
-        program,
-        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
-        MATLAB,
-        scalars,
-    )
-    return Sources(
-        program.kernel,
-        target,
-        files,
-        Function(name, program.inputs, tuple(result.signal for result in program.outputs)),
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-        runs=(f"{name}_propagate.m",) if program.companions else (),
-        rounding=rounding,
-    )
+    runs = (f"{name}_propagate.m",) if program.companions else ()
+    return sources_of(program, target, name, _files, MATLAB, runs)
 
 
 def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
     """Return the function of a program with its printed names and, for a step, the loop."""
-    printer = MatlabPrinter()
+    printer = _MatlabPrinter()
     command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     outputs = [result.signal.name for result in program.outputs]
@@ -117,8 +79,8 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
     return files
 
 
-def _loop(program: Program, identity: Iterable[Fraction], printer: MatlabPrinter) -> dict[str, object]:
-    """Return what the loop over steps holds: a step in two parts, without the state and with it."""
+def _loop(program: Program, identity: Iterable[Fraction], printer: _MatlabPrinter) -> dict[str, object]:
+    """Return the two parts of a step in the loop over steps, without the state and with it."""
     ahead, behind = program.split()
     state = program.inputs[0]
     first = _array(_by_columns(map(printer.constant, identity), state.shape), state.shape)
@@ -133,7 +95,7 @@ def _loop(program: Program, identity: Iterable[Fraction], printer: MatlabPrinter
     }
 
 
-def _code(program: Program, printer: MatlabPrinter) -> dict[str, object]:
+def _code(program: Program, printer: _MatlabPrinter) -> dict[str, object]:
     """Return the statements of a function: loads, assignments, stores."""
     used = program.used(program.outputs)
     return {
@@ -170,7 +132,7 @@ def _by_columns(elements: Iterable[str], shape: tuple[int, ...]) -> list[str]:
     return [rows[i * shape[1] + j] for j in range(shape[1]) for i in range(shape[0])]
 
 
-def _output(result: Result, program: Program, printer: MatlabPrinter) -> str:
+def _output(result: Result, program: Program, printer: _MatlabPrinter) -> str:
     """Return the array (shape, samples) of an output."""
     first = program.inputs[0]
 

@@ -20,7 +20,7 @@ _WORDS = frozenset(_WORDS_TEXT.split())
 
 
 def _allows(name: str) -> bool:
-    """Return whether an identifier can name a quantity: it begins with a letter, and has at most 63 characters."""
+    """Tell whether an identifier can name a quantity: it begins with a letter, and has at most 63 characters."""
     return name not in _WORDS and not name.startswith("_") and len(name) <= 63
 
 
@@ -45,11 +45,6 @@ def file_name(program: Program) -> str:
 
     MATLAB and Octave have thousands of functions, and a file of the same name would hide one of them. Their names are
     mostly a single word, so a kernel whose name is one gets another word behind it.
-
-    Raises
-    ------
-    InputError
-        If a user chose a keyword.
     """
     name = function_name(program)
     if not program.function:

@@ -26,7 +26,7 @@ _FUNCTIONS = {
 }
 
 
-class NumpyPrinter(Printer):
+class _NumpyPrinter(Printer):
     """Prints nodes as numpy expressions."""
 
     def constant(self, value: Fraction) -> str:
@@ -39,20 +39,7 @@ class NumpyPrinter(Printer):
 
 
 def emit(program: Program, target: str) -> Sources:
-    """Generate a numpy module for a program.
-
-    Parameters
-    ----------
-    program : Program
-    target : str
-        Name of the target.
-
-    Returns
-    -------
-    Sources
-        One file. Its function takes and returns arrays (..., shape); a step has a second function,
-        ``<name>_transition``, from the increments to the transition.
-    """
+    """Print a module with a function of arrays (..., shape), and of a step the function ``<name>_transition``."""
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     named, files = printed(program, lambda part, _: _files(part, target), PYTHON, scalars)
     function = Function(named.name, program.inputs, tuple(result.signal for result in program.outputs))
@@ -89,7 +76,7 @@ def _files(program: Program, target: str) -> dict[str, str]:
 
 
 def _function(program: Program, is_transition: bool) -> dict[str, object]:
-    printer = NumpyPrinter()
+    printer = _NumpyPrinter()
     used = program.used()
     loads = []
     for signal in program.inputs:

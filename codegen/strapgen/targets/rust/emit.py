@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, walk
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c import emit as c
-from strapgen.targets.c.rounding_text import rounding_text, with_names
+from strapgen.targets.c.rounding_text import rounding_text
 from strapgen.targets.cpp.emit import interface_values
 from strapgen.targets.cpp.text import CHECK, runs_of
-from strapgen.targets.names import function_name, printed
+from strapgen.targets.names import function_name
 from strapgen.targets.rendering import render
 from strapgen.targets.rust.text import RUST, TYPES, array, constants, module_name, structure_name
 
@@ -43,7 +42,7 @@ _FUNCTIONS = {
 }
 
 
-class RustPrinter(c.CPrinter):
+class _RustPrinter(c.CPrinter):
     """Prints nodes as Rust expressions: sums and products are those of C, choices and declarations are not."""
 
     def constant(self, value: Fraction) -> str:
@@ -60,48 +59,14 @@ class RustPrinter(c.CPrinter):
 
 
 def emit(program: Program, target: str) -> Sources:
-    """Generate a Rust module for a program, with the C interface through which other languages call it.
-
-    Parameters
-    ----------
-    program : Program
-    target : str
-        A target whose numbers are those of a type of C.
-
-    Returns
-    -------
-    Sources
-        One module with the function ``<name>``; and two files with ``<name>``, ``<name>_array`` and, for a step,
-        ``<name>_propagate`` for C, the functions of the same names that the target ``c`` has.
-    """
-    real = c.real_of(target)
-    name = module_name(function_name(program, real.infix))
-    scalars = [signal.name for signal in program.inputs if not signal.shape]
-    rounding = rounding_bounds(program, real.name)
-    _, files = printed(
-        program,
-        lambda named, _: _files(named, name, target, with_names(rounding, program, named)),
-        RUST,
-        scalars,
-    )
-    function = Function(name, program.inputs, tuple(result.signal for result in program.outputs))
-    return Sources(
-        program.kernel,
-        target,
-        files,
-        function,
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-        runs=runs_of(name, "rust", "rs"),
-        rounding=rounding,
-    )
+    """Print a module with ``<name>``, and the functions of the target ``c`` as an interface to it."""
+    name = module_name(function_name(program, c.real_of(target).infix))
+    return c.sources_of(program, target, name, _files, RUST, runs_of(name, "rust", "rs"))
 
 
 def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
     """Return the module and the C interface of a program with its printed names."""
-    printer = RustPrinter(c.real_of(target), name)
+    printer = _RustPrinter(c.real_of(target), name)
     kind = TYPES[printer.real.name]
     command = f"{contract.generating(program)} --target {target}"
     nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]

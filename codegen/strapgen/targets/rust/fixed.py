@@ -22,7 +22,7 @@ _WORDS = {
 }
 
 
-class RustStatementPrinter(StatementPrinter):
+class _RustStatementPrinter(StatementPrinter):
     """Prints statements of Rust, which converts no number by itself."""
 
     def helper(self, name: str) -> str:
@@ -42,7 +42,7 @@ class RustStatementPrinter(StatementPrinter):
         return f"let {name}: {kind} = {self.read(kind, source, argument)};"
 
     def start(self, kind: str, name: str, constant: bool = True) -> str:
-        """Return how the declaration of a value starts."""
+        """Return the beginning of a value's declaration."""
         return f"let {'' if constant else 'mut '}{name}: {kind} ="
 
     def unset(self, kind: str, name: str) -> str:
@@ -74,28 +74,14 @@ class RustStatementPrinter(StatementPrinter):
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
-    """Print a Rust module for a program, with the C interface through which other languages call it.
-
-    Parameters
-    ----------
-    fixed : FixedProgram
-        With a word of the target.
-    target : str
-        Name of the target.
-
-    Returns
-    -------
-    Sources
-        One module with the function ``<name>``; and two files with ``<name>``, ``<name>_array`` and, for a step,
-        ``<name>_propagate`` for C, the functions of the same names that the target ``c-fixed`` has.
-    """
+    """Print a module with ``<name>``, and the functions of the target ``c-fixed`` as an interface to it."""
     name = module_name(function_name(fixed.program, f"_w{fixed.word}"))
     return c_fixed.sources_of(fixed, target, name, _files, RUST, runs_of(name, "rust", "rs"))
 
 
 def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     """Return the module and the C interface of a program with its printed names."""
-    printer, interface = RustStatementPrinter(fixed, _WORDS[fixed.word], name), fixed.interface
+    printer, interface = _RustStatementPrinter(fixed, _WORDS[fixed.word], name), fixed.interface
     header, runs = runs_of(name, "rust", "rs")
     inputs = [(TYPES[memory_type(a)], a.signal.size, a.signal.name) for a in interface.inputs]
     outputs = [(TYPES[memory_type(a)], a.signal.size, a.signal.name) for a in interface.outputs]

@@ -1,9 +1,9 @@
-"""What Rust asks of names, types and constants."""
+"""The rules of Rust for names, types and constants."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from strapgen.targets.definitions import Macro
 from strapgen.targets.lines import fill_arguments
@@ -36,13 +36,6 @@ RUST = Language(_allows, C.scopes, most=C.most)
 def module_name(name: str) -> str:
     """Return the name of a function and of its module: that of C, changed if Rust has it for itself.
 
-    Parameters
-    ----------
-    name : str
-        Name of the function in C.
-
-    Examples
-    --------
     >>> module_name("euler_rk4_2"), module_name("loop")
     ('euler_rk4_2', 'loop_Kernel')
     """
@@ -52,8 +45,6 @@ def module_name(name: str) -> str:
 def structure_name(name: str) -> str:
     """Return the name of the structure with the outputs of a function.
 
-    Examples
-    --------
     >>> structure_name("imu_compensate")
     'ImuCompensateOutputs'
     """
@@ -78,8 +69,3 @@ def _constant(definition: Macro, real: str) -> str:
     if len(line) + len(comment) < 99:
         return f"{line} {comment}"
     return f"{comment}\n{fill_arguments(line, '    ')}"
-
-
-def fields(names: Iterable[str], values: Iterable[str]) -> str:
-    """Return the fields of a structure with their values or types."""
-    return ", ".join(f"{name}: {value}" for name, value in zip(names, values, strict=True))
