@@ -1,4 +1,4 @@
-"""The command ``strapgen derive`` shows the formulas or the program of a kernel."""
+"""The command ``strapgen derive``: formulas or program of a kernel."""
 
 from __future__ import annotations
 

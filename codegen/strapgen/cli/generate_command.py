@@ -1,4 +1,4 @@
-"""The command ``strapgen generate`` writes the source code of a kernel or of the standard catalogue."""
+"""The command ``strapgen generate``: source code of a kernel or of the standard catalogue."""
 
 from __future__ import annotations
 
@@ -88,7 +88,6 @@ def generate(
 
 
 def _names(target: str | None) -> list[str]:
-    """Return the targets of the option, each checked."""
     from strapgen.targets import TARGETS
 
     return [
@@ -98,7 +97,6 @@ def _names(target: str | None) -> list[str]:
 
 
 def _files(task: Request, sources: Sources, output: SourceOptions) -> dict[str, str]:
-    """Return the files of a target that the options ask for."""
     files = sources.files if output.with_runs else sources.step_files
     return files | _project_files(task, output) if output.project else files
 
@@ -116,13 +114,7 @@ def _together(groups: list[dict[str, str]]) -> dict[str, str]:
 def request(
     algorithm: str, method: KernelOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
-    """Return what the options of the command ask for.
-
-    Raises
-    ------
-    InputError
-        If options do not go together.
-    """
+    """Return the request of the command's options."""
     from strapgen.run.generation import Request
     from strapgen.targets import TARGETS, fixed_targets
 
@@ -153,7 +145,6 @@ def _check_alone(
     fixed: FixedOptions,
     output: SourceOptions,
 ) -> None:
-    """Refuse options that do not go with --all."""
     for name, value in (
         ("an algorithm", algorithm),
         ("--method", method.method),
@@ -176,7 +167,6 @@ def _check_alone(
 
 
 def _text(task: Request, sources: Sources, written: list[Path]) -> str:
-    """Return the operations and the files, in fixed point with the gyro and the error of every output."""
     from strapgen.cli import generated_text
 
     lines = [*generated_text.head(sources, task.target, written), *_call_rate(task)]
@@ -184,7 +174,7 @@ def _text(task: Request, sources: Sources, written: list[Path]) -> str:
 
 
 def _call_rate(task: Request) -> list[str]:
-    """Return how often a step is called, if the sampling rate is stated and a step takes several samples."""
+    """Return the line with the rate of calls, if the sampling rate is stated and a step takes several samples."""
     words = [] if task.settings is None else task.settings.stated.split()
     count = task.choice.increments_per_step
     if "--sample-hz" not in words or count < 2:

@@ -24,7 +24,7 @@ _Text = str | None
 def option(*names: str, metavar: str | None = None, help: str, panel: str | None = None) -> Any:
     """Return an option of a command; the names after the first one are aliases, which the help does not show.
 
-    A default that the parameter has is shown if it is no None; one that the command finds stands in the help.
+    A default of the parameter is shown if it is not None; one that the command finds stands in the help.
     """
     check = _require_folder if metavar == "FOLDER" else None
     return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel, callback=check)
@@ -221,7 +221,6 @@ class MethodOptions:
             return self._with_constants(choose(algorithm, method, count, self.rates, before, after))
 
     def _with_constants(self, choice: Choice) -> Choice:
-        """Return a choice with the constants of the options."""
         if not self.constant:
             return choice
         from strapgen import catalogue
@@ -300,7 +299,7 @@ class SeveralMethods(MethodOptions):
         ]
 
     def choices(self, algorithm: str, *, step: bool = True) -> list[Choice]:
-        """Return the algorithm with every method and every number of increments."""
+        """Return the choices of the algorithm with every method and every number of increments."""
         return [options.choose(algorithm, step=step) for options in self.each()]
 
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
@@ -337,13 +336,7 @@ def one(option: str, value: str | None) -> None:
 
 
 def listed(option: str, text: str) -> list[str]:
-    """Return the values of a comma-separated list, each once.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the values of a comma-separated list, each once, at least one."""
     values = list(dict.fromkeys(value.strip() for value in text.split(",") if value.strip()))
     if not values:
         raise InputError(f"{option} is {text!r}; at least one value is needed")
@@ -360,13 +353,7 @@ def backends(option: str, text: str | None, default: Sequence[str]) -> list[str]
 
 
 def pair(option: str, text: str) -> tuple[str, str]:
-    """Return the name and the value of a setting.
-
-    Raises
-    ------
-    InputError
-        If the text is none.
-    """
+    """Return the name and the value of NAME=VALUE."""
     name, equals, value = text.partition("=")
     if not equals or not name or not value:
         raise InputError(f"{option} {text!r} is no setting; NAME=VALUE is needed")
