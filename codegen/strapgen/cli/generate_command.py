@@ -10,7 +10,7 @@ import typer
 from strapgen import applications
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import KernelOptions, OptionalAlgorithm, listed, option
+from strapgen.cli.options import MethodOptions, OptionalAlgorithm, listed, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def generate(
     algorithm: OptionalAlgorithm = None,
     *,
-    method: KernelOptions,
+    method: MethodOptions,
     target: Annotated[
         str | None,
         option(
@@ -112,7 +112,7 @@ def _together(groups: list[dict[str, str]]) -> dict[str, str]:
 
 
 def request(
-    algorithm: str, method: KernelOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
+    algorithm: str, method: MethodOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
     """Return the request of the command's options."""
     from strapgen.run.generation import Request
@@ -141,7 +141,7 @@ def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
 
 def _check_alone(
     algorithm: str | None,
-    method: KernelOptions,
+    method: MethodOptions,
     fixed: FixedOptions,
     output: SourceOptions,
 ) -> None:

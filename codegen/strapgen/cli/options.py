@@ -112,7 +112,7 @@ Increments = Annotated[
 
 @dataclass(frozen=True)
 class MethodOptions:
-    """Options that choose the integration method of an algorithm and the samples that a step takes."""
+    """Options that choose a kernel: the method and the samples of a step, constants, the layout of another kernel."""
 
     panel: ClassVar[str] = "Algorithm"
 
@@ -183,10 +183,19 @@ class MethodOptions:
         ),
     ] = None
 
+    layout: Annotated[
+        Path | None,
+        option(
+            "--layout",
+            metavar="FILE",
+            help="TOML file with the gyros whose rate and acceleration separate separates.",
+        ),
+    ] = None
+
     @property
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
-        return self.tableau, self.window, self.coning
+        return self.tableau, self.window, self.coning, self.layout
 
     @property
     def stated(self) -> list[str]:
@@ -213,7 +222,7 @@ class MethodOptions:
         for path, read in readers.values():
             if path is not None:
                 method = read(path)
-        choose = catalogue.choose_step if step else self._chooser()
+        choose = catalogue.choose_step if step else partial(catalogue.choose, layout=self.layout)
         one("--method", self.method)
         count = whole("increments", self.increments)
         before, after = whole("previous", self.previous), whole("ahead", self.ahead)
@@ -233,40 +242,11 @@ class MethodOptions:
             constants[name] = [number.strip() for number in numbers.split(",")]
         return catalogue.with_constants(choice, constants)
 
-    def _chooser(self) -> Callable[..., Choice]:
-        """Return the function that chooses a kernel, which need be no attitude step."""
-        from strapgen import catalogue
-
-        return catalogue.choose
-
-
-@dataclass(frozen=True)
-class KernelOptions(MethodOptions):
-    """Options that choose a kernel: those of an attitude step, and the constants and the layout of any other."""
-
-    layout: Annotated[
-        Path | None,
-        option(
-            "--layout",
-            metavar="FILE",
-            help="TOML file with the gyros whose rate and acceleration separate separates.",
-        ),
-    ] = None
-
-    @property
-    def files(self) -> tuple[Path | None, ...]:
-        """The files that the options name."""
-        return *super().files, self.layout
-
-    def _chooser(self) -> Callable[..., Choice]:
-        """Return the function that chooses a kernel, with its layout."""
-        from strapgen import catalogue
-
-        return partial(catalogue.choose, layout=self.layout)
-
 
 #: The options of an attitude step, which takes increments.
 STEP_OPTIONS = ("method", "tableau", "window", "coning", "increments", "previous", "ahead", "constant")
+#: The options of any step, which may take rates too.
+ANY_STEP_OPTIONS = tuple(part.name for part in fields(MethodOptions) if part.name != "layout")
 
 
 @dataclass(frozen=True)
