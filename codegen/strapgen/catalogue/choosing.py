@@ -1,4 +1,4 @@
-"""Choosing checks names and options, fills in the defaults and returns a `Choice`."""
+"""Choice of a kernel: names and options are checked, defaults are filled in."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
 
 
 def _with_values(kernel: Kernel, values: Constants) -> Kernel:
-    """Return a user's kernel with numbers in place of unknowns; its arguments state them."""
+    """Return a user's kernel with numbers in place of unknowns, stated in its arguments."""
     for name, numbers in values:
         if len(numbers) != 1:
             raise InputError(f"kernel {kernel.name}: {name} has {len(numbers)} numbers; 1 is needed")
@@ -111,7 +111,6 @@ def _with_values(kernel: Kernel, values: Constants) -> Kernel:
 
 
 def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Choice:
-    """Return the choice of a kernel of a layout, which its file describes."""
     if choice.name not in LAYOUT_KERNELS:
         raise InputError(f"{choice.name} takes no layout; {' and '.join(LAYOUT_KERNELS)} do")
     if layout is None:
@@ -186,7 +185,6 @@ def _choose(
 def _choose_samples(
     name: str, method: str | Tableau, increments: int | None, rates: bool, beside: tuple[int, int]
 ) -> Choice:
-    """Return the choice of a method with the samples that the options ask for, if it goes with them."""
     previous, ahead = beside
     if rates:
         if increments is not None or previous or ahead:
@@ -292,7 +290,6 @@ def _choose_users(
     previous: int | None,
     ahead: int | None,
 ) -> Choice:
-    """Load a user's algorithm with the options that the user chose."""
     if rates:
         raise InputError(
             f"{name}: rates at nodes go with methods of the catalogue; the file of an algorithm says what it takes"
@@ -310,7 +307,7 @@ def _choose_users(
 
 
 def _algorithms() -> list[str]:
-    """Return the names of all attitude steps: those of the catalogue, and those that users have installed."""
+    """Return the names of all attitude steps, the installed ones included."""
     return list(dict.fromkeys([*ALGORITHMS, *loading.installed()]))
 
 

@@ -1,4 +1,4 @@
-"""`derive` returns the kernel of a choice; other functions tell what is known of its method without deriving it."""
+"""Derivation of the kernel of a choice, and properties of its method that need no derivation."""
 
 from __future__ import annotations
 
@@ -47,8 +47,6 @@ def rounding(choice: Choice) -> Fraction:
 def enough(method: AnyMethod) -> int:
     """Return the smallest number of increments with which a step reaches the order of its method.
 
-    Examples
-    --------
     >>> enough("rk4"), enough("butcher6"), enough("window-7-7")
     (2, 4, 1)
     """
@@ -65,18 +63,7 @@ def enough(method: AnyMethod) -> int:
 
 
 def derive(choice: Choice) -> Kernel:
-    """Derive a kernel exactly.
-
-    Parameters
-    ----------
-    choice : Choice
-        What `choose` returned.
-
-    Raises
-    ------
-    InputError
-        If the kernel has no input for a constant of the choice, see `folding.fold`.
-    """
+    """Derive a kernel exactly; raise InputError if it has no input for a constant of the choice."""
     kernel = _derived(choice)
     if not choice.constants:
         return kernel
@@ -100,7 +87,6 @@ def _known(choice: Choice) -> Kernel:
 
 
 def _of_catalogue(choice: Choice) -> Kernel:
-    """Return the kernel of a choice of names."""
     if choice.method is None:
         described = choice.layout is not None
         recipe = LAYOUT_KERNELS[choice.name] if described else KERNELS[choice.name]
@@ -126,15 +112,7 @@ def _of_catalogue(choice: Choice) -> Kernel:
 
 
 def companion(kernel: Kernel, name: str) -> Kernel:
-    """Return a kernel that a step needs: the user's own if there is one, else that of the catalogue.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        An attitude step.
-    name : str
-        Name of the product, orthonormalization or attitude kernel in the step's `companions`.
-    """
+    """Return a kernel named in a step's `companions`: the user's own if there is one, else that of the catalogue."""
     return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
 
 
@@ -148,7 +126,7 @@ def _require_conditions(tableau: Tableau) -> None:
 
 
 def _method(method: AnyMethod) -> Method:
-    """Load a method by its name, from its tableau or from its window."""
+    """Return a method by its name, from its tableau or from its window."""
     from strapgen.catalogue.methods import coning, runge_kutta, windowed
 
     shape = named_shape(method)

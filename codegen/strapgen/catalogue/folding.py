@@ -1,4 +1,4 @@
-"""Folds constants into a kernel: inputs whose values are known become numbers in its formulas."""
+"""Constants folded into a kernel: inputs with known values become numbers in its formulas."""
 
 from __future__ import annotations
 
@@ -19,27 +19,8 @@ _UNDEFINED = (sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I)
 
 
 def fold(kernel: Kernel, constants: Constants) -> Kernel:
-    """Return a kernel with constants in place of inputs; what is multiplied by zero vanishes.
+    """Return a kernel with constants in place of inputs, stated in its arguments and notes; products with 0 vanish.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    constants : tuple of (str, tuple of Fraction)
-        The name of each input and its numbers, in its unit and row by row, as `constants.read` returns.
-
-    Returns
-    -------
-    Kernel
-        With the same name and the remaining inputs; its arguments and notes state the constants.
-
-    Raises
-    ------
-    InputError
-        If the kernel has no such input, the input is a state, the numbers are too few or too many, no input would
-        remain, or a result would have no value.
-
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> from strapgen.catalogue import Choice, derive
     >>> kernel = fold(derive(Choice("temperature-coefficient")), (("difference", (Fraction(2),)),))
@@ -76,7 +57,7 @@ def fold(kernel: Kernel, constants: Constants) -> Kernel:
 
 
 def _checked(kernel: Kernel, constants: Constants) -> dict[str, Signal]:
-    """Return the inputs that become constants by their names, if all of them can."""
+    """Return by name the inputs that become constants."""
     states = [name for name, _ in kernel.recursion.states] if kernel.recursion else []
     signals = {signal.name: signal for signal in kernel.inputs}
     allowed = [name for name in signals if name not in states]
@@ -114,7 +95,6 @@ def _folded(name: str, stages: tuple[Stage, ...], values: dict[sp.Symbol, sp.Exp
 
 
 def _note(signals: Mapping[str, Signal], constants: Constants) -> str:
-    """Return what the constants are in words."""
     parts = []
     for name, numbers in constants:
         unit = "" if signals[name].unit == "1" else f" {signals[name].unit}"

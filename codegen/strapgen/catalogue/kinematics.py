@@ -1,4 +1,4 @@
-"""The kinematics of an attitude representation is the differential equation of its state.
+"""Kinematics of the attitude representations: the differential equations of their states.
 
 Every state obeys a linear equation dx/dt = f(x, g) with the generator g = scale * w, where w is the body rate. A step
 applied to the identity is the transition, and the product of state and transition is the same step applied to the

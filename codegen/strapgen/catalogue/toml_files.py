@@ -1,4 +1,4 @@
-"""Reads TOML files of users, and says in one line what is wrong with one."""
+"""Users' TOML files, with errors in one line."""
 
 from __future__ import annotations
 
@@ -14,23 +14,7 @@ from strapgen.ir.exceptions import InputError
 def content(
     path: str | Path, what: str, most_bytes: int, parse_float: Callable[[str], Any] = float
 ) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Parameters
-    ----------
-    path : path
-    what : str
-        What the file holds, for an error message: "a tableau".
-    most_bytes : int
-        A longer file is refused.
-    parse_float : callable, optional
-        Returns the number that a text with a decimal point or an exponent stands for.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is too long, not UTF-8 or not TOML.
-    """
+    """Return the content of a TOML file of at most `most_bytes`; `what` it holds and `parse_float` as for tomllib."""
     place = checks.path("path", path)
     try:
         with place.open("rb") as file:

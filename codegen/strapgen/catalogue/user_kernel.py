@@ -1,4 +1,4 @@
-"""A user's kernel as the catalogue holds it: what chooses it is at hand, its formulas when they are needed."""
+"""A user's kernel in the catalogue: its head at hand, its formulas loaded when they are needed."""
 
 from __future__ import annotations
 
@@ -15,39 +15,20 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Head:
-    """What is known of a kernel without its formulas.
-
-    Parameters
-    ----------
-    name : str
-        Name of the kernel.
-    samples : int
-        Rows of its last input: of an attitude step the number of increments that it takes in all.
-    companions : Companions or None
-        The kernels of an attitude step.
-    brought : tuple of str
-        Names of the kernels that come with it.
-    text : str
-        Text that differs between different kernels, without their arguments.
-    unknowns : tuple of str
-        Coefficients that are not known.
-    beside : tuple of (int, int), optional
-        Of a step of velocity and position, the numbers of samples from before it and from after it; None for any
-        other kernel.
-    """
+class _Head:
+    """The properties of a kernel that need none of its formulas."""
 
     name: str
-    samples: int
-    companions: Companions | None
-    brought: tuple[str, ...]
-    text: str
+    samples: int  # rows of its last input: of an attitude step all increments that it takes
+    companions: Companions | None  # of an attitude step
+    brought: tuple[str, ...]  # names of the kernels that come with it
+    text: str  # differs between different kernels; without their arguments
     unknowns: tuple[str, ...] = ()
+    #: Samples from before and from after a step of velocity and position; None for any other kernel.
     beside: tuple[int, int] | None = None
 
     @classmethod
-    def of(cls, kernel: Kernel) -> Head:
-        """Return the head of a kernel."""
+    def of(cls, kernel: Kernel) -> _Head:
         shape = kernel.inputs[-1].shape if kernel.inputs else ()
         brought = tuple(other.name for other in kernel.own)
         text = _text(replace(kernel, arguments=""))
@@ -57,20 +38,9 @@ class Head:
 
 
 class UserKernel:
-    """A user's kernel, whose formulas may still lie in the cache.
+    """A user's kernel, whose formulas may lie in the cache; equal to one with the same formulas and arguments."""
 
-    Two are equal if their formulas and their arguments are.
-
-    Parameters
-    ----------
-    head : Head
-    restore : callable
-        Returns the kernel.
-    arguments : str, optional
-        Name and options on the command line; by default the kernel's.
-    """
-
-    def __init__(self, head: Head, restore: Callable[[], Kernel], arguments: str | None = None) -> None:
+    def __init__(self, head: _Head, restore: Callable[[], Kernel], arguments: str | None = None) -> None:
         self.head, self.arguments = head, arguments
         self._restore = restore
         self._kernel: Kernel | None = None
@@ -78,7 +48,7 @@ class UserKernel:
     @classmethod
     def of(cls, kernel: Kernel) -> UserKernel:
         """Return a kernel that is at hand."""
-        return cls(Head.of(kernel), lambda: kernel, kernel.arguments)
+        return cls(_Head.of(kernel), lambda: kernel, kernel.arguments)
 
     def with_arguments(self, arguments: str) -> UserKernel:
         """Return the same kernel with other arguments."""
@@ -86,7 +56,7 @@ class UserKernel:
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """Coefficients that are not known."""
+        """Coefficients without a value."""
         return self.head.unknowns
 
     @property
@@ -109,13 +79,12 @@ class UserKernel:
         return hash(self.text)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what another process builds the same from."""
         return UserKernel.of, (self.kernel,)
 
 
 def packed(kernel: Kernel) -> bytes | None:
     """Return the head of a kernel as bytes; None if they hold something of SymPy, which takes long to import."""
-    head = Head.of(kernel)
+    head = _Head.of(kernel)
     if b"sympy" in pickle.dumps(replace(head, text="")):
         return None
     return pickle.dumps(head)

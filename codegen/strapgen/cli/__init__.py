@@ -1,4 +1,4 @@
-"""The command line: `main` runs the commands, each of which is a module that imports what it needs when it runs."""
+"""The command line: `main` runs the commands, each of which imports what it needs when it runs."""
 
 from __future__ import annotations
 
@@ -70,12 +70,10 @@ def _add(commands: Mapping[str, Command]) -> None:
 
 
 def _names() -> set[str]:
-    """Return the names of the commands of strapgen."""
     return {*_COMPILER}.union(*(one.commands for one in applications.built_in().values()))
 
 
 def _add_installed() -> None:
-    """Add the commands of installed applications."""
     known = _names()
     for label, application in applications.installed().items():
         for name in application.commands:

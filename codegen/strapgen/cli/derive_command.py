@@ -1,11 +1,11 @@
-"""The command ``strapgen derive`` shows the formulas or the program of a kernel."""
+"""The command ``strapgen derive``: formulas or program of a kernel."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Algorithm, KernelOptions, option
+from strapgen.cli.options import Algorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -17,7 +17,7 @@ _SHOWN = ("text", "latex", "program", "operations")
 def derive(
     algorithm: Algorithm,
     *,
-    method: KernelOptions,
+    method: MethodOptions,
     show: Annotated[
         str,
         option(

@@ -1,4 +1,4 @@
-"""Options that set the word, the rounding and the ranges of fixed-point code, shared by several commands."""
+"""Options for the word, the rounding and the ranges of fixed-point code, shared by several commands."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RUN_OPTIONS = (
 
 @dataclass(frozen=True)
 class FixedOptions:
-    """Options that set the word and the rounding of fixed-point code, and the largest numbers that it must hold."""
+    """Word and rounding of fixed-point code, and the largest numbers that it must hold."""
 
     panel: ClassVar[str] = "Fixed point"
 
@@ -181,7 +181,7 @@ class FixedOptions:
         return {option: value for option, value in options.items() if value not in (None, [])}
 
     def settings(self, increments: int) -> Settings | None:
-        """Return the settings of fixed point for so many increments in a step; None if no option is stated."""
+        """Return the settings of fixed point for so many increments a step; None if no option is stated."""
         if not self.stated:
             return None
         from strapgen.ir import checks
@@ -230,7 +230,7 @@ class FixedOptions:
             raise InputError(f"--lsb is {self.lsb}, an angle a count; --lsb-rad takes it, without its unit")
 
     def at_step(self, seconds: float) -> FixedOptions:
-        """Return the options with the step of a run, by which a largest rate becomes a largest increment."""
+        """Return the options at the step of a run in s, by which a largest rate becomes a largest increment."""
         is_needed = self.max_rate_deg_s is not None or self.lsb is not None
         return replace(self, step=repr(seconds) if is_needed else None)
 
@@ -280,27 +280,9 @@ class FixedOptions:
     def settings_for_run(
         self, backend: str, increments: int | None, step: float, largest: Callable[[], float]
     ) -> Settings | None:
-        """Return the settings of a run in fixed point: formats for the stated largest rate, or else for its increments.
+        """Return the settings of a run with a step in s: formats for the stated largest rate, else for `largest()` rad.
 
-        Parameters
-        ----------
-        backend : str
-        increments : int or None
-            Increments a step, None for the default.
-        step : float
-            Step of the run in s.
-        largest : callable
-            Returns the largest increment of the run in rad.
-
-        Returns
-        -------
-        Settings or None
-            None for a back end in floating point.
-
-        Raises
-        ------
-        InputError
-            If the back end's words have another length than the one stated.
+        None for a back end in floating point.
         """
         from strapgen.ir.fixed_settings import Settings
         from strapgen.run.backends import BACKENDS

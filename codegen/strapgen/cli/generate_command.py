@@ -1,4 +1,4 @@
-"""The command ``strapgen generate`` writes the source code of a kernel or of the standard catalogue."""
+"""The command ``strapgen generate``: source code of a kernel or of the standard catalogue."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from strapgen import applications
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import KernelOptions, OptionalAlgorithm, listed, option
+from strapgen.cli.options import MethodOptions, OptionalAlgorithm, listed, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def generate(
     algorithm: OptionalAlgorithm = None,
     *,
-    method: KernelOptions,
+    method: MethodOptions,
     target: Annotated[
         str | None,
         option(
@@ -88,7 +88,6 @@ def generate(
 
 
 def _names(target: str | None) -> list[str]:
-    """Return the targets of the option, each checked."""
     from strapgen.targets import TARGETS
 
     return [
@@ -98,7 +97,6 @@ def _names(target: str | None) -> list[str]:
 
 
 def _files(task: Request, sources: Sources, output: SourceOptions) -> dict[str, str]:
-    """Return the files of a target that the options ask for."""
     files = sources.files if output.with_runs else sources.step_files
     return files | _project_files(task, output) if output.project else files
 
@@ -114,15 +112,9 @@ def _together(groups: list[dict[str, str]]) -> dict[str, str]:
 
 
 def request(
-    algorithm: str, method: KernelOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
+    algorithm: str, method: MethodOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
-    """Return what the options of the command ask for.
-
-    Raises
-    ------
-    InputError
-        If options do not go together.
-    """
+    """Return the request of the command's options."""
     from strapgen.run.generation import Request
     from strapgen.targets import TARGETS, fixed_targets
 
@@ -149,11 +141,10 @@ def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
 
 def _check_alone(
     algorithm: str | None,
-    method: KernelOptions,
+    method: MethodOptions,
     fixed: FixedOptions,
     output: SourceOptions,
 ) -> None:
-    """Refuse options that do not go with --all."""
     for name, value in (
         ("an algorithm", algorithm),
         ("--method", method.method),
@@ -176,7 +167,6 @@ def _check_alone(
 
 
 def _text(task: Request, sources: Sources, written: list[Path]) -> str:
-    """Return the operations and the files, in fixed point with the gyro and the error of every output."""
     from strapgen.cli import generated_text
 
     lines = [*generated_text.head(sources, task.target, written), *_call_rate(task)]
@@ -184,7 +174,7 @@ def _text(task: Request, sources: Sources, written: list[Path]) -> str:
 
 
 def _call_rate(task: Request) -> list[str]:
-    """Return how often a step is called, if the sampling rate is stated and a step takes several samples."""
+    """Return the line with the rate of calls, if the sampling rate is stated and a step takes several samples."""
     words = [] if task.settings is None else task.settings.stated.split()
     count = task.choice.increments_per_step
     if "--sample-hz" not in words or count < 2:

@@ -1,4 +1,4 @@
-"""Tells of generated sources: operations, files, the gyro and the range of samples, the error of every output."""
+"""Lines on generated sources: operations, files, the gyro and the range of samples, the error of every output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def head(sources: Sources, target: str, written: Iterable[Path] = ()) -> list[st
 
 
 def contract(sources: Sources) -> Iterator[str]:
-    """Yield what a caller must know: in fixed point the gyro and the range of samples, and the error of outputs."""
+    """Yield lines on the gyro and the range of samples in fixed point, and on the error of outputs."""
     if sources.fixed is not None:
         yield from _fixed(sources.fixed)
     if sources.rounding is not None:

@@ -1,4 +1,4 @@
-"""Lays out the help of a command as plain text as wide as the terminal, and explains wrong words in one line."""
+"""Help of commands as plain text as wide as the terminal, and explanations of wrong words in one line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class PlainCommand(TyperCommand):
     """A command whose help is plain text and whose messages name its options."""
 
     def get_help(self, ctx: Any) -> str:
-        """Return the help: usage, text, examples, arguments, and the options in their groups."""
+        """Return usage, text, examples, arguments, and the options in their groups."""
         return "\n".join(_help(self, ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -49,7 +49,7 @@ class PlainGroup(TyperGroup):
     headings: ClassVar[dict[str, list[str]]] = {}
 
     def get_help(self, ctx: Any) -> str:
-        """Return the help: usage, text, options and the commands under their headings."""
+        """Return usage, text, options and the commands under their headings."""
         headings = self.headings or {"Commands": list(self.commands)}
         lines = _help(self, ctx)
         width = max(len(name) for names in headings.values() for name in names)
@@ -61,36 +61,16 @@ class PlainGroup(TyperGroup):
 
 @dataclass(frozen=True)
 class CommandHelp:
-    """What the help of a command says, before it is laid out.
+    """The help of a command before it is laid out."""
 
-    Parameters
-    ----------
-    usage : str
-        The command with its arguments, as it is typed.
-    paragraphs : tuple of str
-        The text without its examples, each paragraph in one line.
-    examples : tuple of str
-        Whole commands, each in one line.
-    panels : mapping of str to list of tuple of str
-        Arguments and options with what they mean, by the titles of their groups.
-    """
-
-    usage: str
-    paragraphs: tuple[str, ...]
-    examples: tuple[str, ...]
-    panels: Mapping[str, Sequence[tuple[str, str]]]
+    usage: str  # the command with its arguments, as it is typed
+    paragraphs: tuple[str, ...]  # the text without its examples, each paragraph in one line
+    examples: tuple[str, ...]  # whole commands, each in one line
+    panels: Mapping[str, Sequence[tuple[str, str]]]  # arguments and options with their help, by group
 
 
 def help_parts(command: Any, context: Any) -> CommandHelp:
-    """Return what ``--help`` says of a command; terminal and reference lay it out.
-
-    Parameters
-    ----------
-    command : Command
-        A command of Typer, or a group of commands.
-    context : Context
-        Its context, whose path of names begins the usage.
-    """
+    """Return the help of a command or group of Typer, whose context has the path of names that begins the usage."""
     pieces = [f"[{_label(p)}]" if not p.required else _label(p) for p in _arguments(command, context)]
     if hasattr(command, "commands"):
         pieces.append("COMMAND [ARGS]...")
@@ -106,13 +86,7 @@ def help_parts(command: Any, context: Any) -> CommandHelp:
 
 
 def explanation(error: Any) -> str:
-    """Return what a line of usage lacks, in one sentence: what was perhaps meant, and what is allowed.
-
-    Parameters
-    ----------
-    error : UsageError
-        An error of Typer's parser.
-    """
+    """Return an error of Typer's parser in one sentence: the likely meaning, and the allowed words."""
     said = error.format_message() or "a command is needed"
     context = getattr(error, "ctx", None)
     command = context and context.command
@@ -142,13 +116,13 @@ def _headings(group: Any) -> dict[str, tuple[str, ...]]:
 
 
 def _needs(command: Any, name: str, context: Any) -> str:
-    """Return the message that an option lacks its value, with what the help says of it."""
+    """Return the message that an option lacks its value, with its help."""
     option = next(option for option in _options(command, context) if name in option.opts)
     return f"{name} needs a value, {option.metavar}: {_meaning(option, context)}"
 
 
 def _meaning(parameter: Any, context: Any) -> str:
-    """Return what the help says of a parameter, to stand behind a colon."""
+    """Return the help of a parameter, to stand behind a colon."""
     text = re.sub(r"\s*\[.*\]$", "", _help_text(parameter, context)).rstrip(".")
     return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
 
@@ -225,7 +199,7 @@ def _arguments(command: Any, context: Any) -> list[Any]:
 
 
 def _label(parameter: Any) -> str:
-    """Return an argument or an option with its value as the help shows it; its aliases are not shown."""
+    """Return an argument or an option with its value as the help shows it, without its aliases."""
     if parameter.param_type_name == "argument":
         return str(parameter.metavar or parameter.name.upper())
     names = sorted((name for name in parameter.opts if not name.startswith("--")), key=len)
@@ -239,7 +213,7 @@ def _help_text(parameter: Any, context: Any) -> str:
 
 
 def _unbroken(remark: str, room: int) -> str:
-    """Return a remark in such a form that no line ends inside it, if it is short enough."""
+    """Return a remark in which no line ends, if it is short enough."""
     return remark.replace(" ", _SPACE) if len(remark) <= room else remark
 
 

@@ -1,4 +1,4 @@
-"""The command ``strapgen list`` shows all names."""
+"""The command ``strapgen list``: all names."""
 
 from __future__ import annotations
 
@@ -51,7 +51,6 @@ def list_names(
 
 
 def _parts() -> dict[str, dict[str, str]]:
-    """Return all names with their meanings, by their kinds."""
     from strapgen import catalogue
     from strapgen.catalogue.user import loading
     from strapgen.run.backends import BACKENDS

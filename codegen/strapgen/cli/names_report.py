@@ -12,17 +12,7 @@ _Meanings = Mapping[str, str]
 
 
 def names_report(kinds: Mapping[str, _Meanings], short: Mapping[str, _Meanings], every: bool) -> Report:
-    """Return names as a report.
-
-    Parameters
-    ----------
-    kinds : mapping of str to mapping of str to str
-        All names and their meanings, by their kind.
-    short : mapping of str to mapping of str to str
-        What the text shows of them.
-    every : bool
-        Whether these are all kinds: each then has a heading, a key of JSON, and its name in a column of the table.
-    """
+    """Return names with their meanings, by kind, as a report; `short` for its text, `every` if these are all kinds."""
 
     def text() -> str:
         width = max(len(name) for part in short.values() for name in part)

@@ -1,4 +1,4 @@
-"""Groups of options: a dataclass declares options once, and each command that has them takes it as one parameter."""
+"""Groups of options: a dataclass declares options once, and a command takes it as one parameter."""
 
 from __future__ import annotations
 
@@ -16,30 +16,21 @@ _KEYWORD = Parameter.KEYWORD_ONLY
 
 
 class Shown(NamedTuple):
-    """Which options of a group a command has, and where its help shows them; it stands in the parameter's annotation.
+    """The options of a group that a command has, in the annotation of the command's parameter."""
 
-    Parameters
-    ----------
-    only : tuple of str
-        Fields that the command has as options, in their order there; the others keep their defaults. Empty for all.
-    before : str
-        Field or parameter before which the help shows these; empty for the place of the parameter.
-    """
-
-    only: tuple[str, ...] = ()
-    before: str = ""
+    only: tuple[
+        str, ...
+    ] = ()  # fields, in the order of the help; the others keep their defaults. Empty for all
+    before: str = (
+        ""  # field or parameter before which the help shows these; empty for the place of the parameter
+    )
 
 
 def grouped(command: Command) -> Command:
-    """Let Typer see the fields of a command's groups as options of the command.
+    """Show Typer the fields of a command's groups as options of the command.
 
     A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. The command gets an
     object of the dataclass in place of the single values. Its class variable `panel` is the heading of its options.
-
-    Raises
-    ------
-    TypeError
-        If two options of a command have one name, or a field to be shown is not there.
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, tuple[type[Any], tuple[str, ...]]] = {}
@@ -70,7 +61,6 @@ def grouped(command: Command) -> Command:
 
 
 def _options(group: type[Any], only: tuple[str, ...]) -> list[Parameter]:
-    """Return the fields of a group as parameters of a command."""
     hints = get_type_hints(group, include_extras=True)
     fields = {field.name: field for field in dataclasses.fields(group)}
     if unknown := {*only} - {*fields}:
@@ -83,7 +73,6 @@ def _options(group: type[Any], only: tuple[str, ...]) -> list[Parameter]:
 
 
 def _in_panel(hint: Any, panel: str | None) -> Any:
-    """Return the annotation of an option that the help shows among those of its group."""
     metadata = [copy(item) if hasattr(item, "rich_help_panel") else item for item in hint.__metadata__]
     for item in metadata:
         if hasattr(item, "rich_help_panel"):
@@ -96,7 +85,6 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 
 
 def _insert(options: dict[str, Parameter], more: list[Parameter], before: str) -> dict[str, Parameter]:
-    """Return options with more of them behind all others, or before one of them."""
     if twice := {*options} & {option.name for option in more}:
         raise TypeError(f"two options of a command are named {', '.join(sorted(twice))}")
     names = list(options)
@@ -106,19 +94,7 @@ def _insert(options: dict[str, Parameter], more: list[Parameter], before: str) -
 
 
 def command_line(command: str, names: Iterable[str], stated: Mapping[str, str], *groups: Any) -> str:
-    """Return the command line with all options that are not the default.
-
-    Parameters
-    ----------
-    command : str
-        Name of the command.
-    names : iterable of str
-        Its arguments.
-    stated : mapping of str to str
-        Options that belong to no group, with their values.
-    groups : object
-        The groups of options that the command has.
-    """
+    """Return the command line of arguments, stated options and groups, with all options that are not the default."""
     words = ["strapgen", command, *names, *(word for pair in stated.items() for word in pair)]
     for group in groups:
         hints = get_type_hints(type(group), include_extras=True)

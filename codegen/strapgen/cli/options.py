@@ -24,7 +24,7 @@ _Text = str | None
 def option(*names: str, metavar: str | None = None, help: str, panel: str | None = None) -> Any:
     """Return an option of a command; the names after the first one are aliases, which the help does not show.
 
-    A default that the parameter has is shown if it is no None; one that the command finds stands in the help.
+    A default of the parameter is shown if it is not None; one that the command finds stands in the help.
     """
     check = _require_folder if metavar == "FOLDER" else None
     return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel, callback=check)
@@ -112,7 +112,7 @@ Increments = Annotated[
 
 @dataclass(frozen=True)
 class MethodOptions:
-    """Options that choose the integration method of an algorithm and the samples that a step takes."""
+    """Options that choose a kernel: the method and the samples of a step, constants, the layout of another kernel."""
 
     panel: ClassVar[str] = "Algorithm"
 
@@ -183,10 +183,19 @@ class MethodOptions:
         ),
     ] = None
 
+    layout: Annotated[
+        Path | None,
+        option(
+            "--layout",
+            metavar="FILE",
+            help="TOML file with the gyros whose rate and acceleration separate separates.",
+        ),
+    ] = None
+
     @property
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
-        return self.tableau, self.window, self.coning
+        return self.tableau, self.window, self.coning, self.layout
 
     @property
     def stated(self) -> list[str]:
@@ -213,7 +222,7 @@ class MethodOptions:
         for path, read in readers.values():
             if path is not None:
                 method = read(path)
-        choose = catalogue.choose_step if step else self._chooser()
+        choose = catalogue.choose_step if step else partial(catalogue.choose, layout=self.layout)
         one("--method", self.method)
         count = whole("increments", self.increments)
         before, after = whole("previous", self.previous), whole("ahead", self.ahead)
@@ -221,7 +230,6 @@ class MethodOptions:
             return self._with_constants(choose(algorithm, method, count, self.rates, before, after))
 
     def _with_constants(self, choice: Choice) -> Choice:
-        """Return a choice with the constants of the options."""
         if not self.constant:
             return choice
         from strapgen import catalogue
@@ -234,40 +242,11 @@ class MethodOptions:
             constants[name] = [number.strip() for number in numbers.split(",")]
         return catalogue.with_constants(choice, constants)
 
-    def _chooser(self) -> Callable[..., Choice]:
-        """Return the function that chooses a kernel, which need be no attitude step."""
-        from strapgen import catalogue
-
-        return catalogue.choose
-
-
-@dataclass(frozen=True)
-class KernelOptions(MethodOptions):
-    """Options that choose a kernel: those of an attitude step, and the constants and the layout of any other."""
-
-    layout: Annotated[
-        Path | None,
-        option(
-            "--layout",
-            metavar="FILE",
-            help="TOML file with the gyros whose rate and acceleration separate separates.",
-        ),
-    ] = None
-
-    @property
-    def files(self) -> tuple[Path | None, ...]:
-        """The files that the options name."""
-        return *super().files, self.layout
-
-    def _chooser(self) -> Callable[..., Choice]:
-        """Return the function that chooses a kernel, with its layout."""
-        from strapgen import catalogue
-
-        return partial(catalogue.choose, layout=self.layout)
-
 
 #: The options of an attitude step, which takes increments.
 STEP_OPTIONS = ("method", "tableau", "window", "coning", "increments", "previous", "ahead", "constant")
+#: The options of any step, which may take rates too.
+ANY_STEP_OPTIONS = tuple(part.name for part in fields(MethodOptions) if part.name != "layout")
 
 
 @dataclass(frozen=True)
@@ -300,7 +279,7 @@ class SeveralMethods(MethodOptions):
         ]
 
     def choices(self, algorithm: str, *, step: bool = True) -> list[Choice]:
-        """Return the algorithm with every method and every number of increments."""
+        """Return the choices of the algorithm with every method and every number of increments."""
         return [options.choose(algorithm, step=step) for options in self.each()]
 
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
@@ -337,13 +316,7 @@ def one(option: str, value: str | None) -> None:
 
 
 def listed(option: str, text: str) -> list[str]:
-    """Return the values of a comma-separated list, each once.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the values of a comma-separated list, each once, at least one."""
     values = list(dict.fromkeys(value.strip() for value in text.split(",") if value.strip()))
     if not values:
         raise InputError(f"{option} is {text!r}; at least one value is needed")
@@ -360,13 +333,7 @@ def backends(option: str, text: str | None, default: Sequence[str]) -> list[str]
 
 
 def pair(option: str, text: str) -> tuple[str, str]:
-    """Return the name and the value of a setting.
-
-    Raises
-    ------
-    InputError
-        If the text is none.
-    """
+    """Return the name and the value of NAME=VALUE."""
     name, equals, value = text.partition("=")
     if not equals or not name or not value:
         raise InputError(f"{option} {text!r} is no setting; NAME=VALUE is needed")

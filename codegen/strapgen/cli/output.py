@@ -1,4 +1,4 @@
-"""Options for the output of a command, which goes to the terminal or into files written whole or not at all."""
+"""Options for the output of a command, on the terminal or in files written whole or not at all."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _TERMINAL = Path("-")
 
 
 def format_option(formats: tuple[str, ...], default: str = "") -> Any:
-    """Return the option --format; `default` says in words what holds without it, where that depends."""
+    """Return the option --format; `default` tells of its default in words, where that depends."""
     return option(
         "--format",
         metavar="NAME",
@@ -68,7 +68,7 @@ Project = Annotated[
 
 @dataclass(frozen=True)
 class Output:
-    """Options that say where a result goes, and in which format."""
+    """Options for the place and the format of a result."""
 
     panel: ClassVar[str] = "Output"
     formats: ClassVar[tuple[str, ...]] = _TABLE
@@ -103,21 +103,14 @@ class Output:
         return None if self.out == _TERMINAL else self.out
 
     def report(self, report: Report, image: Callable[[Path], bytes] | bytes | None = None) -> None:
-        """Deliver a report in the format of the options.
-
-        Parameters
-        ----------
-        report : Report
-        image : bytes or callable, optional
-            The image for the file of --plot, or what returns it: that is called only if there is such a file.
-        """
+        """Deliver a report in the format of the options; `image` is called with the file of --plot, if there is one."""
         text = report.written(self.format or "text")
         if callable(image):
             image = None if self.plot is None else image(self.plot)
         self.deliver(text, image)
 
     def deliver(self, text: str, image: bytes | None = None) -> None:
-        """Print the text, or write it and the image into their files, all or none; stderr says which were written."""
+        """Print the text, or write it and the image into their files, all or none; stderr names those written."""
         from strapgen.storage.files import write_files
 
         text = text.rstrip("\n")

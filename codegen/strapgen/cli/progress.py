@@ -1,4 +1,4 @@
-"""Progress display for long commands: it is shown on stderr, and only if that is a terminal."""
+"""Progress of long commands, on stderr, and only if that is a terminal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WIPE = "\r\x1b[2K"
 
 
 def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
-    """Yield the items and show on stderr, if it is a terminal, how many are done."""
+    """Yield the items and show the number done."""
     if not sys.stderr.isatty():
         yield from items
         return
@@ -29,7 +29,7 @@ def track(items: Iterable[Item], title: str, total: int) -> Iterator[Item]:
 
 @contextmanager
 def waiting(title: str) -> Iterator[None]:
-    """Show on stderr, if it is a terminal, the seconds that a task has taken, once it takes more than one."""
+    """Show the seconds that a task has taken, once it takes more than one."""
     stream = sys.stderr
     if not stream.isatty():
         yield

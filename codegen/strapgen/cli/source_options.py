@@ -1,4 +1,4 @@
-"""Options of commands that write source files: names, files beside the step, and what is done with those in place."""
+"""Options of commands that write source files: names, files beside the step, and the treatment of files in place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """Options that say which files are written, under which names, and over which others."""
+    """Options for the files that are written, their names, and files that are overwritten."""
 
     panel: ClassVar[str] = "Output"
 
@@ -70,7 +70,7 @@ class SourceOptions:
 
     @property
     def for_libraries(self) -> str | None:
-        """The first option that is stated and goes with C, C++, Rust and MATLAB; None if there is none."""
+        """The first stated option that goes with C, C++, Rust and MATLAB alone; None if there is none."""
         stated = {
             "--name": self.name is not None,
             "--prefix": self.prefix is not None,
@@ -79,13 +79,7 @@ class SourceOptions:
         return next((option for option, is_stated in stated.items() if is_stated), None)
 
     def require_language(self, target: str) -> None:
-        """Check that the options go with the language of a target.
-
-        Raises
-        ------
-        InputError
-            If one does not.
-        """
+        """Check that the options go with the language of a target."""
         from strapgen.targets import TARGETS
 
         if self.for_libraries and not TARGETS[target].nameable:
@@ -116,13 +110,13 @@ class SourceOptions:
         return write_files(folder, files)
 
     def compare(self, files: Mapping[str, str]) -> str:
-        """Return how the files in the folder differ from generated ones; "" if they do not."""
+        """Return the difference of the files in the folder from generated ones; "" if there is none."""
         from strapgen.run import generated_files
 
         return generated_files.difference(self.out or Path(), files)
 
     def show_difference(self, files: Mapping[str, str], format: str) -> None:
-        """Print how the files in the folder differ from generated ones, and exit with 1 if they do."""
+        """Print the difference of the files in the folder from generated ones, and exit with 1 if there is one."""
         folder, difference = self.out or Path(), self.compare(files)
         if format == "json":
             print_json({"in_step": not difference, "difference": difference})
@@ -135,6 +129,6 @@ class SourceOptions:
 
 
 def refuse_out_of_step(folder: Path, again: str) -> None:
-    """Say on stderr that files differ from what is generated, and how to make them again; exit with 1."""
+    """Say on stderr that files differ from generated ones, and how to make them again; exit with 1."""
     typer.echo(f"strapgen: {folder} is out of step; {again}", err=True)
     raise typer.Exit(1)

@@ -18,7 +18,7 @@ def _show(chosen: bool) -> None:
 
 
 def _log_stages(context: typer.Context) -> None:
-    """Write the log of the stages to stderr, a line each, until the command ends."""
+    """Write the log of the stages to stderr until the command ends."""
     logger, handler = logging.getLogger("strapgen"), logging.StreamHandler()
     level = logger.level
     logger.addHandler(handler)

@@ -11,7 +11,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import KernelOptions, option
+from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import format_option
 from strapgen.cli.progress import track
 from strapgen.ir.exceptions import InputError
@@ -40,7 +40,7 @@ def evidence(
         bool,
         option("--all", help="Examine the standard catalogue in 32-bit fixed point.", panel="Algorithm"),
     ] = False,
-    method: KernelOptions,
+    method: MethodOptions,
     fixed: FixedOptions,
     tool: Annotated[
         str | None,
@@ -103,7 +103,7 @@ def evidence(
 
 
 def _subjects(
-    kernels: list[str], all_: bool, method: KernelOptions, fixed: FixedOptions
+    kernels: list[str], all_: bool, method: MethodOptions, fixed: FixedOptions
 ) -> Iterator[Subject]:
     from strapgen.evidence import subjects
 
@@ -122,7 +122,7 @@ def _subjects(
         yield subjects.Subject(choice, fixed.settings(choice.increments_per_step))
 
 
-def _stages(name: str, method: KernelOptions, fixed: FixedOptions) -> Iterator[Subject]:
+def _stages(name: str, method: MethodOptions, fixed: FixedOptions) -> Iterator[Subject]:
     """Yield the stages of a described system."""
     from strapgen.evidence import subjects
     from strapgen.navigation.systems.simulate_system import refuse_options

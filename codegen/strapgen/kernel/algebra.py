@@ -1,4 +1,4 @@
-"""Offers, as `strapgen.algebra`, what kernels of users are written with: rotations and functions of angles."""
+"""Names of `strapgen.algebra`: rotations and functions of angles for users' kernels."""
 
 from strapgen.kernel.evaluation import Direction, Wrapped, evaluate, exact
 from strapgen.kernel.rotations import (

@@ -1,4 +1,4 @@
-"""Bounds the largest eigenvalue of a symmetric matrix of polynomials on a cube, in Bernstein form.
+"""Bounds of the eigenvalues of a symmetric matrix of polynomials on a cube, in Bernstein form.
 
 In this form a polynomial is a mean of its coefficients, whose weights are not negative; so is a matrix of polynomials.
 Where a number exceeds the eigenvalues of all coefficients, it exceeds those of the matrix on the whole cube. Halving a
@@ -41,20 +41,20 @@ class _BernsteinForms:
 
     coefficients: NDArray[np.int64]
     cubes: list[Cube]
-    #: Units by which a true coefficient may be larger.
-    slack: int
+    slack: int  # units by which a true coefficient may be larger
 
     @classmethod
     def of(cls, form: NDArray[Any], unit: Fraction) -> _BernsteinForms:
-        """Return integers as multiples of a unit, rounded down, on the whole cube."""
+        """Return a form on the whole cube in integer multiples of a unit, rounded down."""
         whole = ((0.0, 1.0),) * (form.ndim - 1)
         return cls((form * unit.denominator // unit.numerator).astype(np.int64)[None], [whole], 1)
 
     def are_below(self, limit: int) -> NDArray[np.bool_]:
-        """Tell of each part whether the eigenvalues of its coefficients are below a limit: their lack has none below 0.
+        """Return for each part whether all eigenvalues of its coefficients are proved to lie below `limit`.
 
-        A matrix of n rows has none if the Cholesky decomposition in double succeeds after (n + 2) 2^-53 of its trace
-        were subtracted from the diagonal (S. M. Rump, BIT 46 (2006) 433-452); here it is 2^-45 of it.
+        The matrix limit - form of n rows is positive if its Cholesky decomposition in double succeeds after
+        (n + 2) 2^-53 of the trace were subtracted from the diagonal (S. M. Rump, BIT 46 (2006) 433-452); here it is
+        2^-45 of it.
         """
         parts, elements = self.coefficients.shape[:2]
         size = _size(elements)
@@ -98,7 +98,6 @@ class _BernsteinForms:
         )
 
     def chosen(self, which: NDArray[np.bool_]) -> _BernsteinForms:
-        """Return some of the parts."""
         cubes = [cube for cube, one in zip(self.cubes, which, strict=True) if one]
         return _BernsteinForms(self.coefficients[which], cubes, self.slack)
 
@@ -109,27 +108,11 @@ def eigenvalue_bounds(
     known: Fraction,
     is_outside: Callable[[Cube], bool] = lambda cube: False,
 ) -> tuple[Fraction, Fraction]:
-    """Return two numbers of which no eigenvalue of symmetric matrices is below or above, and neither is 0.
+    """Return a lower bound <= 0 and an upper bound >= 0 of all eigenvalues of symmetric matrices on the unit cube.
 
-    Parameters
-    ----------
-    matrices : sequence of matrix of Powers
-        Polynomials in variables that lie from 0 to 1, in one number and order in all matrices.
-    samples : array, shape (count, variables)
-        Points at which eigenvalues hint how close bounds may be; no proof rests on them.
-    known : Fraction
-        Bound of the magnitude of eigenvalues, which is returned where no closer one is proved.
-    is_outside : callable, optional
-        Tells of a part of the cube whether the bounds need not hold in it.
-
-    Returns
-    -------
-    tuple of Fraction
-        Not above 0, and not below it.
-
-    Examples
-    --------
-    The eigenvalues of [[0, x], [x, 0]] are x and -x.
+    The matrices have polynomials in the same variables. Eigenvalues at the `samples`, (count, variables), show how
+    close the bounds may be; no proof rests on them. Where no bound is proved, `known` bounds their magnitude. Parts of
+    the cube that `is_outside` names are left out.
 
     >>> zero, x = {}, {(1,): Fraction(1)}
     >>> low, high = eigenvalue_bounds([[[zero, x], [x, zero]]], np.array([[1.0]]), Fraction(7))
@@ -157,7 +140,7 @@ def eigenvalue_bounds(
 def _bound(
     wholes: Sequence[_BernsteinForms], reached: int, known: Fraction, is_outside: Callable[[Cube], bool]
 ) -> Fraction:
-    """Return a number that is not below any eigenvalue, near the largest of the samples if that is proved."""
+    """Return an upper bound of the eigenvalues, near the largest of the samples if that is proved, else `known`."""
     for of_reached, of_largest in _ROOMS:
         limit = _short(math.ceil(reached * (1 + of_reached) + (1 << _BITS) * of_largest))
         if limit >= known:
@@ -168,7 +151,7 @@ def _bound(
 
 
 def _bernstein(matrix: Sequence[Sequence[Powers]]) -> tuple[NDArray[Any], int]:
-    """Return the coefficients of the upper triangle in Bernstein form, element by variables, and their denominator."""
+    """Return the Bernstein coefficients of the upper triangle, element by variables, and their denominator."""
     elements = [matrix[i][j] for i in range(len(matrix)) for j in range(i, len(matrix))]
     sides = [max(powers) + 1 for powers in zip(*(powers for p in elements for powers in p), strict=True)]
     if not sides:
@@ -213,23 +196,22 @@ def _reached(form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]) -
 
 @cache
 def _upper_triangle(size: int) -> list[tuple[int, int]]:
-    """Return the rows and columns of the elements of an upper triangle."""
     return list(itertools.combinations_with_replacement(range(size), 2))
 
 
 def _size(elements: int) -> int:
-    """Return the number of rows of a matrix whose upper triangle has so many elements."""
+    """Return the number of rows of a matrix from the number of elements of its upper triangle."""
     return (math.isqrt(8 * elements + 1) - 1) // 2
 
 
 def _short(value: int) -> int:
-    """Return an integer of few bits that is not below a positive one."""
+    """Round a positive integer up to one of few significant bits."""
     dropped = max(0, value.bit_length() - _BOUND_BITS)
     return -(-value >> dropped) << dropped
 
 
 def _is_below(wholes: Sequence[_BernsteinForms], limit: int, is_outside: Callable[[Cube], bool]) -> bool:
-    """Tell whether all eigenvalues are proved to be below a limit; False after too many cubes."""
+    """Return whether all eigenvalues are proved to be below a limit; False after too many cubes."""
     left = min(_MOST_CUBES, _MOST_COEFFICIENTS // max(whole.coefficients.size for whole in wholes))
     for parts in wholes:
         while True:

@@ -22,42 +22,18 @@ from strapgen.kernel.rotations import cross, dot, skew
 
 
 @dataclass(frozen=True)
-class CovariantTerm:
-    """A tensor times a polynomial in scalar products.
+class _Term:
+    """A tensor times a polynomial in scalar products."""
 
-    Parameters
-    ----------
-    name : str
-        Ending of the names of its stages.
-    weight : Polynomial
-    written : sequence of Expr
-        The elements of the tensor in the elements of the vectors.
-    named : sequence of Expr
-        The same in the symbols of stages, where there are such.
-    """
-
-    name: str
+    name: str  # ends the names of its stages
     weight: Polynomial
-    written: Sequence[sp.Expr]
-    named: Sequence[sp.Expr]
+    written: Sequence[sp.Expr]  # elements of the tensor in the elements of the vectors
+    named: Sequence[sp.Expr]  # the same in the symbols of stages, where there are such
 
 
 class CovariantFunction:
-    """A covariant function under construction, with its derivatives.
+    """A covariant quaternion, vector (a quaternion with scalar 0) or matrix, and its derivatives, as stages.
 
-    Parameters
-    ----------
-    build : KernelBuilder
-        The kernel under construction.
-    decomposition : Decomposition
-        The function: a quaternion, a vector (a quaternion whose scalar is zero) or a matrix.
-    vectors : sequence of Matrix, 3 x 1
-        Symbols of the vectors.
-    label : str
-        Beginning of the names of all stages.
-
-    Examples
-    --------
     >>> from strapgen.kernel.covariants import Frame
     >>> frame = Frame(1)
     >>> (x, y, z), = frame.vectors
@@ -94,7 +70,7 @@ class CovariantFunction:
         ]
 
     def derivative(self, vector: int, axis: int) -> list[sp.Expr]:
-        """Return the derivatives of all elements along an element of a vector."""
+        """Return the derivatives of all elements with respect to an element of a vector."""
         along = self._vectors[vector][axis]
         total = [sp.Integer(0)] * len(self._terms[0].written)
         for weight, term in zip(self._weights, self._terms, strict=True):
@@ -105,8 +81,7 @@ class CovariantFunction:
             total = [a + factor * element[axis] * h for a, h in zip(total, gradient, strict=True)]
         return total
 
-    def _terms_of(self, decomposition: Decomposition) -> list[CovariantTerm]:
-        """Return the terms of a decomposition."""
+    def _terms_of(self, decomposition: Decomposition) -> list[_Term]:
         size = 4 if decomposition.scalar is not None else 9
         terms = []
         for covariant, weight in decomposition.vector.items():
@@ -117,18 +92,18 @@ class CovariantFunction:
                 terms.append(self._term(covariant, weight, [*written, 0], [*named, 0]))
         if decomposition.scalar:
             unit = [sp.Integer(0)] * 3 + [sp.Integer(1)]
-            terms.append(CovariantTerm("scalar", decomposition.scalar, unit, unit))
+            terms.append(_Term("scalar", decomposition.scalar, unit, unit))
         for covariant, weight in decomposition.symmetric.items():
             written, named = (self._symmetric(covariant, which) for which in (self._vector, self._named))
             name = "_".join(map(str, ("symmetric", *covariant)))
-            terms.append(CovariantTerm(name, weight, written, named))
+            terms.append(_Term(name, weight, written, named))
         return terms
 
     @staticmethod
     def _term(
         covariant: Covariant, weight: Polynomial, written: list[sp.Expr], named: list[sp.Expr]
-    ) -> CovariantTerm:
-        return CovariantTerm("_".join(map(str, covariant)), weight, written, named)
+    ) -> _Term:
+        return _Term("_".join(map(str, covariant)), weight, written, named)
 
     def _vector(self, covariant: Covariant) -> sp.Matrix:
         first, *rest = (self._vectors[k] for k in covariant)
@@ -154,7 +129,7 @@ class CovariantFunction:
         return list(first * second.T + second * first.T)
 
     def _gradient(self, k: int, j: int) -> list[sp.Expr]:
-        """Return the stage of a tensor H, in symbols where it is no constant."""
+        """Return the tensor H_kj, each element a stage unless it is a constant or a symbol."""
         if (k, j) not in self._gradients:
             size = len(self._terms[0].written)
             total = [sp.Integer(0)] * size
@@ -200,7 +175,7 @@ class CovariantFunction:
 
 
 def _slope(polynomial: Polynomial, factor: tuple[int, int]) -> Polynomial:
-    """Return the derivative of a polynomial along a scalar product."""
+    """Return the derivative of a polynomial with respect to a scalar product."""
     slopes: dict[tuple[tuple[int, ...], ...], Fraction] = {}
     for monomial, c in polynomial.items():
         number = monomial.count(factor)

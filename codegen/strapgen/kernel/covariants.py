@@ -1,10 +1,9 @@
-"""Covariant decomposition writes a transition in terms of scalar and cross products of its vectors.
+"""Decomposition of a transition that commutes with rotations of its inputs into scalar and cross products of them.
 
-A transition that commutes with rotations of its inputs has scalars that are polynomials in the scalar products (and
-triple products) of the vectors, vectors that are sums of vectors and cross products with such coefficients, and
-symmetric matrices that are sums of the unit matrix and of symmetrized products of two vectors. The coefficients
-follow from one small linear system for every degree in each vector, in a rotated frame whose x axis lies along the
-first vector and whose xy plane contains the second.
+Its scalars are polynomials in the scalar products (and triple products) of the vectors; its vectors are sums of
+vectors and cross products with such coefficients, its symmetric matrices sums of the unit matrix and of symmetrized
+products of two vectors. The coefficients follow from one small linear system for every degree in each vector, in a
+rotated frame whose x axis lies along the first vector and whose xy plane contains the second.
 """
 
 from __future__ import annotations
@@ -47,21 +46,11 @@ class NotCovariantError(ValueError):
 
 @dataclass(frozen=True)
 class Decomposition:
-    """A transition as coefficients of covariants.
+    """A transition as coefficients of covariants."""
 
-    Parameters
-    ----------
-    scalar : Polynomial or None
-        The scalar part of a quaternion, None for a matrix.
-    vector : Coefficients
-        The vector part of a quaternion, or the vector of a matrix's skew part.
-    symmetric : Coefficients
-        The symmetric part of a matrix; empty for a quaternion.
-    """
-
-    scalar: Polynomial | None
-    vector: Coefficients
-    symmetric: Coefficients
+    scalar: Polynomial | None  # of a quaternion; None for a matrix
+    vector: Coefficients  # of a quaternion, or of a matrix's skew part
+    symmetric: Coefficients  # part of a matrix; empty for a quaternion
 
     def coefficients(self) -> list[Polynomial]:
         """Return all polynomials."""
@@ -69,7 +58,7 @@ class Decomposition:
         return [*scalars, *self.vector.values(), *self.symmetric.values()]
 
     def evaluate(self, vectors: list[list[Any]]) -> list[Any]:
-        """Return the elements of the transition (x, y, z, s, or row by row) for vectors of numbers or polynomials."""
+        """Return the elements (x, y, z, s, or row by row) for vectors of numbers or polynomials."""
 
         def value(polynomial: Polynomial) -> Any:
             total: Any = 0
@@ -103,13 +92,7 @@ class Decomposition:
 
 
 class Frame:
-    """Vectors in a rotated frame, as polynomials in those coordinates that are not zero in it.
-
-    Parameters
-    ----------
-    count : int
-        Number of vectors.
-    """
+    """Vectors in a rotated frame, as polynomials in those coordinates that are not zero in it."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -123,35 +106,11 @@ class Frame:
         self._known: dict[tuple[str, _Degree], _Products] = {}
 
     def quaternion(self, vector: list[Any], scalar: Any) -> Decomposition:
-        """Decompose a quaternion.
-
-        Parameters
-        ----------
-        vector : list of ring element
-            Its vector part, three polynomials in the coordinates of the frame.
-        scalar : ring element
-            Its scalar part.
-
-        Raises
-        ------
-        NotCovariantError
-            If it does not commute with rotations of the vectors.
-        """
+        """Decompose a quaternion whose elements are polynomials in the coordinates of the frame."""
         return Decomposition(self._solve([scalar], self._scalars).get((), {}), self._vector(vector), {})
 
     def matrix(self, m: list[Any]) -> Decomposition:
-        """Decompose a 3 x 3 matrix.
-
-        Parameters
-        ----------
-        m : list of ring element
-            Its nine elements, row by row, as polynomials in the coordinates of the frame.
-
-        Raises
-        ------
-        NotCovariantError
-            If it does not commute with rotations of the vectors.
-        """
+        """Decompose a 3 x 3 matrix, row by row, whose elements are polynomials in the coordinates of the frame."""
         half = sp.Rational(1, 2)
         skew = [(m[7] - m[5]) * half, (m[2] - m[6]) * half, (m[3] - m[1]) * half]
         symmetric = [(m[3 * i + j] + m[3 * j + i]) * half for i in range(3) for j in range(i, 3)]
@@ -245,14 +204,9 @@ class Frame:
 
 @cache
 def invariants(degree: _Degree, triple: bool = False) -> tuple[Monomial, ...]:
-    """Return all products of scalar products of a given degree in each vector.
+    """Return all products of scalar products in which vector k occurs degree[k] times, with at most one triple product.
 
-    Parameters
-    ----------
-    degree : tuple of int
-        How often each vector occurs; with a negative number there are no products.
-    triple : bool, optional
-        Whether a triple product may occur; one is enough, since two are a sum of products of scalar products.
+    One triple product is enough: two are a sum of products of scalar products. A negative degree has no products.
     """
     if min(degree) < 0:
         return ()
@@ -282,18 +236,7 @@ def _symmetrized(a: list[Any], b: list[Any]) -> list[Any]:
 
 
 def transform(decomposition: Decomposition, matrix: list[list[Fraction]]) -> Decomposition:
-    """Return a decomposition in other vectors.
-
-    Parameters
-    ----------
-    decomposition : Decomposition
-    matrix : list of list of Fraction
-        Row i holds the components of the old vector i along the new ones.
-
-    Returns
-    -------
-    Decomposition
-    """
+    """Return a decomposition in new vectors; row i of the matrix has the components of the old vector i."""
     expansions = {(i,): {(j,): c for j, c in enumerate(row) if c} for i, row in enumerate(matrix)}
 
     def expand(covariant: Covariant, canonical: Callable[[Covariant], tuple[Covariant, int]]) -> Polynomial:

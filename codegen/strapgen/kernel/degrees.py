@@ -1,4 +1,4 @@
-"""Degrees of polynomials that stages compute, without expanding them."""
+"""Degrees of the polynomials that stages compute, without expanding them."""
 
 from __future__ import annotations
 
@@ -25,18 +25,8 @@ class _Degree:
 
 
 def degree(stages: Iterable[Stage], variables: Iterable[str], results: Sequence[str]) -> int | None:
-    """Return an upper bound of the degree of some elements in the variables; None if they are no polynomials.
+    """Return an upper bound of the degree of the elements `results` in the variables; None if they are no polynomials.
 
-    Parameters
-    ----------
-    stages : iterable of Stage
-    variables : iterable of str
-        Names of the elements on which the stages depend.
-    results : sequence of str
-        Names of elements of the stages.
-
-    Examples
-    --------
     >>> from strapgen import derive
     >>> step = derive("euler", "rk4", increments=2)
     >>> degree(step.stages, [e for s in step.inputs for e in s.elements], ["p_x", "p_s"])

@@ -1,4 +1,4 @@
-"""Evaluates expressions in any arithmetic (numbers, ring elements, intervals), and defines functions SymPy lacks."""
+"""Evaluation of expressions in any arithmetic (numbers, ring elements, intervals), and functions that SymPy lacks."""
 
 from __future__ import annotations
 

@@ -21,19 +21,8 @@ _NO_SERIES = "the square root of a series that begins with 0 is no series"
 
 
 class Powers:
-    """A power series in a small quantity.
+    """A power series whose coefficients are polynomials, cut off after the power `top`.
 
-    Parameters
-    ----------
-    ring : PolyRing
-        Ring of the coefficients.
-    parts : mapping of int to ring element
-        Coefficients by power; those beyond `top` are dropped.
-    top : int
-        The last power of the series.
-
-    Examples
-    --------
     >>> ring, x = sp.ring("x", sp.QQ)
     >>> h = Powers(ring, {1: ring.one}, 3)
     >>> ((1 + h * x) ** 2).parts
@@ -47,7 +36,7 @@ class Powers:
         self.parts = {power: part for power, part in sorted(parts.items()) if part and power <= top}
 
     def _of(self, other: Any) -> Powers:
-        if isinstance(other, SeriesRoot):
+        if isinstance(other, _SeriesRoot):
             raise ArithmeticError(_NO_SERIES)
         return other if isinstance(other, Powers) else Powers(self.ring, {0: self.ring(other)}, self.top)
 
@@ -58,7 +47,7 @@ class Powers:
         return Powers(self.ring, total, self.top)
 
     def __mul__(self, other: Any) -> Powers:
-        if isinstance(other, SeriesRoot):
+        if isinstance(other, _SeriesRoot):
             return NotImplemented
         if not isinstance(other, Powers):
             return self._scaled(self.ring(other))
@@ -77,7 +66,6 @@ class Powers:
     __radd__, __rmul__ = __add__, __mul__
 
     def _scaled(self, factor: Any) -> Powers:
-        """Return the product with a polynomial."""
         if factor.is_ground:
             factor = factor.LC  # a number
         return Powers(self.ring, {power: part * factor for power, part in self.parts.items()}, self.top)
@@ -115,13 +103,7 @@ class Powers:
         return self.parts.get(0, self.ring.zero)
 
     def inverse(self) -> Powers:
-        """Return the reciprocal of a series that begins with a number.
-
-        Raises
-        ------
-        ArithmeticError
-            If it begins with 0 or with a polynomial.
-        """
+        """Return the reciprocal of a series that begins with a number other than 0."""
         start = self._number()
         if not start:
             raise ArithmeticError("a series that begins with 0 has no inverse")
@@ -131,13 +113,7 @@ class Powers:
         return reciprocal
 
     def root(self) -> Powers:
-        """Return the square root of a series that begins with the square of a number of the field.
-
-        Raises
-        ------
-        ArithmeticError
-            If it begins with anything else.
-        """
+        """Return the square root of a series that begins with the square of a number of the field."""
         factor = _root_of(self.ring.domain, self._number())
         rest = self * (self.ring.domain.one / (factor * factor)) - 1
         coefficients = [sp.binomial(sp.Rational(1, 2), k) for k in range(self.top + 1)]
@@ -145,7 +121,7 @@ class Powers:
         return root
 
     def composed(self, coefficients: Sequence[Any], inner: Powers) -> Powers:
-        """Return sum_k coefficients[k] inner^k for a series that begins with 0."""
+        """Return sum_k coefficients[k] inner^k for a series `inner` that begins with 0."""
         total, power = self._of(0), self._of(1)
         for coefficient in coefficients:
             if not power.parts:
@@ -163,7 +139,6 @@ class Powers:
 
 @lru_cache(256)
 def _root_of(domain: Any, number: Any) -> Any:
-    """Return the square root of a number of a field."""
     start = domain.to_sympy(number)
     if start.free_symbols:
         raise ArithmeticError(f"a series that begins with the unknown {start} has no series as its root")
@@ -176,23 +151,23 @@ def _root_of(domain: Any, number: Any) -> Any:
     return factor
 
 
-class SeriesRoot:
-    """The square root of a series that begins with 0; it is no power series, but its even functions are."""
+class _SeriesRoot:
+    """The square root of a series that begins with 0: no power series, though its even functions are."""
 
     __slots__ = ("square",)
 
     def __init__(self, square: Powers) -> None:
         self.square = square
 
-    def __add__(self, other: Any) -> SeriesRoot:
+    def __add__(self, other: Any) -> _SeriesRoot:
         raise ArithmeticError(_NO_SERIES)
 
     __radd__ = __add__
 
-    def __mul__(self, factor: Any) -> SeriesRoot:
-        if isinstance(factor, SeriesRoot):
+    def __mul__(self, factor: Any) -> _SeriesRoot:
+        if isinstance(factor, _SeriesRoot):
             raise ArithmeticError(_NO_SERIES)
-        return SeriesRoot(self.square * factor * factor)
+        return _SeriesRoot(self.square * factor * factor)
 
     __rmul__ = __mul__
 
@@ -203,41 +178,15 @@ class SeriesRoot:
 
 
 def constant(ring: Any, value: Any, top: int) -> Powers:
-    """Return a number of SymPy as a series.
-
-    Parameters
-    ----------
-    ring : PolyRing
-        Ring of the coefficients.
-    value : Expr or number
-        Exact number in the field of the ring.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    Powers
-    """
+    """Return an exact number of SymPy in the field of a ring as a series."""
     return Powers(ring, {0: ring(ring.domain.from_sympy(sp.sympify(value)))}, top)
 
 
 def field(expressions: Iterable[sp.Expr], unknowns: Sequence[str] = ()) -> Any:
-    """Return the smallest domain that holds the numbers of some expressions, and polynomials in some unknowns.
+    """Return the rationals, extended by the roots in expressions and, over that field, by the polynomials in unknowns.
 
-    Parameters
-    ----------
-    expressions : iterable of Expr
-    unknowns : sequence of str, optional
-        Names of the unknowns.
+    Where an expression divides by an unknown, these are quotients of polynomials.
 
-    Returns
-    -------
-    Domain
-        The rationals, extended by the roots in the expressions; the ring of polynomials in the unknowns over that
-        field, or the field of their quotients where an expression divides by one.
-
-    Examples
-    --------
     >>> a = sp.Symbol("a", real=True)
     >>> field([sp.Rational(1, 2)]), field([a / 2], ["a"]), field([1 / a], ["a"])
     (QQ, QQ[a], QQ(a))
@@ -260,30 +209,8 @@ def field(expressions: Iterable[sp.Expr], unknowns: Sequence[str] = ()) -> Any:
 
 
 def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -> dict[str, list[Powers]]:
-    """Return the outputs of a kernel whose inputs are series.
+    """Return the elements of each output, row-major, of a kernel with a series for every element of its inputs.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    values : mapping of str to Powers
-        A series for every element of the inputs.
-    ring : PolyRing
-        Ring of the coefficients.
-    top : int
-        The last power of the outputs.
-
-    Returns
-    -------
-    dict of str to list of Powers
-        For each output its elements, row-major.
-
-    Raises
-    ------
-    ArithmeticError
-        If an output is no power series.
-
-    Examples
-    --------
     >>> from strapgen import derive
     >>> ring, x, y, z = sp.ring("x y z", sp.QQ)
     >>> update = derive("euler-update")
@@ -306,20 +233,7 @@ def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -
 
 
 def function(expression: sp.Expr, arguments: list[Any]) -> Any:
-    """Evaluate a function of series, as `strapgen.kernel.evaluation.evaluate` expects it.
-
-    Parameters
-    ----------
-    expression : Expr
-        The function, power, maximum or condition.
-    arguments : list of Powers or SeriesRoot
-        Its evaluated arguments.
-
-    Raises
-    ------
-    ArithmeticError
-        If the result is no power series.
-    """
+    """Evaluate a function, power, maximum or condition of series, for `strapgen.kernel.evaluation.evaluate`."""
     if isinstance(expression, sp.Pow):
         return _power(arguments[0], expression.exp)
     if isinstance(expression, sp.Max):
@@ -331,7 +245,7 @@ def function(expression: sp.Expr, arguments: list[Any]) -> Any:
     if expression.func in (sp.cos, sp.sinc):
         return _even(expression, arguments[0])
     if expression.func in (sp.sin, sp.asin, sp.atan2, Direction, Wrapped):
-        if any(isinstance(argument, SeriesRoot) for argument in arguments):
+        if any(isinstance(argument, _SeriesRoot) for argument in arguments):
             raise ArithmeticError(f"{expression.func.__name__} of it: {_NO_SERIES}")
         if not arguments[0].start:
             return _odd(expression, *arguments)
@@ -342,16 +256,16 @@ def _power(base: Any, exponent: sp.Expr) -> Any:
     if exponent.is_Integer:
         return base ** int(exponent)
     if (2 * exponent).is_Integer and isinstance(base, Powers):
-        root = base.root() if base.start else SeriesRoot(base)
+        root = base.root() if base.start else _SeriesRoot(base)
         return root if exponent == sp.S.Half else root ** int(2 * exponent)
     raise ArithmeticError(f"the power {exponent} is no power series here")
 
 
 def _even(expression: sp.Expr, argument: Any) -> Powers:
     """Return a cosine, or sin(x)/x."""
-    if not isinstance(argument, SeriesRoot) and argument.start:
+    if not isinstance(argument, _SeriesRoot) and argument.start:
         raise ArithmeticError(f"{expression} is no series with rational coefficients")
-    square = argument.square if isinstance(argument, SeriesRoot) else argument * argument
+    square = argument.square if isinstance(argument, _SeriesRoot) else argument * argument
     first = int(expression.func is sp.sinc)
     coefficients = [sp.Rational((-1) ** k, math.factorial(2 * k + first)) for k in range(square.top // 2 + 1)]
     even: Powers = square.composed(coefficients, square)
@@ -397,4 +311,4 @@ def _compared(expression: sp.Expr, left: Any, right: Any) -> tuple[Any, Any]:
 
 def _begins(value: Any) -> Any:
     """Return the coefficient of the power 0 as a number of SymPy."""
-    return sp.S.Zero if isinstance(value, SeriesRoot) else value.ring.domain.to_sympy(value._number())
+    return sp.S.Zero if isinstance(value, _SeriesRoot) else value.ring.domain.to_sympy(value._number())

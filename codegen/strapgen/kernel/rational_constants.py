@@ -1,4 +1,4 @@
-"""Rounds irrational constants to rational ones, once, with so many digits that no target can tell the difference."""
+"""Irrational constants as rational ones, rounded once to so many digits that no target can tell the difference."""
 
 from __future__ import annotations
 
@@ -13,28 +13,7 @@ DIGITS = 80
 
 
 def rationalized(kernel: Kernel) -> Kernel:
-    """Return a kernel whose constants are rational: the kernel itself if they all are.
-
-    Parameters
-    ----------
-    kernel : Kernel
-
-    Returns
-    -------
-    Kernel
-        With a note on the rounding if there was any.
-
-    Examples
-    --------
-    >>> from strapgen.kernel.kernel import KernelBuilder
-    >>> from strapgen.ir.signals import Signal
-    >>> build = KernelBuilder()
-    >>> x = build.scalar(Signal.scalar("x"))
-    >>> _ = build.output(Signal.scalar("y"), [sp.sqrt(2) * x + 1])
-    >>> rounded = rationalized(build.kernel("root", "Root", "none"))
-    >>> rounded.outputs[0].expressions[0].subs(x, 1).is_Rational
-    True
-    """
+    """Return a kernel with its irrational constants rounded and a note that says so; itself if it has none."""
     stages, outputs = (tuple(map(_rounded_stage, group)) for group in (kernel.stages, kernel.outputs))
     if stages == kernel.stages and outputs == kernel.outputs:
         return kernel
@@ -47,7 +26,6 @@ def _rounded_stage(stage: Stage) -> Stage:
 
 
 def _rounded(expression: sp.Expr) -> sp.Expr:
-    """Return an expression with its irrational numbers rounded."""
     numbers = expression.atoms(sp.Pow, sp.NumberSymbol, sp.Function)
     if not any(part.is_number and not part.is_Rational for part in numbers):
         return expression  # rebuilding it could make SymPy multiply it out

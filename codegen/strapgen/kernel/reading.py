@@ -1,4 +1,4 @@
-"""Reads expressions from text exactly, without running anything that the text says."""
+"""Exact expressions from text, of which nothing is executed."""
 
 from __future__ import annotations
 
@@ -30,30 +30,8 @@ class _UnreadableError(Exception):
 def expression(
     what: str, text: Any, symbols: Mapping[str, sp.Symbol], functions: Mapping[str, Any] | None = None
 ) -> sp.Expr:
-    """Read an expression; decimals are exact.
+    """Read an expression of + - * /, whole powers, parentheses, pi, symbols and functions; decimals are exact.
 
-    Parameters
-    ----------
-    what : str
-        Its name in an error message.
-    text : str or int
-        Numbers, symbols, + - * / and whole powers (``**``), parentheses, pi, and the functions.
-    symbols : mapping of str to Symbol
-        The symbols that it may hold, by name.
-    functions : mapping of str to callable, optional
-        By default those of `FUNCTIONS`.
-
-    Returns
-    -------
-    Expr
-
-    Raises
-    ------
-    InputError
-        If it is no such expression; the message says what is allowed.
-
-    Examples
-    --------
     >>> a = sp.Symbol("a")
     >>> expression("weight", "0.25*(1 - a)**2/a", {"a": a})
     (1 - a)**2/(4*a)

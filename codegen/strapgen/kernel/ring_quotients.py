@@ -1,4 +1,4 @@
-"""Quotients of polynomials in place of unknowns, for elements of a ring of SymPy."""
+"""Substitution of quotients for unknowns in elements of a ring of SymPy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def linear_coefficient(polynomial: Any, place: int) -> Any:
-    """Return the coefficient of an unknown that is linear in a polynomial; None if it is not."""
+    """Return the coefficient of an unknown in which a polynomial is linear; None if it is not."""
     terms = {}
     for exponents, number in polynomial.terms():
         if exponents[place] > 1:
@@ -18,12 +18,12 @@ def linear_coefficient(polynomial: Any, place: int) -> Any:
 
 
 def without(polynomial: Any, place: int, coefficient: Any) -> Any:
-    """Return what is left of a polynomial without the terms in which an unknown is linear."""
+    """Return a polynomial minus its term in an unknown, in which it is linear."""
     return polynomial - coefficient * polynomial.ring.gens[place]
 
 
 def substituted(polynomial: Any, place: int, top: Any, bottom: Any) -> Any:
-    """Return the numerator of a polynomial with a quotient in place of an unknown."""
+    """Return the numerator of a polynomial after the substitution of top/bottom for an unknown."""
     parts: dict[int, dict[Any, Any]] = {}
     for exponents, number in polynomial.terms():
         parts.setdefault(exponents[place], {})[(*exponents[:place], 0, *exponents[place + 1 :])] = number
@@ -40,20 +40,20 @@ def substituted(polynomial: Any, place: int, top: Any, bottom: Any) -> Any:
 
 
 def quotient_of(above: Any, below: Any, place: int, top: Any, bottom: Any) -> tuple[Any, Any]:
-    """Return a quotient with another one in place of an unknown."""
+    """Return above/below after the substitution of top/bottom for an unknown."""
     degrees = max(above.degree(place), 0), max(below.degree(place), 0)
     x, y = (substituted(p, place, top, bottom) for p in (above, below))
     return x * bottom ** max(degrees[1] - degrees[0], 0), y * bottom ** max(degrees[0] - degrees[1], 0)
 
 
 def cancelled(top: Any, bottom: Any) -> tuple[Any, Any]:
-    """Return a quotient without what its numerator and denominator share."""
+    """Return a quotient in lowest terms."""
     common = top.gcd(bottom)
     return top.exquo(common), bottom.exquo(common)
 
 
 def may_divide(divisor: Any, polynomial: Any) -> bool:
-    """Tell whether the first and the last monomial of a divisor divide those of a polynomial, as they have to.
+    """Return whether the leading and the last monomial of a divisor divide those of a polynomial, as they must.
 
     Both are of a ring in lexical order; a division that cannot be without a rest need not be tried.
     """

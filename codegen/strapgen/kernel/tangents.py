@@ -1,4 +1,4 @@
-"""Directional derivatives of the stages of a kernel: how every quantity changes when its inputs change at given rates.
+"""Directional derivatives of the stages of a kernel: the change of every quantity for given changes of its inputs.
 
 This is the arithmetic of dual numbers a + b eps with eps^2 = 0: the part in eps of every stage.
 """
@@ -23,26 +23,8 @@ def add_tangents(
 ) -> dict[sp.Symbol, sp.Expr]:
     """Add a stage for the change of every stage that changes, and return the changes of all symbols.
 
-    Parameters
-    ----------
-    build : KernelBuilder
-        The kernel under construction.
-    stages : iterable of Stage
-        Stages of that kernel, in order.
-    changes : mapping of Symbol to Expr
-        The changes of the symbols on which these stages depend; others do not change.
-    ending : str
-        Ending of the names of the stages that are added.
-    unit : str
-        Their unit where the stage itself is an angle in rad.
+    `ending` ends the names of these stages; where a stage is an angle in rad, its change has the `unit`.
 
-    Returns
-    -------
-    dict of Symbol to Expr
-        The changes that were passed in, with those of the elements of the stages.
-
-    Examples
-    --------
     >>> from strapgen.ir.signals import Signal
     >>> build = KernelBuilder()
     >>> x, dx = build.scalar(Signal.scalar("x")), build.scalar(Signal.scalar("dx"))
@@ -78,7 +60,7 @@ def add_tangents(
 
 
 def tangent(element: sp.Symbol, expression: sp.Expr, changes: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Return the change of an element from its expression and from the changes of the symbols of that."""
+    """Return the change of an element by its expression and the changes of the symbols in it."""
     if expression.is_Pow and expression.exp == -sp.S.Half:  # no new root: a power of the element
         return -(element**3) / 2 * tangent(element, expression.base, changes)
     terms = [
@@ -91,7 +73,7 @@ def tangent(element: sp.Symbol, expression: sp.Expr, changes: Mapping[sp.Symbol,
 
 @lru_cache(10_000)
 def _slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return a partial derivative: the changes along all inputs of a kernel have it in common."""
+    """Return a partial derivative, cached: the changes along all inputs of a kernel share it."""
     return sp.diff(expression, symbol)
 
 

@@ -1,4 +1,4 @@
-"""Reads the values that take the place of unknowns."""
+"""Values for unknown coefficients."""
 
 from __future__ import annotations
 
@@ -15,27 +15,8 @@ from strapgen.kernel.evaluation import exact
 
 
 def read(what: str, unknowns: tuple[str, ...], values: Mapping[str, Any]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the values of unknowns as exact expressions.
+    """Return the values of unknowns as exact expressions; `what` holds them, in an error message.
 
-    Parameters
-    ----------
-    what : str
-        What holds the unknowns, for an error message.
-    unknowns : tuple of str
-    values : mapping of str to number, Expr or str
-        By the name of the unknown.
-
-    Returns
-    -------
-    dict of Symbol to Expr
-
-    Raises
-    ------
-    InputError
-        If there is no such unknown, or a value is inexact or holds another symbol.
-
-    Examples
-    --------
     >>> read("this", ("a", "b"), {"a": "1 - b"})
     {a: 1 - b}
     """
@@ -60,7 +41,7 @@ def read(what: str, unknowns: tuple[str, ...], values: Mapping[str, Any]) -> dic
 
 
 def remaining(unknowns: tuple[str, ...], chosen: Mapping[sp.Symbol, sp.Expr]) -> tuple[str, ...]:
-    """Return the unknowns that are left after a substitution: those without a value, and those in one."""
+    """Return the unknowns left after a substitution: those without a value, and those in a value."""
     replaced = {symbol.name for symbol in chosen}
     held = {symbol.name for value in chosen.values() for symbol in value.free_symbols}
     return tuple(name for name in unknowns if name not in replaced or name in held)

@@ -10,7 +10,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, command_line, grouped
-from strapgen.cli.options import FastBackends, KernelOptions, SeveralMethods, backends, listed, option
+from strapgen.cli.options import FastBackends, SeveralMethods, backends, listed, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.ir import checks
@@ -43,11 +43,6 @@ _CHOOSING = (
 )
 #: Most names in the heading of a page.
 _MOST_NAMES = 3
-
-
-@dataclass(frozen=True)
-class SeveralKernels(SeveralMethods, KernelOptions):
-    """Options that choose kernels: the methods and the numbers of increments of steps, and the layout of others."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +117,7 @@ def report(
         ),
     ] = None,
     *,
-    methods: Annotated[SeveralKernels, Shown(only=_CHOOSING)],
+    methods: Annotated[SeveralMethods, Shown(only=_CHOOSING)],
     backend: FastBackends = None,
     beside: Annotated[
         str,

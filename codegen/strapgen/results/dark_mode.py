@@ -1,4 +1,4 @@
-"""Gives SVG text the colours of a dark page: each colour of the drawing gets a counterpart that reads on black."""
+"""Colours of a dark page in SVG text: each colour of a drawing gets a counterpart that reads on black."""
 
 from __future__ import annotations
 
@@ -38,21 +38,10 @@ _FROM_LAB = (
 
 
 def for_both_pages(svg: str) -> str:
-    """Return an SVG of matplotlib's that can be read on light and on dark pages.
+    """Return an SVG of matplotlib's that can be read on light and on dark pages; black ink becomes a soft one.
 
-    Colours stay as they are for programs that know no style sheets of dark pages; black ink becomes a soft one.
+    Colours stay as they are for programs that know no style sheets of dark pages.
 
-    Parameters
-    ----------
-    svg : str
-        With colours as ``fill: #rrggbb`` and ``stroke: #rrggbb`` in attributes ``style``.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> svg = for_both_pages('<svg><style type="text/css"></style><path style="stroke: #0072b2"/></svg>')
     >>> "[style*='stroke: #0072b2'] { stroke: #55aff3 !important }" in svg
     True
@@ -76,19 +65,8 @@ def for_both_pages(svg: str) -> str:
 
 
 def on_dark(colour: str) -> str:
-    """Return the counterpart of a colour on dark paper: the same hue, light where the colour is dark.
+    """Return the counterpart of a colour ``#rrggbb`` on dark paper: the same hue, light where the colour is dark.
 
-    Parameters
-    ----------
-    colour : str
-        As ``#rrggbb``.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> on_dark(PAPER) == DARK_PAPER, on_dark(INK) == DARK_INK
     (True, True)
     """
@@ -104,8 +82,6 @@ def on_dark(colour: str) -> str:
 def contrast(one: str, other: str) -> float:
     """Return the contrast of two colours as the Web Content Accessibility Guidelines define it, 1 to 21.
 
-    Examples
-    --------
     >>> round(contrast("#000000", "#ffffff"), 9)
     21.0
     """

@@ -1,4 +1,4 @@
-"""What all plots share: matplotlib without a display, kinds of image files, and the look of axes and legends."""
+"""Common parts of all plots: matplotlib without a display, kinds of image files, the look of axes and legends."""
 
 from __future__ import annotations
 
@@ -23,13 +23,7 @@ LIGHTEST = 0.62
 
 
 def pyplot() -> Any:
-    """Return matplotlib's pyplot, drawing to files alone.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    """
+    """Return matplotlib's pyplot, drawing to files alone."""
     before = os.environ.get("MPLBACKEND")
     os.environ["MPLBACKEND"] = "agg"  # a backend of the user's that is not installed would stop the import
     try:
@@ -48,15 +42,7 @@ def pyplot() -> Any:
 
 
 def require_kind(path: str | Path) -> str:
-    """Return the kind of image that a file's ending says.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind is unknown.
-    """
+    """Return the kind of image of a file's ending."""
     pyplot()
     from matplotlib.backend_bases import FigureCanvasBase
 
@@ -68,7 +54,7 @@ def require_kind(path: str | Path) -> str:
 
 
 def image(figure: Any, path: str | Path) -> bytes:
-    """Return a figure as the content of an image file, of the kind that the file's ending says; it is closed.
+    """Return a figure as the content of an image file, of the kind of the file's ending; it is closed.
 
     SVG has its text as text, and colours for light and for dark pages.
     """
@@ -93,7 +79,7 @@ def grid_of_axes(rows: int, columns: int, size: tuple[float, float], **options: 
 
 
 def colours(count: int, last: float) -> Any:
-    """Return so many colours from dark to light; `last` is how far they go, 0 to 1."""
+    """Return so many colours from dark to light, which end at `last` from 0 to 1."""
     import numpy as np
 
     return pyplot().get_cmap("viridis")(np.linspace(0.0, last, count))
@@ -115,7 +101,7 @@ def title(figure: Any, text: str) -> None:
 
 
 def printable(text: str) -> str:
-    """Return text without what cannot be encoded, as names of files may have it."""
+    """Return text without characters that cannot be encoded, as names of files may have them."""
     return text.encode(errors="replace").decode()
 
 
@@ -143,15 +129,7 @@ def step_ticks(axes: Any, steps: Iterable[float]) -> None:
 
 
 def labels_at_the_right(axes: Any, labels: Iterable[tuple[float, str, Any]]) -> None:
-    """Write labels beside the right end of axes, at a height in data or a little off, so that none covers another.
-
-    Parameters
-    ----------
-    axes : Axes
-        With its final limits.
-    labels : iterable of (float, str, colour)
-        Heights, texts and colours; a height outside of the axes stands at their border.
-    """
+    """Write labels beside the right end of axes, at a height in data or a little off, so that none covers another."""
     height = axes.get_position().height * axes.figure.get_size_inches()[1]
     apart = 11.5 / 72 / height  # a line of text, as a part of the height
     upwards = sorted(labels, key=lambda label: label[0])
@@ -174,17 +152,7 @@ _PLACES = [(x, y) for x in (-7, 7) for y in (-11, -2, -21, -31, -41, 5, 15, 25)]
 def labels_beside_points(
     axes: Any, points: Mapping[str, tuple[float, float]], colours: Mapping[str, Any]
 ) -> None:
-    """Write labels beside points, each where it covers no other label and leaves the axes as little as can be.
-
-    Parameters
-    ----------
-    axes : Axes
-        With their final place and limits.
-    points : mapping of str to (float, float)
-        Points in data by their labels.
-    colours : mapping of str to colour
-        Of the labels.
-    """
+    """Write labels beside points in data, each where it covers no other label and leaves the axes least."""
     boxes: list[Any] = []
     frame = axes.get_window_extent()
     for text, point in points.items():
@@ -215,7 +183,7 @@ def labels_beside_points(
 
 
 def _height(axes: Any, value: float) -> float:
-    """Return where a number stands between the lower and the upper end of axes, 0 to 1."""
+    """Return the place of a number between the lower and the upper end of axes, 0 to 1."""
     low, high = map(float, axes.get_ylim())
     if axes.get_yscale() == "log":
         low, high, value = math.log(low), math.log(high), math.log(value) if value > 0 else -math.inf
@@ -231,6 +199,6 @@ def common_legend(figure: Any, panels: Iterable[Any], **options: Any) -> None:
 
 
 def fraction(number: float) -> str:
-    """Return a number as one part of a whole where it is one."""
+    """Return a number as text, as 1/n where it is one."""
     parts = round(1 / number)
     return f"1/{parts}" if parts > 1 and abs(parts * number - 1) < 1e-9 else f"{number:g}"

@@ -1,4 +1,4 @@
-"""A report holds a result in every format that a command offers; each is written only when it is asked for."""
+"""Results in every format that a command offers, each written only when it is asked for."""
 
 from __future__ import annotations
 
@@ -16,44 +16,21 @@ _DIGITS = ".6g"
 
 @dataclass(frozen=True)
 class Report:
-    """A result in every format.
-
-    Parameters
-    ----------
-    text : callable
-        Returns the result for a reader.
-    data : callable
-        Returns it as plain JSON data.
-    table : callable, optional
-        Returns it as a table, which is written as comma-separated values or in Markdown; None for what is no table.
-    markdown : callable, optional
-        Returns another table for Markdown, with the columns of the text.
-    latex : callable, optional
-        Returns it as LaTeX; by default the table of Markdown, if there is one.
-    indented : bool, optional
-        Whether an object of JSON has a line for each of its parts.
-    """
+    """A result in every format."""
 
     text: Callable[[], str]
-    data: Callable[[], Any]
-    table: Callable[[], TextTable] | None = None
-    markdown: Callable[[], TextTable] | None = None
-    latex: Callable[[], str] | None = None
-    indented: bool = True
+    data: Callable[[], Any]  # of plain JSON
+    table: Callable[[], TextTable] | None = (
+        None  # for comma-separated values and Markdown; None for what is no table
+    )
+    markdown: Callable[[], TextTable] | None = (
+        None  # another table for Markdown, with the columns of the text
+    )
+    latex: Callable[[], str] | None = None  # by default the table of Markdown, if there is one
+    indented: bool = True  # whether an object of JSON has a line for each of its parts
 
     def written(self, format: str) -> str:
-        """Return the result in a format.
-
-        Parameters
-        ----------
-        format : str
-            "text", "json", "csv", "markdown" or "latex".
-
-        Raises
-        ------
-        InputError
-            If the result cannot be written so.
-        """
+        """Return the result as "text", "json", "csv", "markdown" or "latex"."""
         table = self.markdown or self.table
         if format == "text":
             return self.text()
@@ -84,15 +61,7 @@ def as_json(data: Any, indented: bool = True) -> str:
 
 
 def flat_table(rows: Sequence[Mapping[str, Any]]) -> TextTable:
-    """Return objects of JSON as a table: a row for each, a column for each key.
-
-    Examples
-    --------
-    >>> print(flat_table([{"name": "a", "size": 0.5}, {"name": "b", "size": None}]).as_csv(), end="")
-    name,size
-    a,0.5
-    b,
-    """
+    """Return objects of JSON as a table: a row for each, a column for each key."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     values = [[_cell(row.get(name)) for name in names] for row in rows]
     columns = []

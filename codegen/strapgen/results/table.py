@@ -1,4 +1,4 @@
-"""Lays out tables whose columns say how cells are written: text, comma-separated values, Markdown, LaTeX and HTML."""
+"""Tables whose columns say how cells are written: text, comma-separated values, Markdown, LaTeX and HTML."""
 
 from __future__ import annotations
 
@@ -40,36 +40,20 @@ _LATEX = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
+    """A column of a table."""
 
-    Parameters
-    ----------
-    header : str, optional
-        A table in which no column has a header has no line of headers.
-    align : str, optional
-        "<", ">" or "^".
-    spec : str, optional
-        Format of the cells that are no text.
-    least : int, optional
-        Least width in characters.
-    gap : int, optional
-        Spaces before the column.
-    missing : str, optional
-        What stands for None.
-    group : str, optional
-        Title above neighbouring columns of the same group: in their middle, or aligned as a column that stands alone.
-    """
-
-    header: str = ""
-    align: str = ">"
-    spec: str = ""
-    least: int = 0
-    gap: int = 2
-    missing: str = "-"
-    group: str = ""
+    header: str = ""  # a table in which no column has one has no line of headers
+    align: str = ">"  # "<", ">" or "^"
+    spec: str = ""  # format of the cells that are no text
+    least: int = 0  # width in characters
+    gap: int = 2  # spaces before the column
+    missing: str = "-"  # for None
+    group: str = (
+        ""  # title above neighbouring columns of the same group, in their middle; aligned above a single one
+    )
 
     def cell(self, value: Any) -> str:
-        """Return a value as it stands in the column."""
+        """Return a value as text of the column."""
         if value is None:
             return self.missing
         return value if isinstance(value, str) else format(value, self.spec)
@@ -77,17 +61,12 @@ class Column:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Rows of values under columns.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-    rows : sequence of sequence
-        A value for each column: text stays as it is, a number has the format of its column, None is missing.
-    """
+    """Rows of values under columns."""
 
     columns: Sequence[Column]
-    rows: Sequence[Sequence[Any]]
+    rows: Sequence[
+        Sequence[Any]
+    ]  # text stays as it is, a number has the format of its column, None is missing
 
     def lines(self, indent: str = "") -> list[str]:
         """Return the table as lines of text, each column as wide as its widest cell."""
@@ -113,7 +92,6 @@ class TextTable:
         ]
 
     def _titles(self, widths: Sequence[int]) -> str:
-        """Return the line of the titles of groups."""
         line = ""
         for group, members in groupby(range(len(widths)), key=lambda k: self.columns[k].group):
             first, *others = members
@@ -199,7 +177,6 @@ class TextTable:
         return sheets
 
     def _tabular(self, part: Sequence[int], heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-        """Return some columns as one environment."""
         widest = max(len(_printed(row[part[-1]])) for row in [heads, *rows])
         rules = {"<": "l", ">": "r", "^": "c"}
         letters = [rules[self.columns[k].align] for k in part]

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.option_groups import grouped
+from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import (
+    ANY_STEP_OPTIONS,
     Duration,
     MethodOptions,
     OptionalStepAlgorithm,
@@ -130,7 +131,7 @@ class SeriesOutput(Output):
 def series(
     algorithm: OptionalStepAlgorithm = None,
     *,
-    methods: SeveralMethods,
+    methods: Annotated[SeveralMethods, Shown(only=ANY_STEP_OPTIONS)],
     all_of_them: Annotated[
         bool,
         option(

@@ -15,8 +15,7 @@ from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolu
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, tableaux
 from strapgen.catalogue.methods.coefficient_files import entries
-from strapgen.catalogue.methods.derivative_words import word_text, words
-from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text
+from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text, word_text, words
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import typer
 
 from strapgen.analysis.vibration.band_options import GyroDamping
-from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import MethodOptions, SeveralMethods, option, whole
+from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.options import ANY_STEP_OPTIONS, MethodOptions, SeveralMethods, option, whole
 from strapgen.cli.output import Output, plot_option
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -255,7 +255,7 @@ def vibration(
         ),
     ],
     *,
-    methods: AssessedMethods,
+    methods: Annotated[AssessedMethods, Shown(only=ANY_STEP_OPTIONS)],
     source: VibrationSource,
     output: VibrationOutput,
 ) -> None:

@@ -1,4 +1,4 @@
-"""The acceleration transformation takes velocity increments from body to navigation axes."""
+"""The acceleration transformation: velocity increments from body to navigation axes."""
 
 from __future__ import annotations
 
@@ -35,22 +35,7 @@ VELOCITY_EQUATIONS = {("dcm", 1): "(51)", ("dcm", 2): "(52)", ("euler", 1): "(57
 
 
 def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> sp.Matrix:
-    """Return vectors in navigation axes instead of body axes: C u, or q u q*.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    name : str
-        "dcm" or "euler".
-    state : Matrix
-        Attitude, body to navigation axes.
-    u : Matrix, 3 x N
-        The vectors in body axes.
-
-    Returns
-    -------
-    Matrix, 3 x N
-    """
+    """Return vectors u (3, N) in navigation axes instead of body axes: C u, or q u q*."""
     if name == "dcm":
         return state * u
     matrix = Signal.matrix(
@@ -62,36 +47,14 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
 def compensated(
     build: KernelBuilder, form: int, u: sp.Matrix, sculling: sp.Matrix, beta: sp.Matrix | None
 ) -> sp.Matrix:
-    """Return the velocity increment of a slow cycle in the body axes of its start: u + S1, or u + beta x u / 2 + S2.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    form : int
-        1 or 2.
-    u, sculling : Matrix, 3 x 1
-        Sum of the velocity increments and sculling integral at the end of the cycle, in m/s.
-    beta : Matrix, 3 x 1
-        Sum of the angle increments at the end of the cycle in rad, for form 2.
-    """
+    """Return the velocity increment of a slow cycle in m/s, body axes at its start: u + S1 or u + beta x u / 2 + S2."""
     meaning = "velocity increment, body axes at the start of the slow cycle"
     named = Signal.vector("compensated", "w", unit="m/s", meaning=meaning)
     return build.stage(named, u + sculling + (cross(beta, u) / 2 if form == 2 else sp.zeros(3, 1)))
 
 
 def transformation(name: str) -> Kernel:
-    """Return the transformation of a vector from body to navigation axes, equations (44) and (57).
-
-    Parameters
-    ----------
-    name : str
-        "dcm" or "euler".
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``acceleration`` (3,) in m/s^2; output ``transformed`` (3,).
-    """
+    """Derive the transformation of a specific force from body to navigation axes, equations (44) and (57)."""
     build = KernelBuilder()
     state = build.input(KINEMATICS[name].state)
     a = build.input(
@@ -116,21 +79,7 @@ def transformation(name: str) -> Kernel:
 
 
 def velocity(name: str, form: int) -> Kernel:
-    """Return the slow loop of the velocity, with S1 by equations (51) and (57) or S2 by equations (52) and (58).
-
-    Parameters
-    ----------
-    name : str
-        "dcm" or "euler".
-    form : int
-        1 if the sculling integral includes the rotation compensation, 2 if this kernel computes it.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` at the start of the slow cycle, ``velocity_sum`` and ``sculling`` (3,) in m/s at its end, and
-        for form 2 ``angle_sum`` (3,) in rad; output ``transformed`` (3,) in m/s.
-    """
+    """Derive the slow loop of the velocity, with S1 by equations (51) and (57) or S2 by equations (52) and (58)."""
     build = KernelBuilder()
     state, u, eta = map(build.input, (KINEMATICS[name].state, VELOCITY_SUM, SCULLING))
     beta = build.input(ANGLE_SUM) if form == 2 else None
@@ -143,18 +92,12 @@ def velocity(name: str, form: int) -> Kernel:
 
 
 def frame_correction(theta: sp.Matrix, v: sp.Matrix) -> sp.Matrix:
-    """Return the change of velocity due to the rotation of the navigation frame over its cycle, equation (59)."""
+    """Return the change of velocity due to the rotation theta of the navigation frame over its cycle, equation (59)."""
     return -cross(theta, v) / 2
 
 
 def navigation_velocity() -> Kernel:
-    """Return the velocity correction for the rotation of the navigation frame, equation (59).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``navigation_rotation`` (3,) in rad and ``navigation_velocity`` (3,) in m/s; output ``correction`` (3,).
-    """
+    """Derive the velocity correction for the rotation of the navigation frame, equation (59)."""
     build = KernelBuilder()
     theta, v = build.input(NAVIGATION_ROTATION), build.input(NAVIGATION_VELOCITY)
     build.output(

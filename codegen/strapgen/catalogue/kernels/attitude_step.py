@@ -1,4 +1,4 @@
-"""Derives attitude steps in transition form from a kinematics, a method and samples of the rate."""
+"""Attitude steps in transition form from a kinematics, a method and samples of the rate."""
 
 from __future__ import annotations
 
@@ -20,27 +20,10 @@ from strapgen.kernel.rotations import dot
 def step(
     kinematics: Kinematics, method: Method, increments: int | None, previous: int = 0, ahead: int = 0
 ) -> Kernel:
-    """Derive one integration step from angle increments, or from rates, to the next state.
+    """Derive a step from angle increments, or from rates times the step at nodes if `increments` is None, all in rad.
 
-    The method is applied to the identity, which gives the transition: the step is linear in the state. The
-    step length cancels, since increments and rates differ by it alone.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-        The attitude representation.
-    method : Method
-        The integration method.
-    increments : int or None
-        Angle increments a step, 1 to 8; None for a step that takes the rate at every node.
-    previous, ahead : int, optional
-        Increments from before the step and from after it that the rate extraction uses too.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``increments`` (previous + increments + ahead, 3) in rad, or ``turns`` (nodes, 3) in
-        rad: the rates times the step length; output ``next``.
+    The method is applied to the identity, which gives the transition: the step is linear in the state. The step length
+    cancels, since increments and rates differ by it alone.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
@@ -74,7 +57,7 @@ def step(
 
 
 def _notes(order: Order, truncation: Truncation | None) -> tuple[str, ...]:
-    """Return what the reader of generated code should know of the order and of a series that is cut off."""
+    """Return notes on a limited order and on a series that is cut off."""
     notes: tuple[str, ...] = (f"{str(order).capitalize()}.",) if order.limited else ()
     if truncation is not None:
         text = f"The exponential of the rotation vector is a series to its power {truncation.order}"
@@ -83,26 +66,7 @@ def _notes(order: Order, truncation: Truncation | None) -> tuple[str, ...]:
 
 
 def rotation_vector(method: Method, increments: int | None, previous: int = 0, ahead: int = 0) -> Kernel:
-    """Derive the rotation vector of one step from angle increments, or from rates.
-
-    Parameters
-    ----------
-    method : Method
-        A method whose transition is the exponential of a rotation vector.
-    increments, previous, ahead : int
-        As in `step`.
-
-    Returns
-    -------
-    Kernel
-        Input ``increments`` (previous + increments + ahead, 3) in rad, or ``turns``; output ``rotation_vector`` (3,)
-        in rad.
-
-    Raises
-    ------
-    ValueError
-        If the method has no rotation vector.
-    """
+    """Derive the rotation vector of a step, in rad, body axes, from increments or from rates times the step."""
     if method.rotation_vector is None:
         raise ValueError(f"{method.name} has no rotation vector")
     build = KernelBuilder()
@@ -153,16 +117,7 @@ def chosen(method: Method, increments: int | None, previous: int = 0, ahead: int
 
 
 def smooth(build: KernelBuilder, kinematics: Kinematics, order: int) -> Kinematics:
-    """Return a kinematics whose exponential is a series, which has a derivative everywhere.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-        The kernel under construction, in which the square of each angle gets a name.
-    kinematics : Kinematics
-    order : int
-        Highest power of the rotation vector in the series.
-    """
+    """Return a kinematics whose exponential is a series to the power `order`, which has a derivative everywhere."""
     numbers = count(1)
 
     def exponential(v: sp.Matrix, *_: object) -> sp.Matrix:
@@ -178,13 +133,7 @@ def smooth(build: KernelBuilder, kinematics: Kinematics, order: int) -> Kinemati
 
 
 def product(name: str) -> Kernel:
-    """Return the kernel that advances a state by a transition, and a transition by the one that follows it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the attitude algorithm.
-    """
+    """Derive the state after a transition; likewise a transition after another."""
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state, transition = build.input(kinematics.state), build.input(kinematics.transition)

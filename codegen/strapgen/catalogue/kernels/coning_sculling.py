@@ -1,4 +1,4 @@
-"""Derives the fast and slow loops that compute coning, sculling and the rotation vector by recursion."""
+"""Fast and slow loops that compute coning, sculling and the rotation vector by recursion."""
 
 from __future__ import annotations
 
@@ -75,14 +75,7 @@ SCULLING = Signal.vector(
 
 
 class FastLoop:
-    """A fast loop under construction: its inputs, and the outputs that take their place in the next cycle.
-
-    Attributes
-    ----------
-    build : KernelBuilder
-    states : list of (str, str)
-        Feedback pairs: an input and the output that takes its place.
-    """
+    """A fast loop under construction: its inputs, and the outputs that become them in the next cycle."""
 
     def __init__(self) -> None:
         self.build = KernelBuilder()
@@ -104,16 +97,7 @@ class FastLoop:
 def coned(
     build: KernelBuilder, coning: sp.Matrix, beta: sp.Matrix, past: sp.Matrix, d: sp.Matrix
 ) -> sp.Matrix:
-    """Return the coning correction after a fast cycle, equation (26).
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    coning, beta : Matrix, 3 x 1
-        Coning correction and sum of the increments before the cycle, in rad.
-    past, d : Matrix, 3 x 1
-        Increments of the previous cycle and of this one, in rad.
-    """
+    """Return the coning correction after a fast cycle, in rad, equation (26); `past` is the previous increment."""
     arm = Signal.vector("arm", "arm", unit="rad", meaning="angle at the middle of the cycle, for coning")
     return coning + cross(build.stage(arm, beta + past / 6), d) / 2
 
@@ -127,19 +111,7 @@ def sculled(
     d: sp.Matrix,
     dv: sp.Matrix,
 ) -> sp.Matrix:
-    """Return the sculling integral after a fast cycle: S1 by equation (55), S2 by (56).
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    form : int
-        1 or 2.
-    eta, beta, u : Matrix, 3 x 1
-        Sculling integral in m/s, and the sums of the angle increments in rad and of the velocity increments in m/s
-        before the cycle; S1 does not use u.
-    d, dv : Matrix, 3 x 1
-        Angle and velocity increment of the cycle.
-    """
+    """Return the sculling integral after a fast cycle, in m/s: S1 by equation (55), which needs no u, or S2 by (56)."""
     if form == 1:
         middle = Signal.vector("middle", "middle", unit="rad", meaning="angle at the middle of the cycle")
         return eta + cross(build.stage(middle, beta + d / 2), dv)
@@ -147,14 +119,7 @@ def sculled(
 
 
 def coning() -> Kernel:
-    """Return the fast loop of the rotation vector, equation (26).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``angle_sum``, ``coning``, ``previous_increment`` and ``increment``, all (3,) in rad; outputs
-        ``next_angle_sum``, ``next_coning``, ``next_previous_increment``.
-    """
+    """Derive the fast loop of the rotation vector, equation (26)."""
     loop = FastLoop()
     beta, correction, past, d = map(loop.build.input, (ANGLE_SUM, CONING, PREVIOUS, INCREMENT))
     loop.hand_on(ANGLE_SUM, beta + d)
@@ -169,13 +134,7 @@ def rotation_vector_of(beta: sp.Matrix, correction: sp.Matrix) -> sp.Matrix:
 
 
 def rotation_vector() -> Kernel:
-    """Return the slow loop of the rotation vector, which adds increments and coning correction, equation (26).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``angle_sum`` and ``coning`` (3,) in rad; output ``rotation_vector`` (3,) in rad.
-    """
+    """Derive the slow loop of the rotation vector, equation (26)."""
     build = KernelBuilder()
     beta, correction = build.input(ANGLE_SUM), build.input(CONING)
     build.output(ROTATION_VECTOR, rotation_vector_of(beta, correction))
@@ -185,19 +144,7 @@ def rotation_vector() -> Kernel:
 
 
 def sculling(form: int) -> Kernel:
-    """Return the fast loop of the velocity: S1 by equation (55) for form 1, S2 by (56) for form 2.
-
-    Parameters
-    ----------
-    form : int
-        1 or 2.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``angle_sum``, ``velocity_sum``, ``sculling``, ``increment``, ``velocity_increment``; outputs
-        ``next_angle_sum``, ``next_velocity_sum``, ``next_sculling``. Angles in rad, velocities in m/s, all (3,).
-    """
+    """Derive the fast loop of the velocity: S1 by equation (55) for form 1, S2 by (56) for form 2."""
     loop = FastLoop()
     beta, u, eta, d, dv = map(
         loop.build.input, (ANGLE_SUM, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT)

@@ -1,4 +1,4 @@
-"""Derives conversions between direction cosine matrix, Euler parameters and Cayley-Klein parameters."""
+"""Conversions between direction cosine matrix, Euler parameters and Cayley-Klein parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ _CONVERTED = Signal.matrix(
 
 
 def _result(kinematics: Kinematics) -> Signal:
-    """Return the signal of a state that results from a conversion."""
     state = kinematics.state
     elements = tuple(f"next_{element.split('_')[1]}" for element in state.elements)
     return replace(state, name="converted", elements=elements)
@@ -60,16 +59,9 @@ def dcm_from_cayley_klein() -> Kernel:
 
 
 def _largest_column(build: KernelBuilder) -> tuple[sp.Matrix, sp.Symbol, sp.Matrix]:
-    """Return the column of 4 e e' through its largest diagonal element; 4 e e' is linear in the matrix.
+    """Return the column of 4 e e' through its largest diagonal element, that element, and the diagonal, scalar last.
 
-    Returns
-    -------
-    column : Matrix, 4 x 1
-        Scalar last.
-    largest : Symbol
-        The diagonal element.
-    diagonal : Matrix, 4 x 1
-        All diagonal elements, scalar last.
+    4 e e' is linear in the matrix.
     """
     C = build.input(DCM.state)
     trace = build.value("trace", C.trace(), "trace of C")
@@ -97,7 +89,7 @@ def _of_largest(values: Sequence[Any], diagonal: Sequence[sp.Symbol], largest: s
 
 
 def _sign(expression: sp.Expr) -> sp.Piecewise:
-    """Return 1 for a number from zero up, otherwise -1."""
+    """Return 1 for a number from 0 up, else -1."""
     return sp.Piecewise((sp.Integer(1), expression >= 0), (sp.Integer(-1), True))
 
 
@@ -129,19 +121,10 @@ _PREVIOUS = replace(
 
 
 def euler_from_dcm_followed(rule: str) -> Kernel:
-    """Return Euler parameters of a direction cosine matrix, with a sign continuous from call to call.
+    """Derive Euler parameters from a direction cosine matrix, with a sign continuous from call to call.
 
-    Parameters
-    ----------
-    rule : str
-        "element" preserves the sign of the largest element, equation (18), which is correct for rotations of less than
-        60 degrees since the previous call. "product" makes the scalar product with the previous parameters not
-        negative, which is correct up to 180 degrees.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` (3, 3) and ``previous`` (4,); output ``converted`` (4,), scalar last.
+    By the rule "element" the largest element keeps its sign, equation (18), correct below 60 degrees a call; by
+    "product" the scalar product with the previous parameters is not negative, correct up to 180 degrees.
     """
     build = KernelBuilder()
     column, largest, diagonal = _largest_column(build)
@@ -169,12 +152,12 @@ def euler_from_dcm_followed(rule: str) -> Kernel:
 
 
 def euler_from_dcm() -> Kernel:
-    """Return Euler parameters of a direction cosine matrix, accurate for every attitude."""
+    """Derive Euler parameters from a direction cosine matrix, accurate at every attitude."""
     return _from_dcm(EULER, "euler-from-dcm")
 
 
 def cayley_klein_from_dcm() -> Kernel:
-    """Return Cayley-Klein parameters of a direction cosine matrix, accurate for every attitude."""
+    """Derive Cayley-Klein parameters from a direction cosine matrix, accurate at every attitude."""
     return _from_dcm(CAYLEY_KLEIN, "cayley-klein-from-dcm")
 
 
@@ -192,10 +175,10 @@ def _reorder(source: Kinematics, target: Kinematics) -> Kernel:
 
 
 def euler_from_cayley_klein() -> Kernel:
-    """Return Euler parameters from Cayley-Klein parameters: the scalar moves to the end."""
+    """Derive Euler parameters from Cayley-Klein parameters: the scalar moves to the end."""
     return _reorder(CAYLEY_KLEIN, EULER)
 
 
 def cayley_klein_from_euler() -> Kernel:
-    """Return Cayley-Klein parameters from Euler parameters: the scalar moves to the front."""
+    """Derive Cayley-Klein parameters from Euler parameters: the scalar moves to the front."""
     return _reorder(EULER, CAYLEY_KLEIN)

@@ -1,4 +1,4 @@
-"""Derives the error matrix of a computed attitude, and its parts scale, skew and drift."""
+"""The error matrix of a computed attitude, and its parts scale, skew and drift."""
 
 from __future__ import annotations
 
@@ -10,16 +10,10 @@ from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
 def error_matrix() -> Kernel:
-    """Derive E = C_computed C_true' - I and its parts.
+    """Derive E = C_computed C_true' - I and its parts, reference axes, in rad.
 
-    Scale is the diagonal, skew the symmetric part off the diagonal, and drift the skew-symmetric part. If
-    C_computed = exp(skew(eps)) C_true, the drift is -eps to first order.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``computed`` and ``truth`` (3, 3); outputs ``error`` (3, 3), ``scale`` (3,), ``skew`` (3,) and
-        ``drift`` (3,), the last two in rad, each in the order x, y, z.
+    Scale is the diagonal, skew the symmetric part off the diagonal, and drift the skew-symmetric part. If C_computed =
+    exp(skew(eps)) C_true, the drift is -eps to first order.
     """
     build = KernelBuilder()
     computed = build.input(

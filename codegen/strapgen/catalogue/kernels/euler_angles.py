@@ -1,4 +1,4 @@
-"""Derives conversions between direction cosine matrix and Euler angles: rotations by heading, pitch, then roll."""
+"""Conversions between direction cosine matrix and Euler angles: rotations by heading, pitch, then roll."""
 
 from __future__ import annotations
 
@@ -29,13 +29,7 @@ _VERTICAL = 2
 
 
 def dcm_from_euler_angles() -> Kernel:
-    """Return the direction cosine matrix of Euler angles, equation (60).
-
-    Returns
-    -------
-    Kernel
-        Input ``angles`` (3,) in rad: roll, pitch, heading; output ``attitude`` (3, 3).
-    """
+    """Derive the direction cosine matrix of Euler angles, equation (60)."""
     build = KernelBuilder()
     roll, pitch, heading = build.input(ANGLES)
 
@@ -56,17 +50,7 @@ def dcm_from_euler_angles() -> Kernel:
 def followed_angles(
     build: KernelBuilder, C: sp.Matrix, before: sp.Symbol, names: tuple[str, str, str]
 ) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
-    """Name roll, pitch and heading of a rotation, and return their symbols, equations (61) to (63).
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    C : Matrix, 3 x 3
-    before : Symbol
-        Roll in the call before, which is held where pitch is vertical, in rad.
-    names : tuple of str
-        What stands for roll, pitch and heading.
-    """
+    """Name roll, pitch and heading of a rotation in rad, equations (61) to (63); a vertical pitch keeps `before`."""
     square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, f"square of the cosine of {names[1]}")
     pitch = build.value(f"next_{names[1]}", sp.atan2(-C[2, 0], sp.sqrt(square)), names[1])
     vertical = (_VERTICAL * resolution) ** 2
@@ -95,17 +79,11 @@ def followed_angles(
 
 
 def euler_angles_from_dcm() -> Kernel:
-    """Return the Euler angles of a direction cosine matrix, equations (61) to (63).
+    """Derive the Euler angles of a direction cosine matrix, equations (61) to (63).
 
-    Equation (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of
-    heading - roll. It is used at steep pitch, so that heading - roll (or their sum) is as accurate as the matrix even
-    where neither angle is by itself. If the pitch is vertical to the last digit, roll does not change.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` (3, 3) and ``previous`` (3,), the angles of the previous call in rad; output ``next`` (3,) in
-        rad, roll and heading from -pi to pi, pitch from -pi/2 to pi/2.
+    Equation (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of heading
+    - roll. It is used at steep pitch, so that heading - roll (or their sum) is as accurate as the matrix even where
+    neither angle is by itself. If the pitch is vertical to the last digit, roll does not change.
     """
     build = KernelBuilder()
     C = build.input(replace(DCM.state, frame=ANY))

@@ -1,4 +1,4 @@
-"""Derives the Jacobians of an attitude step, which Kalman filters and least squares use, exactly.
+"""Exact Jacobians of an attitude step, for Kalman filters and least squares.
 
 The step is bilinear in state and transition, so its Jacobian by the state holds the elements of the transition. That by
 the increments follows from the covariant form of the transition: a polynomial transition of few vectors is
@@ -49,23 +49,9 @@ def cayley_klein(method: Method, increments: int, previous: int = 0, ahead: int 
 
 
 def jacobians(name: str, method: Method, counts: tuple[int, int, int]) -> Kernel:
-    """Derive the Jacobians of an attitude step by its state and by its increments.
+    """Derive the Jacobians of the next state by the state (N, N) and by K increments (N, 3 K) in 1/rad.
 
-    Parameters
-    ----------
-    name : str
-        Name of the attitude algorithm.
-    method : Method
-        The integration method.
-    counts : tuple of int
-        Samples of the step, from before it and from after it.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``increments`` (K, 3) in rad; outputs ``state_jacobian`` (N, N) and ``increments_jacobian``
-        (N, 3 K) in 1/rad: the derivatives of the elements of the next state, row by row, by the elements of the state
-        and of the increments, all row by row and each taken as independent.
+    Rows and columns count elements row by row, each taken as independent.
     """
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
@@ -95,24 +81,11 @@ def jacobians(name: str, method: Method, counts: tuple[int, int, int]) -> Kernel
 
 
 def error_state(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:
-    """Derive how a small error of the attitude goes through a step, and what errors of the increments add to it.
+    """Derive the propagation of a small attitude error through a step, and what errors of K increments add: F, R, L.
 
-    With the right error r, C_true = C (I + [r x]) in body axes, r+ = A^T r + R e for errors e of the increments, where
-    A turns from the body axes at the end of the step to those at its start. With the left error l,
+    With the right error r, C_true = C (I + [r x]) in body axes, r+ = A^T r + R e for errors e (3 K,) of the increments,
+    where A turns from the body axes at the end of the step to those at its start and F = A^T. With the left error l,
     C_true = (I + [l x]) C in reference axes, l+ = l + C L e with the attitude C at the start of the step.
-
-    Parameters
-    ----------
-    method : Method
-        The integration method.
-    increments, previous, ahead : int
-        Samples of the step, from before it and from after it.
-
-    Returns
-    -------
-    Kernel
-        Input ``increments`` (K, 3) in rad; outputs ``right_transition`` (3, 3), the matrix A^T, and ``right_noise`` and
-        ``left_noise`` (3, 3 K), the matrices R and L.
     """
     counts = increments, previous, ahead
     build = KernelBuilder()
@@ -142,29 +115,19 @@ def error_state(method: Method, increments: int, previous: int = 0, ahead: int =
 
 
 @dataclass(frozen=True)
-class Turn:
-    """The transition of a step under construction with what its derivatives are made of.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-    value : Matrix
-        The transition.
-    parts : sequence of Matrix
-        Derivatives of the transition along some directions; the product with the state comes before their sums.
-    sums : sequence of sequence of Expr
-        For every element of the increments the weights of these directions in its derivative.
-    build : KernelBuilder
-    """
+class _Turn:
+    """The transition of a step under construction and its derivatives."""
 
     kinematics: Kinematics
-    value: sp.Matrix
-    parts: Sequence[sp.Matrix]
-    sums: Sequence[Sequence[sp.Expr]]
+    value: sp.Matrix  # the transition
+    parts: Sequence[
+        sp.Matrix
+    ]  # its derivatives along some directions, which take the state before they are summed
+    sums: Sequence[Sequence[sp.Expr]]  # weights of these directions, for every element of the increments
     build: KernelBuilder
 
     def columns(self, state: sp.Matrix) -> list[sp.Matrix]:
-        """Add stages for the derivatives of the next state, and return one for every element of the increments."""
+        """Add stages for the derivatives of the next state by every element of the increments."""
         along = []
         for place, part in enumerate(self.parts):
             meaning = f"derivative of the next state along direction {place}"
@@ -173,13 +136,7 @@ class Turn:
         return self._summed(along)
 
     def angles(self, before: bool) -> list[sp.Matrix]:
-        """Add stages for the small rotations by which the increments turn the end of the step, of Euler parameters.
-
-        Parameters
-        ----------
-        before : bool
-            Whether the rotations are in the axes at the start of the step, or in those at its end.
-        """
+        """Add stages for the step's rotations by the increments, axes at its start if `before`, else at its end."""
         conjugate = rotations.quaternion_conjugate(self.value)
         name, axes = ("left", "start") if before else ("right", "end")
         along = []
@@ -193,7 +150,7 @@ class Turn:
         return self._summed(along)
 
     def _summed(self, along: Sequence[sp.Matrix]) -> list[sp.Matrix]:
-        """Return the derivatives along the elements of the increments from those along the directions."""
+        """Return the derivatives by the elements of the increments from those along the directions."""
         columns = []
         for weights in self.sums:
             total = sp.zeros(*along[0].shape)
@@ -206,13 +163,13 @@ class Turn:
 
 def transition(
     build: KernelBuilder, kinematics: Kinematics, method: Method, counts: tuple[int, int, int]
-) -> Turn:
-    """Add stages for the transition of a step and for its derivatives along the elements of the increments."""
+) -> _Turn:
+    """Add stages for the transition of a step and for its derivatives by the elements of the increments."""
     count = sum(counts)
     increments = build.input(increments_signal(*counts))
     apart = KernelBuilder()
     samples = Samples(apart, counts[0], counts[1], method.nodes, counts[2], method.fit)
-    forms = _legendre(samples)
+    forms = [samples.fit.legendre(m) for m in range(samples.fit.degree + 1)]
     if method.rotation_vector is not None and len(forms) <= _SOME:
         vector = method.rotation_vector(apart, samples)
         function = _function(build, apart.stages, vector, increments, forms)
@@ -237,7 +194,7 @@ def transition(
                 for vector in range(count)
                 for axis in range(3)
             ]
-            return Turn(kinematics, value, parts, sums, build)
+            return _Turn(kinematics, value, parts, sums, build)
     return _stage_by_stage(build, kinematics, apart.stages, value, increments)
 
 
@@ -303,18 +260,13 @@ def _decomposed(frame: Frame, value: sp.Matrix, elements: list[object]) -> Decom
     return frame.quaternion([by_label[axis] for axis in "xyz"], scalar)
 
 
-def _legendre(samples: Samples) -> list[list[sp.Expr]]:
-    """Return the Legendre coefficients of the rate as sums of the samples."""
-    return [samples.fit.legendre(m) for m in range(samples.fit.degree + 1)]
-
-
 def _exponential(
     build: KernelBuilder,
     kinematics: Kinematics,
     function: CovariantFunction,
     sums: Sequence[Sequence[sp.Expr]],
-) -> Turn:
-    """Return the transition of a rotation vector, with its derivatives along the elements of that."""
+) -> _Turn:
+    """Return the transition of a rotation vector, with its derivatives by the elements of that."""
     phi = build.stage(PHI, function.values()[:3])
     square = build.value("phi_square", rotations.dot(phi, phi), "square of the angle of the step")
     written = kinematics.exponential(phi, SERIES, square)
@@ -342,7 +294,7 @@ def _exponential(
             meaning=f"derivative of the rotation vector by element {place}",
         )
         columns.append(list(build.stage(signal, total)))
-    return Turn(kinematics, value, parts, columns, build)
+    return _Turn(kinematics, value, parts, columns, build)
 
 
 def _stage_by_stage(
@@ -351,8 +303,8 @@ def _stage_by_stage(
     stages: Sequence[Stage],
     value: sp.Matrix,
     increments: sp.Matrix,
-) -> Turn:
-    """Return the transition of any method, with its derivatives along the increments by the chain rule."""
+) -> _Turn:
+    """Return the transition of any method, with its derivatives by the increments by the chain rule."""
     build.stages += stages
     parts = []
     for place, element in enumerate(increments):
@@ -360,11 +312,11 @@ def _stage_by_stage(
         parts.append(value.applyfunc(lambda symbol, changes=changes: changes.get(symbol, sp.Integer(0))))
     count = len(parts)
     sums = [[sp.Integer(int(j == k)) for j in range(count)] for k in range(count)]
-    return Turn(kinematics, value, parts, sums, build)
+    return _Turn(kinematics, value, parts, sums, build)
 
 
 def _places(kinematics: Kinematics) -> list[int]:
-    """Return where the elements of the transition stand in a matrix, or in a quaternion with its scalar last."""
+    """Return the places of a transition's elements in a matrix, or in a quaternion with its scalar last."""
     if kinematics is DCM:
         return list(range(9))
     return ["xyzs".index(element[-1]) for element in kinematics.transition.elements]
@@ -383,7 +335,6 @@ def _stage(
 
 
 def _matrix(name: str, shape: tuple[int, int], what: str, unit: str) -> Signal:
-    """Return the signal of a Jacobian."""
     elements = tuple(f"{name}_{row}_{column}" for row in range(shape[0]) for column in range(shape[1]))
     return Signal(name, shape, elements, unit=unit or "1", meaning=f"Jacobian of the {what}, row by row")
 

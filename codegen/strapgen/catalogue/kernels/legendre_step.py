@@ -1,4 +1,4 @@
-"""Derives attitude steps from the Legendre coefficients of the rate, which any filters of samples estimate."""
+"""Attitude steps from the Legendre coefficients of the rate, which any filters of samples estimate."""
 
 from __future__ import annotations
 
@@ -19,22 +19,9 @@ _SOURCE = "the rate as a Legendre series"
 
 
 def step(name: str, degree: int, terms: int = 0) -> Kernel:
-    """Derive the step of a window after its filters: from the Legendre coefficients of the rate to the next state.
+    """Derive the step of a window after its filters: from Legendre coefficients of the rate times the step, in rad.
 
-    Parameters
-    ----------
-    name : str
-        Name of the attitude algorithm.
-    degree : int
-        Degree of the polynomial of the rate.
-    terms : int, optional
-        Terms of the power series of the exact rotation; by default the rotation vector is to fourth order.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``legendre_0``, ``legendre_1``, ... (3,) in rad, the coefficients of the rate times the
-        step in body axes; output ``next``.
+    `terms` of the power series give the exact rotation; with 0 the rotation vector is to fourth order.
     """
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
@@ -44,22 +31,11 @@ def step(name: str, degree: int, terms: int = 0) -> Kernel:
     transition = method.transition(build, kinematics, samples)
     build.output(kinematics.next, kinematics.product(state, build.stage(kinematics.transition, transition)))
     return build.kernel(
-        kernel_name(name, degree, terms),
+        f"{name}-legendre-{'exact-' if terms else ''}{degree}",
         f"{kinematics.title}: step from the Legendre coefficients of the rate to degree {degree}"
         + (", exact rotation" if terms else ""),
         f"{kinematics.source}; {method.source}",
     )
-
-
-def kernel_name(name: str, degree: int, terms: int) -> str:
-    """Return the name of the kernel, see `step`.
-
-    Examples
-    --------
-    >>> kernel_name("euler", 4, 0), kernel_name("euler", 5, 16)
-    ('euler-legendre-4', 'euler-legendre-exact-5')
-    """
-    return f"{name}-legendre-{'exact-' if terms else ''}{degree}"
 
 
 def coefficient_name(m: int) -> str:
@@ -68,15 +44,7 @@ def coefficient_name(m: int) -> str:
 
 
 class Coefficients(Samples):
-    """Legendre coefficients of the rate as the samples of a step.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-        The kernel under construction.
-    vectors : sequence of Matrix, 3 x 1
-        Coefficients of the rate times the step, from degree 0 on: symbols of the kernel.
-    """
+    """Legendre coefficients of the rate times the step as the samples of a step."""
 
     def __init__(self, build: KernelBuilder, vectors: Sequence[sp.Matrix]) -> None:
         self._build = build
@@ -87,7 +55,6 @@ class Coefficients(Samples):
 
 
 def _signal(m: int) -> Signal:
-    """Return the input of a Legendre coefficient."""
     return Signal.vector(
         coefficient_name(m),
         f"c{m}",

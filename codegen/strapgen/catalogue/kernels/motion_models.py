@@ -1,4 +1,4 @@
-"""Derives motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
+"""Motions with a closed-form attitude: body rate, exact angle increments, true direction cosine matrix.
 
 Formulas whose textbook form is 0/0 somewhere are written with sin(x)/x, which has a value there.
 """
@@ -21,29 +21,20 @@ Formula = Callable[..., sp.Matrix]
 
 @dataclass(frozen=True)
 class MotionModel:
-    """A motion in closed form.
-
-    Parameters
-    ----------
-    name, title : str
-        Name on the command line, and a description in one line.
-    rate : callable
-        ``rate(t, *parameters)`` returns the body rate in rad/s, body axes.
-    increment : callable
-        ``increment(m, d, *parameters)`` returns the integral of the rate over [m - d/2, m + d/2] in rad.
-    attitude : callable
-        ``attitude(t, *parameters)`` returns the direction cosine matrix, body to reference; the identity at t = 0.
-    turning : callable or None
-        For a rate of constant length that rotates uniformly, ``turning(*parameters)`` returns the constant vector n in
-        rad/s about which it rotates; None for other motions. The body rate is that of time 0 rotated by -n t, and the
-        attitude is the rotation by (rate at time 0 + n) t times the rotation by -n t.
-    """
+    """A motion in closed form."""
 
     name: str
     title: str
-    rate: Formula
-    increment: Formula
-    attitude: Formula
+    rate: Formula  # rate(t, *parameters) in rad/s, body axes
+    increment: (
+        Formula  # increment(m, d, *parameters), the integral of the rate over [m - d/2, m + d/2] in rad
+    )
+    attitude: (
+        Formula  # attitude(t, *parameters), direction cosine matrix, body to reference; the identity at t = 0
+    )
+    #: turning(*parameters), the constant vector n in rad/s about which a rate of constant length rotates uniformly: the
+    #: body rate is that of time 0 rotated by -n t, and the attitude is the rotation by (rate at time 0 + n) t times the
+    #: rotation by -n t. None for other motions.
     turning: Formula | None = None
 
 
@@ -118,18 +109,7 @@ def _parameters(build: KernelBuilder, motion: MotionModel) -> list[sp.Symbol]:
 
 
 def truth(name: str) -> Kernel:
-    """Return the kernel of a motion's body rate and true attitude at an instant.
-
-    Parameters
-    ----------
-    name : str
-        A key of `MOTIONS`.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``time`` in s and the parameters; outputs ``rate`` (3,) in rad/s, body axes, and ``attitude`` (3, 3).
-    """
+    """Derive the body rate in rad/s and the attitude, body to reference, of a motion at an instant."""
     motion = MOTIONS[name]
     build = KernelBuilder()
     t = build.scalar(Signal.scalar("time", unit="s", meaning="time since the identity attitude"))
@@ -147,19 +127,7 @@ def truth(name: str) -> Kernel:
 
 
 def increments(name: str) -> Kernel:
-    """Return the kernel of a motion's exact angle increment over an interval.
-
-    Parameters
-    ----------
-    name : str
-        A key of `MOTIONS`.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``middle`` and ``width`` of the interval in s, and the parameters; output ``increment`` (3,) in rad, body
-        axes.
-    """
+    """Derive the exact angle increment in rad, body axes, of a motion over an interval."""
     motion = MOTIONS[name]
     build = KernelBuilder()
     m = build.scalar(Signal.scalar("middle", unit="s", meaning="middle of the interval"))

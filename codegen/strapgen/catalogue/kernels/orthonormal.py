@@ -1,4 +1,4 @@
-"""Derives the orthonormalizations, which restore the constraint that a computed attitude loses to numerical errors."""
+"""Orthonormalizations, which restore the constraint that a computed attitude loses to numerical errors."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ def _normalize(kinematics: Kinematics) -> Kernel:
 
 
 def euler() -> Kernel:
-    """Return the exact normalization of Euler parameters."""
+    """Derive the exact normalization of Euler parameters."""
     return _normalize(EULER)
 
 
 def cayley_klein() -> Kernel:
-    """Return the exact normalization of Cayley-Klein parameters."""
+    """Derive the exact normalization of Cayley-Klein parameters."""
     return _normalize(CAYLEY_KLEIN)
 
 
 def dcm() -> Kernel:
-    """Return the scheme of the thesis, which adds its dual to each row and divides the sum by its length."""
+    """Derive the scheme of the thesis, which adds its dual to each row and divides the sum by its length."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     rows = [C[k, :].T for k in range(3)]
@@ -83,10 +83,10 @@ def _symmetric(build: KernelBuilder, name: str, meaning: str, A: sp.Matrix) -> s
 
 
 def dcm_optimal() -> Kernel:
-    """Return the rotation nearest to the computed matrix, C (C'C)^(-1/2).
+    """Derive the rotation nearest to the computed matrix, C (C'C)^(-1/2).
 
-    Let G = C'C and let i1, i2, i3 be the invariants of U = G^(1/2). The theorem of Cayley and Hamilton leads to
-    U (G + i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G follow from the
+    Let G = C'C and let i1, i2, i3 be the invariants of U = G^(1/2). The theorem of Cayley and Hamilton leads to U (G +
+    i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G follow from the
     trigonometric solution of the cubic, which atan2 makes regular at equal eigenvalues.
     """
     build = KernelBuilder()
@@ -152,17 +152,17 @@ def _expansion(order: int) -> Kernel:
 
 
 def dcm_first_order() -> Kernel:
-    """Return the optimal orthonormalization to first order, C (I - S/2) with S = C'C - I."""
+    """Derive the optimal orthonormalization to first order, C (I - S/2) with S = C'C - I."""
     return _expansion(1)
 
 
 def dcm_second_order() -> Kernel:
-    """Return the optimal orthonormalization to second order, C (I - S/2 + 3/8 S^2) with S = C'C - I."""
+    """Derive the optimal orthonormalization to second order, C (I - S/2 + 3/8 S^2) with S = C'C - I."""
     return _expansion(2)
 
 
 def rows_orthogonalized() -> Kernel:
-    """Return the rows of a matrix, each minus half its projections on the others, equations (28) and (29)."""
+    """Derive the rows of a matrix, each minus half its projections on the others, equations (28) and (29)."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     rows = [C[k, :] for k in range(3)]
@@ -186,7 +186,7 @@ def rows_orthogonalized() -> Kernel:
 
 
 def rows_normalized() -> Kernel:
-    """Return the rows of a matrix, normalized to length 1 to first order, equations (30) and (31)."""
+    """Derive the rows of a matrix, normalized to length 1 to first order, equations (30) and (31)."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     corrected = []
@@ -206,7 +206,7 @@ def rows_normalized() -> Kernel:
 
 
 def third_row() -> Kernel:
-    """Return a matrix whose third row is the cross product of the first two, equation (43)."""
+    """Derive a matrix whose third row is the cross product of the first two, equation (43)."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     rows = [C[k, :].T for k in range(2)]
@@ -219,13 +219,7 @@ def third_row() -> Kernel:
 
 
 def normalized_first_order(name: str) -> Kernel:
-    """Return the normalization of a unit quaternion to first order, equations (41) and (42).
-
-    Parameters
-    ----------
-    name : str
-        "euler" or "cayley-klein".
-    """
+    """Derive the normalization of a unit quaternion to first order, equations (41) and (42)."""
     kinematics = {"euler": EULER, "cayley-klein": CAYLEY_KLEIN}[name]
     build = KernelBuilder()
     x = build.input(kinematics.state)

@@ -1,4 +1,4 @@
-"""Derives the sculling term of a step from the coning term, to which it is dual."""
+"""The sculling term of a step from the coning term, to which it is dual."""
 
 from __future__ import annotations
 
@@ -16,22 +16,9 @@ from strapgen.kernel.rotations import cross
 
 
 def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
-    """Derive the sculling term of a step, by duality with the coning coefficients of a method.
+    """Derive the sculling term of a step in m/s, body axes, by duality with the coning coefficients of a method.
 
-    The term is half the integral of (integral of w) x a + (integral of a) x w, in body axes.
-
-    Parameters
-    ----------
-    method : Method
-        A result of the function `method`.
-    increments, previous : int
-        Samples of the step, and samples from before it.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``increments`` in rad and ``velocity_increments`` in m/s, both (previous + increments, 3); output
-        ``sculling`` (3,) in m/s.
+    The term is half the integral of (integral of w) x a + (integral of a) x w.
     """
     if method.coning is None:
         raise ValueError(f"{method.name} has no coning coefficients")

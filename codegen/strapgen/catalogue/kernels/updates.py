@@ -1,4 +1,4 @@
-"""Derives attitude updates by the rotation vectors of the body and of the navigation frame, exact or truncated."""
+"""Attitude updates by the rotation vectors of the body and of the navigation frame, exact or truncated."""
 
 from __future__ import annotations
 
@@ -48,19 +48,7 @@ _EQUATIONS = {9: ("(2) to (4)", "(5) and (6)"), 4: ("(9) to (14)", "(15)")}
 def transition(
     build: KernelBuilder, kinematics: Kinematics, phi: sp.Matrix, order: int | None = None, frame: str = "b"
 ) -> sp.Matrix:
-    """Name the transition of a rotation vector, and return its symbols.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    kinematics : Kinematics
-    phi : Matrix, 3 x 1
-        Rotation vector in rad.
-    order : int, optional
-        Highest degree of products of its elements in the transition; exact by default.
-    frame : str, optional
-        The frame that rotates, in which the rotation vector is; by default the body.
-    """
+    """Name the transition of a rotation vector in rad, exact or to degree `order`, and return its symbols."""
     square = build.value("angle_squared", rotations.dot(phi, phi), "square of the angle")
     turning = replace(kinematics.transition, frame=f"{frame} to {frame}")
     return build.stage(turning, kinematics.exponential(phi, order, square))
@@ -76,21 +64,9 @@ def _described(kinematics: Kinematics, order: int | None, which: int) -> tuple[s
 
 
 def update(name: str, order: int | None = None) -> Kernel:
-    """Return the kernel that rotates an attitude by the rotation vector of a cycle, equations (2) to (4), (9) to (14).
+    """Derive the rotation of an attitude by the rotation vector of a cycle, equations (2) to (4), (9) to (14).
 
     The exact kernel uses sin(x)/x at all angles, since its rounding error is no larger at small ones.
-
-    Parameters
-    ----------
-    name : str
-        Name of the attitude algorithm.
-    order : int, optional
-        Highest degree of products of elements of the rotation vector; exact by default.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``rotation_vector`` (3,) in rad; output ``next``.
     """
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
@@ -111,38 +87,13 @@ def update(name: str, order: int | None = None) -> Kernel:
 def turned_frame(
     build: KernelBuilder, kinematics: Kinematics, state: sp.Matrix, theta: sp.Matrix, order: int | None = None
 ) -> sp.Matrix:
-    """Return a state relative to the navigation frame after the frame has rotated by theta.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    kinematics : Kinematics
-    state : Matrix
-        Attitude relative to the frame before its rotation.
-    theta : Matrix, 3 x 1
-        Rotation vector of the navigation frame in rad, navigation axes.
-    order : int, optional
-        As for `transition`.
-    """
+    """Return a state relative to the navigation frame after the frame rotated by theta in rad, navigation axes."""
     turn = transition(build, kinematics, -theta, order, "n")
     return kinematics.product(turn, state)
 
 
 def navigation_update(name: str, order: int | None = None) -> Kernel:
-    """Return the kernel that refers an attitude to the rotated navigation frame, equations (5), (6) and (15).
-
-    Parameters
-    ----------
-    name : str
-        Name of the attitude algorithm.
-    order : int, optional
-        Highest degree of products of elements of the rotation; exact by default.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` and ``navigation_rotation`` (3,) in rad; output ``next``.
-    """
+    """Derive the attitude relative to the rotated navigation frame, equations (5), (6) and (15)."""
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state, theta = build.input(kinematics.state), build.input(NAVIGATION_ROTATION)
@@ -163,15 +114,7 @@ def rotation_sum(theta: sp.Matrix, before: sp.Matrix, turn: sp.Matrix) -> sp.Mat
 
 
 def navigation_rotation() -> Kernel:
-    """Return the trapezoidal integral of the rate of the navigation frame, equation (27).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``navigation_rotation``, the sum up to this cycle, and ``previous_turn`` and ``turn``, the rates before
-        and after the cycle times its length, all (3,) in rad; outputs
-        ``next_navigation_rotation`` and ``next_previous_turn``.
-    """
+    """Derive the trapezoidal integral of the rate of the navigation frame, equation (27)."""
     build = KernelBuilder()
     theta, before, turn = map(build.input, (NAVIGATION_ROTATION, PREVIOUS_TURN, TURN))
     build.output(after(NAVIGATION_ROTATION), rotation_sum(theta, before, turn))

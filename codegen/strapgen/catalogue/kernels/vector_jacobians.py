@@ -1,4 +1,4 @@
-"""Derives the Jacobians of the vectors of a step: rotation vector, sculling term, velocity and position change."""
+"""Jacobians of the vectors of a step: rotation vector, sculling term, velocity and position change."""
 
 from __future__ import annotations
 
@@ -29,18 +29,9 @@ def velocity_and_position(method: Method, increments: int, previous: int = 0, ah
 
 
 def jacobian(kernel: Kernel) -> Kernel:
-    """Return the kernel of the derivatives of all outputs of a kernel by all of its inputs.
+    """Derive ``<output>_by_<input>`` for every pair: a row for each element of the output, a column of the input.
 
-    Parameters
-    ----------
-    kernel : Kernel
-        Whose expressions have derivatives everywhere.
-
-    Returns
-    -------
-    Kernel
-        With the same inputs, and for each pair an output ``<output>_by_<input>``: a matrix with a row for each element
-        of the output and a column for each element of the input.
+    The expressions of the kernel must have derivatives everywhere.
     """
     build = KernelBuilder()
     for signal in kernel.inputs:
@@ -71,7 +62,6 @@ def jacobian(kernel: Kernel) -> Kernel:
 
 
 def _matrix(output: Signal, by: Signal) -> Signal:
-    """Return the signal of the derivatives of an output by an input."""
     name = f"{output.name}_by_{by.name}"
     elements = tuple(f"{name}_{row}_{column}" for row in range(output.size) for column in range(by.size))
     unit = "1" if output.unit == by.unit else f"({output.unit})/{by.unit}" if by.unit != "1" else output.unit

@@ -1,11 +1,11 @@
-"""Derives the change of velocity and of position over a step from the attitude step of the same method.
+"""Change of velocity and of position over a step, from the attitude step of the same method.
 
-Rigid motions are rotations in dual numbers a + b eps with eps^2 = 0 (Kotelnikov's principle of transference). Put
-w + f eps in place of the body rate w, with the specific force f: the step that turned by p turns by p + q eps, and
-v = 2 q p* is the integral of R f over the step, R the rotation since its beginning. So every method for the attitude
-has one for the velocity, of its order, and no formula is derived a second time. In the rotation vector phi the dual
-part is nu, the change of phi when the increments change by those of the velocity; then v = J(phi) nu with the left
-Jacobian J(phi) nu = nu + (1 - cos x)/x^2 phi x nu + (x - sin x)/x^3 phi x (phi x nu), x = |phi|.
+Rigid motions are rotations in dual numbers a + b eps with eps^2 = 0 (Kotelnikov's principle of transference). Put w + f
+eps in place of the body rate w, with the specific force f: the step that turned by p turns by p + q eps, and v = 2 q p*
+is the integral of R f over the step, R the rotation since its beginning. So every method for the attitude has one for
+the velocity, of its order, and no formula is derived a second time. In the rotation vector phi the dual part is nu, the
+change of phi when the increments change by those of the velocity; then v = J(phi) nu with the left Jacobian J(phi) nu =
+nu + (1 - cos x)/x^2 phi x nu + (x - sin x)/x^3 phi x (phi x nu), x = |phi|.
 
 The position changes by the integral of (1 - t) R f times the step: it is the velocity for the force (1 - t) f, whose
 samples are linear in those of f.
@@ -54,23 +54,9 @@ CHANGES = {
 
 
 def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:
-    """Derive the change of velocity and position over a step from its angle and velocity increments.
+    """Derive the change of velocity and position over a step, in m/s, body axes at its start.
 
-    Parameters
-    ----------
-    method : Method
-        The integration method of the attitude.
-    increments : int
-        Samples of the step, 1 to 8.
-    previous, ahead : int, optional
-        Samples from before the step and from after it that the step uses too.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``increments`` in rad and ``velocity_increments`` in m/s, both (previous + increments + ahead, 3);
-        outputs ``velocity_change`` and ``position_change`` (3,) in m/s, in the body axes at the start of the step. The
-        latter is a position divided by the step length. Gravity and the velocity before the step are in neither.
+    The position is divided by the step length. Gravity and the velocity before the step are in neither.
     """
     build = KernelBuilder()
     rate = _Rate(build, method, (increments, previous, ahead))
@@ -95,16 +81,7 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
 
 
 class _Rate:
-    """The samples of a step, of the body rate and of the specific force, in the form that its method takes.
-
-    Those of a window are the Legendre coefficients that its filters give.
-
-    Attributes
-    ----------
-    samples : Samples
-    method : Method
-        The method on these samples.
-    """
+    """Samples of the body rate and of the specific force as a method takes them, for a window Legendre coefficients."""
 
     def __init__(self, build: KernelBuilder, method: Method, counts: tuple[int, int, int]) -> None:
         increments, previous, ahead = counts
@@ -167,13 +144,7 @@ def _of_coefficients(window: Window, degree: int) -> Method:
 
 
 class _Turn:
-    """The rotation over a step under construction, and the velocity that follows from its change.
-
-    Attributes
-    ----------
-    stages : tuple of Stage
-        Stages that the samples change.
-    """
+    """The rotation over a step under construction, and the velocity that follows from its change."""
 
     def __init__(self, build: KernelBuilder, rate: _Rate) -> None:
         begin = len(build.stages)

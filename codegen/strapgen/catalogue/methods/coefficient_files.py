@@ -1,4 +1,4 @@
-"""Reads what files of exact coefficients hold: keys, rationals, and the name that a title gives."""
+"""Entries of files of exact coefficients: keys, rationals, and the name that a title gives."""
 
 from __future__ import annotations
 
@@ -18,13 +18,7 @@ MOST_CHARACTERS = 4000
 
 
 def check_keys(data: Mapping[str, Any], keys: Collection[str], optional: Collection[str]) -> None:
-    """Check that a table has all keys that it needs, no other, and that its name and source are texts.
-
-    Raises
-    ------
-    InputError
-        If it does not; the message names the first key.
-    """
+    """Check that a table has all keys that it needs and no other, and that its name and source are texts."""
     for key in data:
         if key not in keys:
             raise InputError(f"key {key!r} is not known; allowed: {', '.join(keys)}")
@@ -39,13 +33,7 @@ def check_keys(data: Mapping[str, Any], keys: Collection[str], optional: Collect
 
 
 def entries(what: str, value: Any) -> list[Any]:
-    """Return a value that must be a list.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Return a value that must be a list."""
     if not isinstance(value, list):
         raise InputError(f"{what} is of type {type(value).__name__}; a list is needed")
     return value
@@ -54,13 +42,6 @@ def entries(what: str, value: Any) -> list[Any]:
 def slug(title: str) -> str:
     """Return a title as a name on the command line.
 
-    Raises
-    ------
-    InputError
-        If it does not begin with a letter.
-
-    Examples
-    --------
     >>> slug("Bogacki & Shampine 3(2)")
     'bogacki-shampine-3-2'
     """
@@ -71,18 +52,7 @@ def slug(title: str) -> str:
 
 
 def rational(what: str, value: Any) -> Fraction:
-    """Return an entry that must be a rational number: a whole number or a text, see `coefficients.number`.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-
-    Examples
-    --------
-    >>> rational("tap", "-7/30")
-    Fraction(-7, 30)
-    """
+    """Return an entry that must be a whole number or a text of a rational number, see `coefficients.number`."""
     # The whole of a large family is read: what is plainly a fraction does not take the way of an expression.
     if isinstance(value, str) and len(value) <= MOST_CHARACTERS and _FRACTION.fullmatch(value):
         top, _, bottom = value.partition("/")
@@ -94,13 +64,7 @@ def rational(what: str, value: Any) -> Fraction:
 
 
 def not_negative(what: str, value: Any) -> Fraction:
-    """Return an entry that must be a rational number from 0 on.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Return an entry that must be a rational number from 0 on."""
     number = rational(what, value)
     if number < 0:
         raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
@@ -108,13 +72,7 @@ def not_negative(what: str, value: Any) -> Fraction:
 
 
 def band(value: Any) -> Fraction:
-    """Return an entry that must be the highest angular frequency of a band, in rad a sample.
-
-    Raises
-    ------
-    InputError
-        If it is none, or not below half the sampling rate.
-    """
+    """Return an entry that must be the end of a band in rad a sample, above 0 and below half the sampling rate."""
     highest = rational("band", value)
     if not 0 < highest < 3:
         raise InputError(
@@ -124,13 +82,7 @@ def band(value: Any) -> Fraction:
 
 
 def gyro(table: Any) -> GyroResponse | None:
-    """Return a table with a gyro of second order; None without a table.
-
-    Raises
-    ------
-    InputError
-        If it is no table, a key is wrong, or a number is not above 0.
-    """
+    """Return the table of a gyro of second order, or None without a table."""
     if table is None:
         return None
     if not isinstance(table, dict):

@@ -1,4 +1,4 @@
-"""Reads the coefficients of tableaux exactly from text: fractions, decimals, and expressions with square roots.
+"""Coefficients of tableaux, exactly from text: fractions, decimals, and expressions with square roots.
 
 A rational number is a `Fraction`, any other a SymPy expression. SymPy is loaded with the first irrational number, so
 that rational tableaux can be read, and all tableaux listed, without it.
@@ -40,28 +40,8 @@ class _NotAllowedError(Exception):
 
 
 def number(what: str, value: Any) -> Number:
-    """Read an exact number.
+    """Read an exact number: whole, a fraction, a decimal, or an expression with + - * /, whole powers and square roots.
 
-    Parameters
-    ----------
-    what : str
-        Its name in an error message.
-    value : str or int
-        A whole number, a fraction, a decimal, or an expression of these with + - * /, parentheses, whole powers
-        (``**``) and ``sqrt``. Decimals are exact.
-
-    Returns
-    -------
-    Fraction or sympy.Expr
-        An irrational number is a SymPy expression, a sum of multiples of square roots.
-
-    Raises
-    ------
-    InputError
-        If it is no such number, not real, or too long.
-
-    Examples
-    --------
     >>> number("node", "9/44")
     Fraction(9, 44)
     >>> number("weight", "(18-sqrt(21))/180")
@@ -86,13 +66,7 @@ def number(what: str, value: Any) -> Number:
 
 
 def text(value: Number) -> str:
-    """Return a number as text that `number` reads.
-
-    Examples
-    --------
-    >>> text(Fraction(-9, 44))
-    '-9/44'
-    """
+    """Return a number as text that `number` reads."""
     return str(value)
 
 

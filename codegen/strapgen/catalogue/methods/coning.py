@@ -1,4 +1,4 @@
-"""Integrates a step by coning coefficients, from increments and their cross products, and derives the sculling dual."""
+"""Steps by coning coefficients, from increments and their cross products, and the coefficients of the sculling dual."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.methods import coning_coefficients, legendre_vector, rate_fit, rotation_series
+from strapgen.catalogue.methods import (
+    coning_coefficients,
+    fit_exact,
+    legendre_vector,
+    rate_fit,
+    rotation_series,
+)
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
@@ -34,14 +40,7 @@ _METHODS = {
 
 
 def method(name: str) -> Method:
-    """Return a step by coning coefficients.
-
-    Parameters
-    ----------
-    name : str
-        "compressed" and "uncompressed" have terms up to second order. "combined" and "polynomial", the latter with
-        uncompressed coefficients, also have the terms of third and fourth order.
-    """
+    """Return a step by the coning coefficients of a name in `_METHODS`."""
     form, terms = _METHODS[name]
     order = _FOURTH if terms else _SECOND
 
@@ -115,55 +114,23 @@ def _with_terms(
     """Return the rotation vector in the Legendre coefficients of the rate, where half of the weights vanish."""
     assert samples.increments is not None, "rates are refused before"
     pairs = coefficients(samples.increments, samples.previous).pairs
-    count = len(samples.fit.basis)
-    vectors = [
-        samples.combination(
-            f"legendre_{m}",
-            samples.fit.legendre(m),
-            f"Legendre coefficient {m} of the rate times the step",
-        )
-        for m in range(count)
-    ]
+    vectors = fit_exact.coefficients(samples)
     second = in_legendre(pairs, samples.increments, samples.previous)
-    third, fourth = rotation_series.legendre_terms(min(count, MOST_COEFFICIENTS), 4)[2:]
+    third, fourth = rotation_series.legendre_terms(min(len(vectors), MOST_COEFFICIENTS), 4)[2:]
     return legendre_vector.rotation_vector(build, vectors, (second, third, fourth))
 
 
 def sample_terms(
     increments: int, previous: int = 0
 ) -> tuple[dict[int, Scalars], dict[tuple[int, int], Scalars]]:
-    """Return the terms of third and fourth order of the polynomial through samples, in terms of the samples.
-
-    Parameters
-    ----------
-    increments, previous : int
-        Samples of the step, and samples from before it.
-
-    Returns
-    -------
-    third, fourth : dict
-        As from `rotation_series.third` and `rotation_series.fourth`; the oldest sample is number 0.
-    """
+    """Return the terms of third and fourth order of the polynomial through samples, which count from the oldest."""
     terms = rotation_series.terms(increments + previous, 4)
     third, fourth = (rotation_series.in_samples(words, increments, previous) for words in terms[2:])
     return rotation_series.third(third), rotation_series.fourth(fourth)
 
 
 def in_legendre(pairs: Scalars, increments: int, previous: int) -> Scalars:
-    """Convert coefficients of cross products of samples to those of the rate's Legendre coefficients.
-
-    Parameters
-    ----------
-    pairs : dict
-        By the numbers of two samples.
-    increments, previous : int
-        Samples of the step, and samples from before it.
-
-    Returns
-    -------
-    dict
-        By the numbers of two Legendre coefficients, without zeros.
-    """
+    """Convert coefficients of cross products of samples to those of the rate's Legendre coefficients."""
     count = increments + previous
     powers = [coning_coefficients.powers(increments, previous, j) for j in range(count)]
     table = [

@@ -1,4 +1,4 @@
-"""Designs coning coefficients, which give the second-order term of the rotation vector from cross products.
+"""Coning coefficients, which give the second-order term of the rotation vector from cross products.
 
 The term is half the integral of (integral of the rate) x (rate). A design has a weight for the cross product of every
 two samples. Samples do not determine the term, and the forms of a design differ in the rates for which they are exact:
@@ -45,22 +45,13 @@ MOST_COMBINED = 17
 
 @dataclass(frozen=True)
 class Design:
-    """Coefficients of the cross products of samples.
+    """Coefficients of the cross products of samples."""
 
-    Parameters
-    ----------
-    form : str
-        "compressed", "uncompressed" or "combined", or "shaped" for coefficients of a file.
-    samples, previous : int
-        Samples of the slow cycle, and samples from before it.
-    pairs : dict
-        The coefficient of each cross product older x newer, by the numbers of the two samples; the oldest is 0. The
-        order is by the newer sample, then by the older one.
-    """
-
-    form: str
-    samples: int
-    previous: int
+    form: str  # one of `FORMS`, or "shaped" for coefficients of a file
+    samples: int  # of the slow cycle
+    previous: int  # samples from before it
+    #: Coefficients of the cross products older x newer, by the numbers of the two samples, of which the oldest is 0; in
+    #: the order of the newer sample, then of the older one.
     pairs: Scalars
 
     __repr__ = short_repr
@@ -71,14 +62,14 @@ class Design:
 
     @cached_property
     def degree(self) -> int:
-        """Return the total degree up to which products of two powers of time in the rate are integrated exactly."""
+        """The total degree up to which products of two powers of time in the rate are integrated exactly."""
         for total in count(1):
             for row, value in polynomial_conditions(self.samples, self.previous, total):
                 if sum(row[pair] * c for pair, c in self.pairs.items()) != value:
                     return total - 1
         raise AssertionError("the samples are finite in number")
 
-    def residual(self) -> ResidualDrift:
+    def residual(self) -> _ResidualDrift:
         """Return the drift on coning that the design does not compensate."""
         sines: dict[int, Fraction] = {self.samples: Fraction(1, 2)}
         for (older, newer), c in self.pairs.items():
@@ -86,28 +77,21 @@ class Design:
             for multiple, weight in ((distance, 2), (distance + 1, -1), (distance - 1, -1)):
                 sines[multiple] = sines.get(multiple, Fraction(0)) + weight * c
         nonzero = {m: c for m, c in sorted(sines.items()) if m and c}
-        return ResidualDrift(self.samples, nonzero)
+        return _ResidualDrift(self.samples, nonzero)
 
 
 @dataclass(frozen=True)
-class ResidualDrift:
+class _ResidualDrift:
     """The mean residual drift on coning, computed minus true, to second order in the half-angle of the cone.
 
     The rotation vector of the body is alpha (cos omega t, sin omega t, 0); samples are T apart, and lambda = omega T.
     Over a slow cycle of N samples the second-order term is alpha^2 (N lambda - sin(N lambda)) / 2 about the third axis.
-    The cross product of two samples m apart is 2 alpha^2 (1 - cos lambda) sin(m lambda). The drift in rad/s is
-    alpha^2 / (N T) times the sum of c_m sin(m lambda), minus N lambda / 2.
-
-    Parameters
-    ----------
-    samples : int
-        N.
-    sines : dict of int to Fraction
-        The coefficients c_m, by m.
+    The cross product of two samples m apart is 2 alpha^2 (1 - cos lambda) sin(m lambda). The drift in rad/s is alpha^2
+    / (N T) times the sum of c_m sin(m lambda), minus N lambda / 2.
     """
 
-    samples: int
-    sines: dict[int, Fraction]
+    samples: int  # N
+    sines: dict[int, Fraction]  # c_m by m
 
     def series(self) -> Iterator[tuple[int, Fraction]]:
         """Yield the powers of lambda with nonzero coefficients in the drift, in units of alpha^2 / (N T)."""
@@ -146,29 +130,8 @@ def _times(c: Fraction | int, factor: str) -> str:
 
 
 def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
-    """Derive coning coefficients exactly.
+    """Derive coning coefficients of a form in `FORMS` exactly, for samples of the slow cycle and ones before it.
 
-    Parameters
-    ----------
-    samples : int
-        Samples of the slow cycle.
-    previous : int, optional
-        Samples from before it.
-    form : str, optional
-        "compressed", "uncompressed" or "combined".
-
-    Returns
-    -------
-    Design
-
-    Raises
-    ------
-    InputError
-        If the form is unknown, there are more than 12 samples or more than 32 from before the cycle, or the form is
-        "combined" and they are more than 17 together.
-
-    Examples
-    --------
     >>> [str(c) for c in design(3).pairs.values()]
     ['9/20', '27/20']
     >>> [str(c) for c in design(3, form="uncompressed").pairs.values()]
@@ -191,18 +154,7 @@ def _designed(samples: int, previous: int, form: str) -> Design:
 
 
 def powers(samples: int, previous: int, power: int) -> list[Fraction]:
-    """Return the samples of the rate t^power, oldest first, where t runs from 0 to 1 over the slow cycle.
-
-    Parameters
-    ----------
-    samples, previous : int
-        Samples of the slow cycle, and samples from before it.
-    power : int
-
-    Returns
-    -------
-    list of Fraction
-    """
+    """Return the samples of the rate t^power, oldest first, where t runs from 0 to 1 over the slow cycle."""
     integral = [Fraction(k, samples) ** (power + 1) / (power + 1) for k in range(-previous, samples + 1)]
     return [b - a for a, b in pairwise(integral)]
 
@@ -241,21 +193,7 @@ def _combined(samples: int, previous: int) -> Scalars:
 
 
 def polynomial_conditions(samples: int, previous: int, total: int) -> Iterator[tuple[Scalars, Fraction]]:
-    """Yield conditions for polynomial rates: the coefficients of the pairs of samples and the true value.
-
-    There is one condition for each product of two different powers of time with a total degree.
-
-    Parameters
-    ----------
-    samples, previous : int
-        Samples of the slow cycle, and samples from before it.
-    total : int
-        Total degree of the product.
-
-    Yields
-    ------
-    dict, Fraction
-    """
+    """Yield a condition for each product of two powers of time with a total degree: weights of the pairs, due value."""
     truth = rotation_series.pairs(rotation_series.terms(total + 1, 2)[1])
     for j in range((total + 1) // 2):
         k = total - j
@@ -265,10 +203,10 @@ def polynomial_conditions(samples: int, previous: int, total: int) -> Iterator[t
 
 
 def _coning(samples: int, previous: int) -> Iterator[tuple[Scalars, Fraction]]:
-    """Yield conditions for coning, one for each power of lambda: the coefficients of the pairs and the true value.
+    """Yield a condition for each power of lambda on coning: the coefficients of the pairs and the true value.
 
-    They follow from the sines in `ResidualDrift`: the coefficient of lambda^(2q+1) in sin(m lambda) is
-    (-1)^q m^(2q+1) / (2q+1)!, whose factor without m is common to both sides and left out.
+    They follow from the sines in `_ResidualDrift`: the coefficient of lambda^(2q+1) in sin(m lambda) is (-1)^q m^(2q+1)
+    / (2q+1)!, whose factor without m is common to both sides and left out.
     """
     total = samples + previous
     for q in range(1, total):
@@ -278,20 +216,7 @@ def _coning(samples: int, previous: int) -> Iterator[tuple[Scalars, Fraction]]:
 
 
 def power_of_coning(distance: int, power: int) -> Fraction:
-    """Return a power of lambda in the cross product of two samples on coning.
-
-    Parameters
-    ----------
-    distance : int
-        m, from the older sample to the newer one.
-    power : int
-        An odd one, 2q + 1.
-
-    Returns
-    -------
-    Fraction
-        The coefficient of the power in 2 sin(m lambda) (1 - cos lambda), by (-1)^q / (2q + 1)!.
-    """
+    """Return the coefficient of lambda^power, power odd, in 2 sin(m lambda) (1 - cos lambda), times +-power!."""
     m = Fraction(distance)
     return 2 * m**power - (m + 1) ** power - (m - 1) ** power
 

@@ -28,19 +28,11 @@ _POINTS = 1200
 
 
 class ConingShape(NamedTuple):
-    """What determines the drift on coning beside the coefficients.
+    """The samples and the gyro of a step, on which the drift on coning depends beside the coefficients."""
 
-    Parameters
-    ----------
-    samples, previous : int
-        N samples of the step, and samples from before it.
-    gyro : GyroResponse or None
-        None for increments that are integrals of the rate.
-    """
-
-    samples: int
-    previous: int
-    gyro: GyroResponse | None = None
+    samples: int  # N, of the step
+    previous: int  # samples from before the step
+    gyro: GyroResponse | None = None  # None for increments that are integrals of the rate
 
     @property
     def unknowns(self) -> int:
@@ -49,23 +41,8 @@ class ConingShape(NamedTuple):
 
 
 def terms(shape: ConingShape, b: Any, context: Any) -> tuple[list[Any], Any]:
-    """Return what a unit of each coefficient adds to E, and what E is without them, with the other sign.
+    """Return dE/dK_s for every s, and minus E without coefficients, at b in rad a sample.
 
-    Parameters
-    ----------
-    shape : ConingShape
-    b : mpf
-        Angular frequency in rad a sample.
-    context : mpmath context
-        Its digits are those of the result.
-
-    Returns
-    -------
-    list of mpf, (unknowns,)
-    mpf
-
-    Examples
-    --------
     >>> columns, right = terms(ConingShape(1, 1), _REAL.mpf(1), _REAL)
     >>> [round(float(value), 6) for value in (*columns, right)]
     [0.773645, 0.079265]
@@ -88,21 +65,8 @@ def _inverse_power(gyro: GyroResponse) -> tuple[Fraction, Fraction, Fraction]:
 
 
 def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fraction]]:
-    """Return the conditions that annul the lowest powers of b in E, exactly.
+    """Return the conditions on K_s that annul the lowest powers b^3, b^5, ... of E: weights and right side of each.
 
-    Parameters
-    ----------
-    shape : ConingShape
-    count : int
-        Number of powers: b^3, b^5, ...
-
-    Returns
-    -------
-    list of (list of Fraction, Fraction)
-        For each power its coefficient for every K_s, and what their sum has to be.
-
-    Examples
-    --------
     >>> powers(ConingShape(1, 1), 1)
     [([Fraction(-6, 1)], Fraction(-1, 2))]
     """
@@ -121,23 +85,10 @@ def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fractio
 
 
 def products(shape: ConingShape, degree: int) -> list[tuple[list[Fraction], Fraction]]:
-    """Return the conditions of a step that is exact for products of two powers of time in the rate.
+    """Return the conditions on K_s for exact products of two powers of time in the rate, up to a total degree.
 
-    Parameters
-    ----------
-    shape : ConingShape
-        Of an ideal gyro.
-    degree : int
-        Highest total degree of the products; 0 for none.
+    With an ideal gyro; those of degree 1 say the same as the first of `powers`.
 
-    Returns
-    -------
-    list of (list of Fraction, Fraction)
-        For each product its coefficient for every K_s, and what their sum has to be. Those of degree 1 say the same as
-        the first of `powers`.
-
-    Examples
-    --------
     >>> [str(value) for row, value in products(ConingShape(1, 2), 2) for value in (*row, value)]
     ['1', '2', '1/12', '0', '-2', '1/12']
     """
@@ -152,23 +103,8 @@ def products(shape: ConingShape, degree: int) -> list[tuple[list[Fraction], Frac
 
 
 def largest(shape: ConingShape, coefficients: Sequence[Fraction], band: Fraction) -> float:
-    """Return the largest magnitude of E over a band.
+    """Return the largest |E| for K_1, K_2, ... over 0 < b <= band, both in rad.
 
-    Parameters
-    ----------
-    shape : ConingShape
-    coefficients : sequence of Fraction, (unknowns,)
-        K_1, K_2, ...
-    band : Fraction
-        Highest angular frequency in rad a sample.
-
-    Returns
-    -------
-    float
-        In rad a step, for each squared radian of the half-angle.
-
-    Examples
-    --------
     >>> f"{largest(ConingShape(1, 1), [Fraction(1, 12)], Fraction(1)):.3e}"
     '1.479e-02'
     """
@@ -197,23 +133,8 @@ def _search(shape: ConingShape, band: Fraction) -> tuple[list[Any], list[tuple[l
 
 
 def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequence[Any]) -> list[Any]:
-    """Return E at frequencies.
+    """Return E for K_1, K_2, ... at frequencies b in rad a sample.
 
-    Parameters
-    ----------
-    shape : ConingShape
-    coefficients : sequence of Fraction, (unknowns,)
-        K_1, K_2, ...
-    points : sequence of number
-        b in rad a sample.
-
-    Returns
-    -------
-    list of mpf
-        In rad a step, for each squared radian of the half-angle.
-
-    Examples
-    --------
     >>> [f"{float(value):.3e}" for value in errors(ConingShape(1, 1), [Fraction(1, 12)], [0.1, 0.2])]
     ['-1.665e-07', '-5.308e-06']
     """
@@ -221,6 +142,6 @@ def errors(shape: ConingShape, coefficients: Sequence[Fraction], points: Sequenc
 
 
 def _sums(coefficients: Sequence[Fraction], rows: Iterable[tuple[list[Any], Any]]) -> list[Any]:
-    """Return the sums of coefficients times columns, without the right sides."""
+    """Return the sums of coefficients times columns, minus the right sides."""
     weights = [_REAL.mpf(c.numerator) / c.denominator for c in coefficients]
     return [_REAL.fdot(zip(weights, columns, strict=True)) - right for columns, right in rows]

@@ -27,13 +27,7 @@ _WEIGHTS = (Fraction(13, 51), Fraction(-2, 3), Fraction(24, 17))
 
 
 def method(order: int) -> Method:
-    """Return the method of third order.
-
-    Parameters
-    ----------
-    order : int
-        3.
-    """
+    """Return the method of third order."""
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         total = None

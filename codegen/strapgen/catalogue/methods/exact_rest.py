@@ -30,13 +30,7 @@ _POWERS = 8
 
 
 def method(order: int) -> Method:
-    """Return the step by combined coefficients with the exact rest.
-
-    Parameters
-    ----------
-    order : int
-        Power of time at which a series of the polynomial's rotation is cut off.
-    """
+    """Return the step by combined coefficients with the exact rest; series end at the power `order` of time."""
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         parameters = EULER if kinematics is DCM else kinematics
@@ -83,7 +77,7 @@ def _limit(increments: int, previous: int, ahead: int) -> int:
 
 
 def _rest(samples: Samples, coefficients: list[sp.Matrix]) -> sp.Matrix:
-    """Return half of what combined coefficients differ from the uncompressed ones, as a vector."""
+    """Return half the difference of combined and uncompressed coefficients, as a vector."""
     increments, previous = samples.increments, samples.previous
     assert increments is not None, "rates are refused before"
     combined, plain = (

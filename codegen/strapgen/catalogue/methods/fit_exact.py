@@ -19,13 +19,7 @@ _INCREMENTS = 2
 
 
 def method(order: int) -> Method:
-    """Return the rotation of the polynomial through the samples.
-
-    Parameters
-    ----------
-    order : int
-        Power of time at which a series is cut off.
-    """
+    """Return the rotation of the polynomial through the samples; series end at the power `order` of time."""
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         return polynomial_rotation.rotation(build, kinematics, coefficients(samples), order, parts(samples))
@@ -41,7 +35,7 @@ def method(order: int) -> Method:
 
 
 def coefficients(samples: Samples) -> list[sp.Matrix]:
-    """Add stages for the Legendre coefficients of the rate times the step, in rad, and return them."""
+    """Add stages for the Legendre coefficients of the rate times the step, in rad."""
     return [
         samples.combination(
             f"legendre_{m}",
@@ -53,6 +47,6 @@ def coefficients(samples: Samples) -> list[sp.Matrix]:
 
 
 def parts(samples: Samples) -> int:
-    """Return into how many equal parts a step is cut, each with a series of its own."""
+    """Return the number of equal parts of a step, each with a series of its own."""
     assert samples.increments is not None, "rates are refused before"
     return -(-samples.increments // _INCREMENTS)

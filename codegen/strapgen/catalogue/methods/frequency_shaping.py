@@ -27,13 +27,7 @@ _BITS = 60
 
 
 def method(order: int) -> Method:
-    """Return the step by shaped coefficients.
-
-    Parameters
-    ----------
-    order : int
-        2: the error of coning at low frequencies is small, but not zero.
-    """
+    """Return the step by shaped coefficients, of order 2: at low frequencies coning has a small error, not zero."""
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         increments, previous = samples.increments, samples.previous
@@ -67,17 +61,6 @@ def method(order: int) -> Method:
 def weights(increments: int, previous: int = 0) -> tuple[Fraction, ...]:
     """Return the weights of the older samples in the lever, the youngest first.
 
-    Parameters
-    ----------
-    increments, previous : int
-        Samples of the step, and samples from before it.
-
-    Returns
-    -------
-    tuple of Fraction
-
-    Examples
-    --------
     >>> [round(float(weight), 4) for weight in weights(1, 2)]
     [0.1329, -0.0277]
     """

@@ -1,4 +1,4 @@
-"""Writes the rotation vector of a step as a sum of vectors and cross products of the rate's Legendre coefficients."""
+"""The rotation vector of a step as a sum of vectors and cross products of the rate's Legendre coefficients."""
 
 from __future__ import annotations
 
@@ -19,16 +19,9 @@ from strapgen.kernel.rotations import cross, dot
 def rotation_vector(
     build: KernelBuilder, vectors: Sequence[sp.Matrix], terms: tuple[Scalars, Words, Words]
 ) -> sp.Matrix:
-    """Add stages for the rotation vector to fourth order, and return it.
+    """Add stages for the rotation vector to fourth order from Legendre coefficients of the rate times the step, in rad.
 
-    Parameters
-    ----------
-    build : KernelBuilder
-    vectors : sequence of Matrix, 3 x 1
-        Legendre coefficients of the rate times the step, in rad.
-    terms : dict, dict, dict
-        Coefficients of the cross products of second order, and the words of third and of fourth order, see
-        `rotation_series`.
+    The terms are the coefficients of the cross products of second order, and the words of third and of fourth order.
     """
     second = terms[0]
     third, fourth = rotation_series.third(terms[1]), rotation_series.fourth(terms[2])

@@ -26,14 +26,7 @@ _GAUSS = {
 
 
 def method(order: int) -> Method:
-    """Return the Magnus series of order 2, 4 or 6.
-
-    It is exact to its order for any rate, and the transition is a rotation whatever the rate is.
-
-    Parameters
-    ----------
-    order : int
-    """
+    """Return the Magnus series of order 2, 4 or 6: exact to its order for any rate, and always a rotation."""
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         if order == 2:
@@ -51,7 +44,7 @@ def method(order: int) -> Method:
 
 
 def _moment(samples: Samples, power: int) -> sp.Matrix:
-    """Add a stage for the integral over the step of the rate times (t - 1/2)^power, t in steps; return its symbols."""
+    """Add a stage for the integral over the step of the rate times (t - 1/2)^power, t in steps."""
     meaning = (
         "integral of the rate over the step"
         if power == 0
@@ -66,17 +59,11 @@ def _legendre_moment(samples: Samples, degree: int) -> list[sp.Expr]:
 
 
 def _second_order(samples: Samples, first: int) -> sp.Matrix:
-    """Return the term of second order in the rate, for its Legendre polynomials from the degree `first` on.
+    """Return the term of second order in the rate, for its Legendre polynomials from the even degree `first` on.
 
-    With the integrals m_k of the rate times the Legendre polynomial P_k the term is half the sum of m_k x m_(k+1):
-    the integral of P_k is a difference of P_(k+1) and P_(k-1), so that all other products vanish. Two products that
-    share the vector of odd degree are taken as one, (m_(k-1) - m_(k+1)) x m_k.
-
-    Parameters
-    ----------
-    samples : Samples
-    first : int
-        An even number.
+    With the integrals m_k of the rate times the Legendre polynomial P_k the term is half the sum of m_k x m_(k+1): the
+    integral of P_k is a difference of P_(k+1) and P_(k-1), so that all other products vanish. Two products that share
+    the vector of odd degree are taken as one, (m_(k-1) - m_(k+1)) x m_k.
     """
     total = sp.zeros(3, 1)
     for odd in range(first + 1, samples.fit.degree + 1, 2):
@@ -115,7 +102,7 @@ def _sixth(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), value)
 
     def alpha(number: int, meaning: str, *factors: sp.Expr) -> sp.Matrix:
-        """Add a stage for a combination of the moments, which is linear in the samples; return its symbols."""
+        """Add a stage for a combination of the moments, which is linear in the samples."""
         moments = [samples.fit.moment(power) for power in range(3)]
         weights = [
             sum((f * w for f, w in zip(factors, column, strict=True)), sp.S.Zero)

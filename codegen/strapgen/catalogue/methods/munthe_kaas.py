@@ -1,4 +1,4 @@
-"""Runge-Kutta-Munthe-Kaas methods apply a tableau to the rotation vector of the step, then take its exponential."""
+"""Runge-Kutta-Munthe-Kaas methods: a tableau applied to the rotation vector of the step, then its exponential."""
 
 from __future__ import annotations
 
@@ -14,12 +14,7 @@ from strapgen.kernel.rotations import cross
 
 
 def method(order: int) -> Method:
-    """Return the method of an order on the classical tableau `rk<order>`.
-
-    Parameters
-    ----------
-    order : int
-    """
+    """Return the method of an order on the classical tableau `rk<order>`."""
     tableau = TABLEAUX[f"rk{order}"]
     nodes = tuple(dict.fromkeys(tableau.nodes))
 
@@ -46,23 +41,10 @@ def method(order: int) -> Method:
 
 
 def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
-    """Return the derivative of the rotation vector by Bortz's equation, as a series of cross products.
+    """Return the derivative of the rotation vector by Bortz's equation, with so many nested cross products at most.
 
     The equation is dphi/dt = sum_k (-1)^k B_k/k! phi x (phi x ... w) with Bernoulli's numbers B_k, B_1 = -1/2, which
     begins w + phi x w/2 + phi x (phi x w)/12 (J. E. Bortz, IEEE Trans. Aerosp. Electron. Syst. 7 (1971) 61-66).
-
-    Parameters
-    ----------
-    phi : Matrix, 3 x 1
-        Rotation vector in rad.
-    turn : Matrix, 3 x 1
-        Body rate, or body rate times the step.
-    products : int
-        Largest number of nested cross products.
-
-    Returns
-    -------
-    Matrix, 3 x 1
     """
     total, nested = turn, turn
     for k in range(1, products + 1):
@@ -72,7 +54,7 @@ def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
 
 
 def bortz_coefficient(products: int) -> sp.Rational:
-    """Return the coefficient of a number of nested cross products in Bortz's equation, see `bortz`."""
+    """Return the coefficient of a number of nested cross products in Bortz's equation."""
     # B_1 of SymPy is +1/2 or -1/2, depending on its release.
     if products == 1:
         return abs(sp.bernoulli(1))

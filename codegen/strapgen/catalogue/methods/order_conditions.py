@@ -1,4 +1,4 @@
-"""Finds the order of a Runge-Kutta method exactly, for general equations and for attitude kinematics.
+"""Order conditions of Runge-Kutta methods, for general equations and for attitude kinematics, exactly.
 
 For general equations the conditions of order p belong to the rooted trees with p nodes: b' Phi(t) = 1/gamma(t), after
 Butcher.
@@ -9,9 +9,9 @@ order. In the exact solution, a series of iterated integrals (Peano and Baker), 
 
     int_0^1 s_1^k_1 int_0^s_1 s_2^k_2 ... int_0^s_(m-1) s_m^k_m ds_m ... ds_1 = prod_i 1 / sum_(j >= i) (k_j + 1)
 
-and in the method it is b' C^k_1 A C^k_2 A ... C^k_m 1 with the diagonal matrix C of the nodes; a factor
-1/(k_1! ... k_m!) is common to both. Attitude kinematics is linear. In the form x' = x A all products are reversed on
-both sides, and the conditions are the same.
+and in the method it is b' C^k_1 A C^k_2 A ... C^k_m 1 with the diagonal matrix C of the nodes; a factor 1/(k_1! ...
+k_m!) is common to both. Attitude kinematics is linear. In the form x' = x A all products are reversed on both sides,
+and the conditions are the same.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from functools import cache, lru_cache
 from itertools import combinations_with_replacement, groupby, product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from strapgen.catalogue.methods.derivative_words import Word, word_coefficient, words
-
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
     from strapgen.catalogue.methods.tableau import Tableau
 
 #: A rooted tree as the tuple of the subtrees of its root, in a fixed order.
 Tree: TypeAlias = "tuple[Tree, ...]"
+#: A product of derivatives of A(t), as the tuple of the orders of the derivatives, the last in time first.
+Word: TypeAlias = tuple[int, ...]
 
 
 # Trees
@@ -39,10 +39,8 @@ Tree: TypeAlias = "tuple[Tree, ...]"
 
 @cache
 def trees(order: int) -> tuple[Tree, ...]:
-    """Return the rooted trees with as many nodes as the order, the tree with all leaves on the root first.
+    """Return the rooted trees with `order` nodes, the tree with all leaves on the root first.
 
-    Examples
-    --------
     >>> trees(3)
     (((), ()), (((),),))
     >>> [len(trees(order)) for order in range(1, 9)]
@@ -76,8 +74,6 @@ def size(tree: Tree) -> int:
 def density(tree: Tree) -> int:
     """Return gamma, the product of the sizes of a tree and of all its subtrees.
 
-    Examples
-    --------
     >>> density((((),),))
     6
     """
@@ -88,8 +84,6 @@ def density(tree: Tree) -> int:
 def symmetry(tree: Tree) -> int:
     """Return sigma, the number of exchanges of branches that leave a tree unchanged.
 
-    Examples
-    --------
     >>> symmetry(((), (), ()))
     6
     """
@@ -103,8 +97,6 @@ def symmetry(tree: Tree) -> int:
 def weight_text(tree: Tree) -> str:
     """Return the elementary weight of a tree in the usual notation.
 
-    Examples
-    --------
     >>> [weight_text(tree) for tree in trees(3)]
     ['sum b_i c_i^2', 'sum b_i a_ij c_j']
     """
@@ -123,21 +115,51 @@ def weight_text(tree: Tree) -> str:
     return " ".join(["sum", f"b_{root}", *factors(tree, root)])
 
 
+# Words
+
+
+def words(order: int, derivatives: int | None = None) -> list[Word]:
+    """Return the products of derivatives of A(t) of an order, the shortest first, none of a derivative above a limit.
+
+    >>> words(3), words(3, derivatives=0)
+    ([(2,), (1, 0), (0, 1), (0, 0, 0)], [(0, 0, 0)])
+    """
+    if order == 0:
+        return [()]
+    highest = order - 1 if derivatives is None else min(derivatives, order - 1)
+    products = [(k, *rest) for k in range(highest, -1, -1) for rest in words(order - 1 - k, derivatives)]
+    return sorted(products, key=len)
+
+
+def word_text(word: Word) -> str:
+    """Return the weight of a word in a tableau in the usual notation.
+
+    >>> [word_text(word) for word in words(3)]
+    ['sum b_i c_i^2', 'sum b_i c_i a_ij', 'sum b_i a_ij c_j', 'sum b_i a_ij a_jk']
+    """
+    letters, parts = "ijklmnopqrstuvwxyz", ["sum b_i"]
+    for place, power in enumerate(word):
+        if place:
+            parts.append(f"a_{letters[place - 1]}{letters[place]}")
+        if power:
+            parts.append(f"c_{letters[place]}" + (f"^{power}" if power > 1 else ""))
+    return " ".join(parts)
+
+
+def word_coefficient(word: Word) -> Fraction:
+    """Return the coefficient of a word in the exact solution, times the factorials of its derivatives.
+
+    >>> word_coefficient((0, 1))  # int_0^1 int_0^s t dt ds
+    Fraction(1, 6)
+    """
+    return Fraction(1, math.prod(sum(k + 1 for k in word[place:]) for place in range(len(word))))
+
+
 # Tableaux
 
 
 class Stages:
-    """The coefficients of a tableau in a ring or field that holds them, and vectors with one element per stage.
-
-    Arithmetic is exact, so that a zero is recognized.
-
-    Parameters
-    ----------
-    rows : sequence of sequence
-        The nodes, the weights, and the rows of the matrix below the diagonal.
-    rational, number : callable
-        Convert a fraction to an element, and an element to a number.
-    """
+    """A tableau's coefficients in a ring or field, where a zero is recognized, and vectors with an element a stage."""
 
     def __init__(
         self,
@@ -209,7 +231,7 @@ class Stages:
         return self.sum(self.weights, vector) - self.rational(exact)
 
     def row_residuals(self) -> list[Any]:
-        """Return for every stage the sum of its row minus its node."""
+        """Return the sum of each row minus its node."""
         sums = self.applied(self.ones)
         return [total - node for total, node in zip(sums, self.nodes, strict=True)]
 
@@ -235,25 +257,14 @@ def _holds(tableau: Tableau, defect: Any) -> bool:
 
 
 def row_residuals(tableau: Tableau) -> list[Number]:
-    """Return for every stage the sum of its row minus its node."""
+    """Return the sum of each row of the matrix minus its node."""
     stages = _stages(tableau)
     return [stages.number(defect) for defect in stages.row_residuals()]
 
 
 def residuals(tableau: Tableau, order: int) -> list[tuple[Tree, Number]]:
-    """Return for every tree of an order its elementary weight minus 1/gamma, which is zero if the condition holds.
+    """Return every tree of an order with its elementary weight minus 1/gamma, which is 0 if the condition holds.
 
-    Parameters
-    ----------
-    tableau : Tableau
-    order : int
-
-    Returns
-    -------
-    list of (Tree, number)
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
     >>> residuals(TABLEAUX["rk2"], 3)
     [(((), ()), Fraction(1, 6)), ((((),),), Fraction(-1, 6))]
@@ -273,25 +284,7 @@ def first_failure(tableau: Tableau, order: int) -> tuple[Tree, Number] | None:
 
 
 def order(tableau: Tableau, most: int = 20, known: int = 0) -> int:
-    """Return the classical order of a method, at most `most`.
-
-    Parameters
-    ----------
-    tableau : Tableau
-    most : int, optional
-    known : int, optional
-        An order up to which its conditions have been checked; they are not looked at again.
-
-    Returns
-    -------
-    int
-
-    Examples
-    --------
-    >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
-    >>> order(TABLEAUX["rk4"])
-    4
-    """
+    """Return the classical order of a method, at most `most`; conditions up to the order `known` are taken to hold."""
     return next((p - 1 for p in range(known + 1, most + 1) if first_failure(tableau, p)), most)
 
 
@@ -303,20 +296,12 @@ def embedded_order(tableau: Tableau) -> int:
 
 @lru_cache(maxsize=128)
 def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
-    """Return the order of a method on attitude kinematics, or on any x' = A(t) x.
+    """Return the order of a method on attitude kinematics, or on any x' = A(t) x with A of degree `derivatives` in t.
 
     It is at least the classical order and can exceed it, since fewer products have to agree. Relations among the
-    matrices of one representation are not used, for instance that the square of a rate is a scalar for quaternions.
+    matrices of one representation are not used, for instance that the square of a rate is a scalar for quaternions. For
+    a constant rate, 0, it is the order to which the step agrees with the exponential.
 
-    Parameters
-    ----------
-    tableau : Tableau
-    derivatives : int, optional
-        Degree of a polynomial rate, for which only words without higher derivatives count. For a constant rate, 0, the
-        result is the order to which the step agrees with the exponential.
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
     >>> attitude_order(TABLEAUX["rk4"]), attitude_order(TABLEAUX["butcher5"], derivatives=0)
     (4, 5)
@@ -338,8 +323,6 @@ def attitude_order(tableau: Tableau, derivatives: int | None = None) -> int:
 def principal_error_norm(tableau: Tableau) -> float:
     """Return the 2-norm of the error coefficients (Phi - 1/gamma)/sigma of the first order that fails.
 
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.tableaux import TABLEAUX
     >>> round(principal_error_norm(TABLEAUX["rk4"]), 6)
     0.014505

@@ -30,28 +30,11 @@ def rotation(
     order: int,
     parts: int = 1,
 ) -> sp.Matrix:
-    """Add stages for the rotation over a step, and return its transition.
+    """Add stages for the rotation over a step from Legendre coefficients c_m of the rate times the step, in rad.
 
-    Parameters
-    ----------
-    build : KernelBuilder
-        The kernel under construction.
-    kinematics : Kinematics
-    coefficients : sequence of Matrix, 3 x 1
-        Legendre coefficients c_m of the rate times the step, in rad, body axes: sum_m c_m P_m(2 t - 1), t from 0 to 1.
-        Symbols or expressions that are linear in them.
-    order : int
-        Power of time at which each series is cut off.
-    parts : int, optional
-        Number of equal parts of the step.
+    With the rate sum_m c_m P_m(2 t - 1), t from 0 to 1, a series over each of the equal parts ends at the power `order`
+    of time. The transition is a rotation whatever the coefficients are.
 
-    Returns
-    -------
-    Matrix
-        The transition; it is a rotation whatever the coefficients are.
-
-    Examples
-    --------
     >>> build = KernelBuilder()
     >>> still, turn = build.input(Signal.vector("c0", "c0")), build.input(Signal.vector("c1", "c1"))
     >>> [element.is_Mul for element in rotation(build, EULER, [still, turn], 4)]
@@ -70,21 +53,7 @@ def series(
     order: int,
     parts: int = 1,
 ) -> sp.Matrix:
-    """Add stages for the rotation over a step before it is normalized, and return it.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    parameters : Kinematics
-        Euler or Cayley-Klein parameters.
-    coefficients, order, parts
-        As for `rotation`.
-
-    Returns
-    -------
-    Matrix, 4 x 1
-        As symbols.
-    """
+    """Add stages for the rotation over a step before it is normalized, in Euler or Cayley-Klein parameters."""
     total = None
     for part in range(parts):
         label = f"part{part + 1}_" if parts > 1 else ""
@@ -133,24 +102,9 @@ def _rates(
 def centred(
     build: KernelBuilder, parameters: Kinematics, rates: Sequence[sp.Matrix], order: int, label: str = ""
 ) -> sp.Matrix:
-    """Add stages for the transition from the beginning of an interval to its end by the series about its middle.
+    """Add stages for the transition over an interval by the series about its middle, in halves of the interval.
 
-    Parameters
-    ----------
-    build : KernelBuilder
-    parameters : Kinematics
-        Euler or Cayley-Klein parameters.
-    rates : sequence of Matrix, 3 x 1
-        Coefficients of the powers of time in the generator; time counts from the middle, in halves of the interval.
-    order : int
-        Power of time at which the series is cut off.
-    label : str, optional
-        Beginning of the names of the stages.
-
-    Returns
-    -------
-    Matrix
-        Parameters whose length is 1 but for what is cut off, as symbols.
+    `parameters` are Euler or Cayley-Klein; their length is 1 but for what is cut off.
     """
     powers = terms(build, parameters, rates, order, "half a step", label)
     even, odd = (sum(powers[k + 2 :: 2], powers[k]) for k in (0, 1))
@@ -166,19 +120,7 @@ def centred(
 
 
 def normalized(build: KernelBuilder, kinematics: Kinematics, series: sp.Matrix) -> sp.Matrix:
-    """Add stages that normalize Euler or Cayley-Klein parameters, and return them as a transition.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    kinematics : Kinematics
-        Direction cosines take the rotation of Euler parameters, which is exact for parameters of any length.
-    series : Matrix, 4 x 1
-
-    Returns
-    -------
-    Matrix
-    """
+    """Add stages that normalize Euler or Cayley-Klein parameters, and return them as a transition."""
     square = rotations.dot(series, series)
     if kinematics is DCM:
         factor = build.value("inverse_square", 1 / square, "1/(series . series)")
@@ -194,25 +136,7 @@ def terms(
     length: str = "the step length",
     label: str = "",
 ) -> list[sp.Matrix]:
-    """Add stages for the terms of the series up to an order.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    kinematics : Kinematics
-    rates : sequence of Matrix, 3 x 1
-        Coefficients of the powers of time in the generator.
-    order : int
-    length : str, optional
-        The unit of time, in words.
-    label : str, optional
-        Beginning of the names of the stages.
-
-    Returns
-    -------
-    list of Matrix
-        The term of order 0 is the identity.
-    """
+    """Add stages for the terms of the series up to an order, the identity first; `length` names the unit of time."""
     series = [kinematics.identity]
     for power in range(1, order + 1):
         total = sp.zeros(*kinematics.identity.shape)

@@ -1,4 +1,4 @@
-"""Extracts the body rate from the samples of a step by fitting a polynomial to them."""
+"""The body rate over a step as a polynomial fitted to its samples."""
 
 from __future__ import annotations
 
@@ -20,19 +20,12 @@ Coefficients = tuple[sp.Expr, ...]
 class Fit:
     """The body rate times the step length as a polynomial of time that is linear in the samples.
 
-    Parameters
-    ----------
-    basis : tuple of tuple of Expr
-        For every sample the coefficients of its polynomial; time is 0 at the beginning of the step and 1 at its end.
-
-    Examples
-    --------
     >>> fit = from_increments(2)
     >>> fit.at(Fraction(0)), fit.moment(0), fit.moment(1)
     ([3, -1], [1, 1], [-1/3, 1/3])
     """
 
-    basis: tuple[Coefficients, ...]
+    basis: tuple[Coefficients, ...]  # a polynomial for every sample, of the time from 0 to 1 over the step
 
     @property
     def degree(self) -> int:
@@ -49,16 +42,8 @@ class Fit:
         ]
 
     def taylor(self, power: int, middle: sp.Rational = sp.S.Zero) -> list[sp.Expr]:
-        """Return the weights of the samples in the coefficient of a power of time.
+        """Return the weights of the samples in the coefficient of a power of time, in steps from `middle`.
 
-        Parameters
-        ----------
-        power : int
-        middle : Rational, optional
-            The instant from which time counts, in steps.
-
-        Examples
-        --------
         >>> from_increments(2).taylor(0), from_increments(2).taylor(0, sp.Rational(1, 2))
         ([3, -1], [1, 1])
         """
@@ -71,8 +56,6 @@ class Fit:
     def legendre(self, degree: int) -> list[sp.Expr]:
         """Return the weights of the samples in the coefficient of a Legendre polynomial, see `legendre`.
 
-        Examples
-        --------
         >>> from_increments(2).legendre(1)
         [-2, 2]
         """
@@ -99,8 +82,6 @@ class Fit:
     def integral(self, begin: Fraction, end: Fraction) -> list[sp.Expr]:
         """Return the weights of the samples in the integral of the rate between two times, in steps.
 
-        Examples
-        --------
         >>> from_increments(2).integral(Fraction(0), Fraction(1, 2))
         [1, 0]
         """
@@ -111,8 +92,6 @@ class Fit:
     def times_remaining(self) -> Fit:
         """Return the rate times 1 - t, the part of the step that is still to come at time t.
 
-        Examples
-        --------
         >>> from_increments(1).times_remaining().basis
         ((1, -1),)
         """
@@ -121,15 +100,8 @@ class Fit:
 
 
 def from_legendre(filters: Sequence[Sequence[Fraction]]) -> Fit:
-    """Return the rate whose Legendre coefficients are given sums of the samples.
+    """Return the rate whose Legendre coefficients, from degree 0 on, are given sums of the samples.
 
-    Parameters
-    ----------
-    filters : sequence of sequence of Fraction
-        For every Legendre polynomial of the step, from degree 0 on, the weights of the samples in its coefficient.
-
-    Examples
-    --------
     >>> from_legendre([from_increments(2).legendre(m) for m in range(2)]) == from_increments(2)
     True
     """
@@ -145,18 +117,10 @@ def from_legendre(filters: Sequence[Sequence[Fraction]]) -> Fit:
 
 
 def legendre(degree: int, middle: sp.Rational = sp.S.Zero) -> Coefficients:
-    """Return the coefficients of a Legendre polynomial of the step in powers of time, from the constant term on.
+    """Return the coefficients of a Legendre polynomial of the step in powers of time, in steps from `middle`.
 
     Over the step, from time 0 to 1, these polynomials are orthogonal to each other; each is 1 at its end.
 
-    Parameters
-    ----------
-    degree : int
-    middle : Rational, optional
-        The instant from which the time of the powers counts, in steps.
-
-    Examples
-    --------
     >>> legendre(2), legendre(2, sp.Rational(1, 2))
     ((1, -6, 6), (-1/2, 0, 6))
     """
@@ -170,13 +134,6 @@ def from_increments(increments: int, previous: int = 0, ahead: int = 0) -> Fit:
     """Fit angle increments: the polynomial through the samples of the integrated rate, differentiated.
 
     Thesis, chapter 3 A, has it for two increments.
-
-    Parameters
-    ----------
-    increments : int
-        Number of equally spaced increments in the step.
-    previous, ahead : int, optional
-        Numbers of increments from before and from after the step that the fit includes.
     """
     times = [sp.Rational(k, increments) for k in range(-previous, increments + ahead + 1)]
     cardinal = _lagrange(times)
@@ -188,12 +145,7 @@ def from_increments(increments: int, previous: int = 0, ahead: int = 0) -> Fit:
 
 
 def from_rates(nodes: Sequence[Fraction | sp.Expr]) -> Fit:
-    """Fit rates at distinct nodes of the step.
-
-    Parameters
-    ----------
-    nodes : sequence of Fraction or Expr
-    """
+    """Fit rates at distinct nodes of the step."""
     return Fit(tuple(_lagrange([exact(node) for node in nodes])))
 
 
@@ -205,13 +157,6 @@ def step_order(increments: int, previous: int = 0, ahead: int = 0) -> int:
     prod (t - t_k), t_k the times of the samples, over the step. That integral is zero for an even number of
     increments with as many before the step as after it, as in Simpson's rule.
 
-    Parameters
-    ----------
-    increments : int
-    previous, ahead : int, optional
-
-    Examples
-    --------
     >>> [step_order(count) for count in range(1, 9)]
     [2, 4, 4, 6, 6, 8, 8, 10]
     >>> step_order(1, previous=2), step_order(2, previous=1, ahead=1)
@@ -243,5 +188,4 @@ def _lagrange(nodes: list[sp.Expr]) -> list[Coefficients]:
 
 
 def _reduced(number: sp.Expr) -> sp.Expr:
-    """Return a number expanded, and with a rational denominator."""
     return number if number.is_Rational else sp.radsimp(sp.expand(number))

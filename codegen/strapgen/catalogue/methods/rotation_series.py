@@ -27,24 +27,11 @@ Scalars = dict[tuple[int, int], Fraction]
 
 @cache
 def terms(vectors: int, order: int) -> tuple[Words, ...]:
-    """Return the terms up to an order for the rate sum_j r_j t^j, for a step from time 0 to time 1.
+    """Return the words of each order in r_j up to `order`, for the rate sum_j r_j t^j over a step, t from 0 to 1.
 
     The equation dphi/dt = sum_k b_k phi x (phi x ... w) with k products is solved order by order in the rate w. The
     right-hand side of order m only needs the terms of lower orders.
 
-    Parameters
-    ----------
-    vectors : int
-        Number of the vectors r_0, r_1, ...
-    order : int
-
-    Returns
-    -------
-    tuple of dict
-        The words in the r_j of each order.
-
-    Examples
-    --------
     >>> first, second = terms(2, 2)
     >>> first, second[0, 1] - second[1, 0]
     ({(0,): Fraction(1, 1), (1,): Fraction(1, 2)}, Fraction(1, 12))
@@ -70,10 +57,9 @@ def terms(vectors: int, order: int) -> tuple[Words, ...]:
 
 @cache
 def legendre_terms(vectors: int, order: int) -> tuple[Words, ...]:
-    """Return the terms for the rate sum_m l_m P_m with the Legendre polynomials P_m of the step.
+    """Return the terms for the rate sum_m l_m P_m with the Legendre polynomials P_m of the step, as `terms`.
 
-    Parameters and result are those of `terms`. Many coefficients vanish here, because reversing time changes the sign
-    of the rotation vector.
+    Many coefficients vanish here, because reversing time changes the sign of the rotation vector.
     """
     table = [
         {m: fraction(rate_fit.legendre(m)[j]) for m in range(j, vectors)} for j in range(vectors)
@@ -82,14 +68,7 @@ def legendre_terms(vectors: int, order: int) -> tuple[Words, ...]:
 
 
 def substituted(words: Words, table: Sequence[Mapping[int, Fraction]]) -> Words:
-    """Return words in which each vector is replaced by a sum of others.
-
-    Parameters
-    ----------
-    words : dict
-    table : sequence of mapping
-        For every vector the coefficients of the others in its sum.
-    """
+    """Return words with each vector replaced by a sum of others, whose coefficients are in the table."""
     length = max(map(len, words), default=0)
     for place in range(length):
         replaced: Words = {}
@@ -101,15 +80,7 @@ def substituted(words: Words, table: Sequence[Mapping[int, Fraction]]) -> Words:
 
 
 def in_samples(terms: Words, increments: int, previous: int = 0) -> Words:
-    """Return a term in r_0, r_1, ... as a term in the samples through which the polynomial rate goes.
-
-    Parameters
-    ----------
-    terms : dict
-        One term from `terms`, for as many vectors as there are samples.
-    increments, previous : int
-        Samples of the step, and samples from before it.
-    """
+    """Return a term in r_0, r_1, ... as a term in the samples through which the polynomial rate goes."""
     fit = rate_fit.from_increments(increments, previous)
     return substituted(
         terms,
@@ -120,8 +91,6 @@ def in_samples(terms: Words, increments: int, previous: int = 0) -> Words:
 def cross(left: Words, right: Words) -> Words:
     """Return the cross product of two sums of words, as a sum of words.
 
-    Examples
-    --------
     >>> cross({(0, 1): Fraction(1)}, {(2,): Fraction(1)})  # (a x b) x c = a x (b x c) - b x (a x c)
     {(0, 1, 2): Fraction(1, 1), (1, 0, 2): Fraction(-1, 1)}
     """
@@ -133,17 +102,7 @@ def cross(left: Words, right: Words) -> Words:
 
 
 def pairs(words: Words) -> Scalars:
-    """Return words of two vectors as coefficients of r_i x r_j, i < j.
-
-    Parameters
-    ----------
-    words : dict
-
-    Returns
-    -------
-    dict
-        Coefficients by (i, j), without zeros.
-    """
+    """Return words of two vectors as coefficients of r_i x r_j, by (i, j), i < j, without zeros."""
     collected: Words = {}
     for (i, j), c in words.items():
         if i != j:
@@ -155,11 +114,6 @@ def third(words: Words) -> dict[int, Scalars]:
     """Return words of three vectors as vectors r_k, each times a sum of scalar products r_i . r_j, i <= j.
 
     It uses a x (b x c) = b (a . c) - c (a . b). The coefficients are unique, since the vectors are arbitrary.
-
-    Returns
-    -------
-    dict
-        For each k the coefficients of the scalar products, by (i, j).
     """
     collected: dict[int, Scalars] = {}
     for (a, b, c), weight in words.items():
@@ -169,15 +123,10 @@ def third(words: Words) -> dict[int, Scalars]:
 
 
 def fourth(words: Words) -> dict[tuple[int, int], Scalars]:
-    """Return words of four vectors as products r_k x r_l, k < l, each times a sum of scalar products r_i . r_j.
+    """Return words of four vectors as products r_k x r_l, k < l, each times a sum of scalar products r_i . r_j, i <= j.
 
     It uses a x (b x (c x d)) = (b . d) a x c - (b . c) a x d. The coefficients are unique, since the vectors are
     arbitrary.
-
-    Returns
-    -------
-    dict
-        For each (k, l) the coefficients of the scalar products, by (i, j), i <= j.
     """
     collected: dict[tuple[int, int], Scalars] = {}
     for (a, b, c, d), weight in words.items():

@@ -1,4 +1,4 @@
-"""`Samples` gives a method the rate during a step, from angle increments or from body rates at nodes."""
+"""Samples of a step, angle increments or body rates at nodes, and the rate that follows from them."""
 
 from __future__ import annotations
 
@@ -19,15 +19,6 @@ from strapgen.kernel.kernel import KernelBuilder
 def sample_names(count: int, previous: int = 0, ahead: int = 0, letter: str = "d") -> list[str]:
     """Return the names of the samples that a step takes, oldest first.
 
-    Parameters
-    ----------
-    count, previous, ahead : int
-        Samples of the step, samples from before it and samples from after it.
-    letter : str, optional
-        Beginning of the names of the step's samples.
-
-    Examples
-    --------
     >>> sample_names(2, previous=1, ahead=1)
     ['past1', 'd1', 'd2', 'ahead1']
     """
@@ -77,7 +68,7 @@ def velocities_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
 
 
 def beside(previous: int, ahead: int = 0) -> str:
-    """Return the part of a signal's meaning that tells of samples from before the step and from after it."""
+    """Return the part of a signal's meaning on samples from before the step and from after it."""
     before = f"; the first {previous} are those before the step" if previous else ""
     return before + (f"; the last {ahead} are those after the step" if ahead else "")
 

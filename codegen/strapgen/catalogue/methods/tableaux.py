@@ -1,4 +1,4 @@
-"""Reads Butcher tableaux of explicit Runge-Kutta methods from files, and verifies their order conditions.
+"""Butcher tableaux of explicit Runge-Kutta methods, read from files, and their verified order conditions.
 
 `TABLEAUX` are those of the folder `butcher_tableaux`; a user's file is read by `read`.
 """
@@ -163,13 +163,7 @@ def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
 
 
 def check_shape(data: Mapping[str, Any], stages: int, most: int = MOST_STAGES) -> None:
-    """Check that the matrix and the weights of a file go with its number of stages.
-
-    Raises
-    ------
-    InputError
-        If they do not, or there are too many stages.
-    """
+    """Check that matrix and weights of a file go with its number of stages, `most` at most."""
     if not 1 <= stages <= most:
         raise InputError(f"nodes has {stages} entries; from 1 to {most} are allowed")
     rows = entries("matrix", data["matrix"])
@@ -216,10 +210,6 @@ def _check_roots(tableau: Tableau) -> None:
 
 def verify(tableau: Tableau) -> None:
     """Check row sums and order conditions exactly.
-
-    Parameters
-    ----------
-    tableau : Tableau
 
     Raises
     ------

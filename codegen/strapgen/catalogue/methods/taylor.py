@@ -21,13 +21,7 @@ _CENTRED = 2
 
 
 def method(order: int) -> Method:
-    """Return the Taylor series of an order.
-
-    Parameters
-    ----------
-    order : int
-        Power of the step at which the series is cut.
-    """
+    """Return the Taylor series to the power `order` of the step."""
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         if samples.fit.degree >= _CENTRED:
@@ -52,7 +46,7 @@ def method(order: int) -> Method:
 
 
 def _centred(build: KernelBuilder, kinematics: Kinematics, samples: Samples, order: int) -> sp.Matrix:
-    """Return the transition from the beginning of the step to its end by the series about its middle, normalized."""
+    """Return the transition over the step by the series about its middle, normalized."""
     parameters = EULER if kinematics is DCM else kinematics
     rates = _rates(samples, parameters.scale, order, sp.Rational(1, 2))
     return polynomial_rotation.normalized(
@@ -63,7 +57,7 @@ def _centred(build: KernelBuilder, kinematics: Kinematics, samples: Samples, ord
 def _rates(
     samples: Samples, scale: sp.Rational, order: int, middle: sp.Rational = sp.S.Zero
 ) -> list[sp.Matrix]:
-    """Add stages for the coefficients of the powers of time in the generator, up to the order; return their symbols.
+    """Add stages for the coefficients of the powers of time in the generator, up to the order.
 
     Time counts from a moment of the step, in steps; from the middle, in halves of the step.
     """

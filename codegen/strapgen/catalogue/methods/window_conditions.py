@@ -20,24 +20,10 @@ PI = Fraction(245850922, 78256779)
 def increments(
     samples: tuple[int, int, int], conditions: int, gyro: GyroResponse | None = None
 ) -> list[Taps]:
-    """Return the increments of the rates u^k times the length of the step.
+    """Return E: for each power k below `conditions` the increments, oldest first, of the rate u^k times the step.
 
-    Parameters
-    ----------
-    samples : (int, int, int)
-        N in the step, p before it, L ahead of it.
-    conditions : int
-        Number of powers k, from 0 on.
-    gyro : GyroResponse, optional
-        By default the increments are the integrals of the rate.
+    The samples are N in the step, p before it and L ahead of it; without a gyro increments are integrals of the rate.
 
-    Returns
-    -------
-    list of tuple of Fraction, (conditions, p + N + L)
-        E; a row for each power, the oldest sample first.
-
-    Examples
-    --------
     >>> increments((1, 1, 1), 2)
     [(Fraction(1, 1), Fraction(1, 1), Fraction(1, 1)), (Fraction(-1, 1), Fraction(0, 1), Fraction(1, 1))]
     """
@@ -61,15 +47,10 @@ def increments(
 
 
 def coefficients(m: int, conditions: int) -> Taps:
-    """Return the Legendre coefficient m over the step of the rates u^k times the length of the step.
+    """Return R_m, the Legendre coefficients m over the step of the rates u^k times the step, k below `conditions`.
 
-    Returns
-    -------
-    tuple of Fraction, (conditions,)
-        R_m; (2m + 1) times the integral of (tau - 1/2)^k P_m(2 tau - 1) over tau from 0 to 1.
+    They are (2m + 1) times the integral of (tau - 1/2)^k P_m(2 tau - 1) over tau from 0 to 1.
 
-    Examples
-    --------
     >>> [str(value) for value in coefficients(1, 4)]
     ['0', '1/2', '0', '3/40']
     """
@@ -88,8 +69,6 @@ def coefficients(m: int, conditions: int) -> Taps:
 def gyro_series(gyro: GyroResponse, terms: int) -> list[Fraction]:
     """Return the gyro's transfer function as a power series in s T, T the sampling interval.
 
-    Examples
-    --------
     >>> series = gyro_series(GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100)), 3)
     >>> [round(float(g), 4) for g in series]
     [1.0, -0.5627, 0.1583]
@@ -102,7 +81,7 @@ def gyro_series(gyro: GyroResponse, terms: int) -> list[Fraction]:
 
 
 def first_failure(window: Window) -> tuple[int, int, Fraction, Fraction] | None:
-    """Return the first condition that does not hold: m, k, the sum and what it must be; None if all hold."""
+    """Return the first condition that does not hold: m, k, the sum and its due value; None if all hold."""
     samples = window.increments, window.previous, window.ahead
     rows = increments(samples, window.conditions, window.gyro)
     for m, taps in enumerate(window.filters):
@@ -114,20 +93,8 @@ def first_failure(window: Window) -> tuple[int, int, Fraction, Fraction] | None:
 
 
 def inner_taps(rows: Sequence[Taps], right: Sequence[Fraction]) -> list[Fraction]:
-    """Return the solution of as many equations as unknowns, exactly.
+    """Return the exact solution of n equations, rows (n, n), in n unknowns.
 
-    Parameters
-    ----------
-    rows : sequence of tuple of Fraction, (n, n)
-    right : sequence of Fraction, (n,)
-
-    Raises
-    ------
-    InputError
-        If the equations do not determine it.
-
-    Examples
-    --------
     >>> inner_taps([(Fraction(2), Fraction(1)), (Fraction(0), Fraction(4))], [Fraction(1), Fraction(2)])
     [Fraction(1, 4), Fraction(1, 2)]
     """

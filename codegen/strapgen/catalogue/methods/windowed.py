@@ -1,4 +1,4 @@
-"""Integrates a step from a window: filters on samples from both sides of the step give the rate over it.
+"""Steps by a window: filters on samples from both sides of the step give the rate over it.
 
 The filters give the Legendre coefficients c_m of the rate over the step. The rotation vector is their series to fourth
 order in the rate, whose terms of third and fourth order take c_0, c_1 and c_2 alone. In its lean form two products of
@@ -37,13 +37,7 @@ _SQUARE = "angle_square"
 
 
 def method(window: Window) -> Method:
-    """Return the step by a window.
-
-    Parameters
-    ----------
-    window : Window
-        Its key `rotation` says whether the rotation is that of the rotation vector to fourth order, or exact.
-    """
+    """Return the step by a window."""
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
         return build.stage(PHI, _rotation_vector(build, Filtered(build, samples, window)))
@@ -96,22 +90,14 @@ def _order(window: Window) -> int:
 
 @cache
 def _lever(odd: int, degree: int) -> dict[int, Fraction]:
-    """Return the weights of the even Legendre coefficients in what an odd one is crossed with at second order."""
+    """Return the weights of the even Legendre coefficients in the vector e that an odd one is crossed with."""
     pairs = rotation_series.pairs(rotation_series.legendre_terms(degree + 1, 2)[1])
     below = {odd - 1: -pairs[odd - 1, odd]}
     return below if odd == degree else {**below, odd + 1: pairs[odd, odd + 1]}
 
 
 class Filtered:
-    """The filters of a window as stages of a kernel under construction.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    samples : Samples
-    window : Window
-        Where its filters have a parity, they act on sums and differences of two samples.
-    """
+    """The filters of a window as stages of a kernel, on sums and differences of samples where they have a parity."""
 
     def __init__(self, build: KernelBuilder, samples: Samples, window: Window) -> None:
         self._build, self._samples, self._window = build, samples, window
@@ -222,7 +208,6 @@ def _lean_series(vectors: int) -> tuple[Scalars, dict[int, Scalars], dict[tuple[
 
 
 def _collect(row: Scalars, key: list[int], c: Fraction) -> None:
-    """Add a coefficient of the scalar product of two vectors."""
     low, high = sorted(key)
     row[low, high] = row.get((low, high), Fraction(0)) + c
 

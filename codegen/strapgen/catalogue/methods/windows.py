@@ -1,4 +1,4 @@
-"""Reads the filters of windows from files, and verifies exactly that they hold their conditions.
+"""Windows, read from files, and their filters' conditions, verified exactly.
 
 `WINDOWS` are those of the folder `window_filters`; a user's file is read by `read`. A file is a family: the filters
 that commit an attitude, and one-sided filters for the same samples.
@@ -210,10 +210,6 @@ def read(path: str | Path) -> Window:
 def verify(window: Window) -> None:
     """Check the conditions of every filter of a family exactly.
 
-    Parameters
-    ----------
-    window : Window
-
     Raises
     ------
     InputError
@@ -278,7 +274,7 @@ def _family(data: Mapping[str, Any], name: str) -> Window:
 
 
 def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
-    """Return the one-sided filters of a family, those with fewer samples before the step mirrored where it can be."""
+    """Return the one-sided filters of a family, those with fewer samples before the step mirrored where possible."""
     sizes = one_sided_sizes(window.previous, window.ahead)
     stored = _stored("one_sided", window, tables, sizes)
     for previous, ahead in sizes:
@@ -288,7 +284,6 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
 
 
 def _start(window: Window, tables: list[Any]) -> tuple[Window, ...]:
-    """Return the filters of the first intervals of a recording."""
     sizes = start_sizes(window.previous, window.ahead)
     return _in_order("start", _stored("start", window, tables, sizes), sizes)
 
@@ -328,7 +323,7 @@ def _stored(
 
 
 def _one_sided(window: Window, table: Mapping[str, Any]) -> Window:
-    """Return one-sided filters, which have of their family what they do not state."""
+    """Return one-sided filters, which take from their family what they do not state."""
     previous, ahead = (_count(key, table[key], 0, MOST_SAMPLES - 1) for key in ("previous", "ahead"))
     samples = previous + window.increments + ahead
     return replace(

@@ -1,4 +1,4 @@
-"""Admission checks a user's kernel before any stage works on it, and refuses it with one line that says why."""
+"""Admission of users' kernels: each is checked before any stage works on it, and refused in one line."""
 
 from __future__ import annotations
 
@@ -39,17 +39,7 @@ ALLOWED = (
 
 
 def require(kernel: Kernel) -> None:
-    """Check the kernel of a user's attitude step, and the kernels that come with it.
-
-    Parameters
-    ----------
-    kernel : Kernel
-
-    Raises
-    ------
-    InputError
-        If a stage could not work on the kernel; the message names the fault.
-    """
+    """Check the kernel of a user's step and the kernels that come with it; raise InputError that names the fault."""
     names = [each.name for each in (kernel, *kernel.own)]
     _require_unknowns(kernel)
     for each in (kernel, *kernel.own):
@@ -123,7 +113,7 @@ def _require_unknowns(kernel: Kernel) -> None:
 
 
 def _require_functions(kernel: Kernel, others: set[str]) -> None:
-    """Check that no function of a kernel has the name of another kernel's: both may be linked into one program."""
+    """Check that no function of a kernel has the name of another's: both may be linked into one program."""
     other = _FUNCTION_OF.sub("", kernel.name)
     if other != kernel.name and other in others:
         _refuse(kernel, f"{other} has a function of this name; another name is needed")
@@ -197,7 +187,6 @@ def _faults(expression: sp.Basic) -> Iterator[str]:
 
 
 def _require_changes(kernel: Kernel) -> None:
-    """Check a step of velocity and position."""
     shapes = [signal.shape for signal in kernel.inputs]
     if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
         _refuse(kernel, "increments and velocity_increments of one shape (K, 3) are needed")
@@ -211,7 +200,6 @@ def _require_changes(kernel: Kernel) -> None:
 
 
 def _require_beside(kernel: Kernel, previous: int, ahead: int, samples: int) -> None:
-    """Check the numbers of samples from before a step and from after it."""
     for name, number in (("previous", previous), ("ahead", ahead)):
         if type(number) is not int:
             _refuse(kernel, f"{name} {number!r} is no number")
@@ -224,7 +212,6 @@ _BESIDE = re.compile(r"; the (?:first|last) \d+ are those (?:before|after) the s
 
 
 def _require_samples(kernel: Kernel, step: Companions) -> None:
-    """Check the inputs of an attitude step: its state, and increments or rates at nodes."""
     names = [signal.name for signal in kernel.inputs]
     shape: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
     if names not in (["state", "increments"], ["state", "turns"]) or len(shape) != 2 or shape[1] != 3:

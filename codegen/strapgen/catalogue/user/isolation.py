@@ -1,4 +1,4 @@
-"""Isolation: a user's code runs as if in a separate process, and every file that it reads is recorded.
+"""Isolation of users' code: it runs as if in a separate process, and every file that it reads is recorded.
 
 Modules that belong to no installed package are imported again from source for every file, and afterwards the program's
 modules are restored. So a user's file never sees a module that lies beside another user's file.
@@ -45,28 +45,20 @@ _ONE_AT_A_TIME = threading.RLock()
 
 @dataclass
 class Record:
-    """The files and modules that a user's code read, by which a cached kernel is found to be out of date.
+    """The files and modules that a user's code read, by which a cached kernel is found to be out of date."""
 
-    Parameters
-    ----------
-    files : dict of str to str
-        Digest of every file by its path, "" if the file was missing. Files of Python, of installed packages and of
-        strapgen are left out, because their versions are part of the cache's key.
-    modules : dict of str to str
-        File of every module that was searched on the path, "" if there was none.
-    path : list of str
-        Folders that the code put on Python's path.
-    outside : str
-        Another thing that the kernel may depend on, such as a program that ran; "" if there is none.
-    """
-
+    #: Digest of every file by its path, "" if the file was missing. Files of Python, of installed packages and of
+    #: strapgen are left out, because their versions are part of the cache's key.
     files: dict[str, str] = field(default_factory=dict)
+    #: File of every module that was searched on the path, "" if there was none.
     modules: dict[str, str] = field(default_factory=dict)
+    #: Folders that the code put on Python's path.
     path: list[str] = field(default_factory=list)
+    #: Another thing that the kernel may depend on, such as a program that ran; "" if there is none.
     outside: str = ""
 
     def read(self, path: str) -> None:
-        """Record a file with the digest of its content."""
+        """Record a file with its digest."""
         if Path(path).exists() and not Path(path).is_file():  # a device or a pipe
             self.outside = f"reads {path}, which is no file"
             return
@@ -76,7 +68,7 @@ class Record:
             self.outside = f"reads {path}: {error.strerror}"
 
     def holds(self, folder: Path | None) -> bool:
-        """Return whether every file and module is still the same."""
+        """Return whether every file and module is unchanged."""
         try:
             if any(content(path) != before for path, before in self.files.items()):
                 return False
@@ -88,13 +80,7 @@ class Record:
 
 
 def content(path: str) -> str:
-    """Return the digest of a file, "" if there is none.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
+    """Return the digest of a file, "" if there is none."""
     try:
         return digest([Path(path).read_bytes()])
     except FileNotFoundError:
@@ -102,7 +88,7 @@ def content(path: str) -> str:
 
 
 def _folders(paths: Iterable[str]) -> tuple[str, ...]:
-    """Return the prefixes of all paths in some folders, with links resolved and not resolved."""
+    """Return the prefixes of all paths in folders, with links resolved and not."""
     return tuple(
         f"{place}{os.sep}" for path in paths for place in dict.fromkeys((path, os.path.realpath(path)))
     )
@@ -163,7 +149,7 @@ class _Loader(SourceFileLoader):
         self._record = record
 
     def get_code(self, fullname: str) -> CodeType:
-        """Compile the source, and record its digest."""
+        """Compile the source and record its digest."""
         source = self.get_data(self.path)
         self._record.files[os.path.realpath(self.path)] = digest([source])
         code: CodeType = self.source_to_code(source, self.path)
@@ -171,14 +157,14 @@ class _Loader(SourceFileLoader):
 
 
 class _Finder:
-    """Finds modules as Python does and records them; those of no installed package are loaded from source."""
+    """Finds and records modules; those of no installed package are loaded from source."""
 
     def __init__(self, record: Record, anew: tuple[str, ...]) -> None:
         self._record = record
         self._anew = anew
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        """Find a module, as importlib asks for it."""
+        """Find a module, as importlib asks."""
         spec = PathFinder.find_spec(name, path, target)
         if path is None:
             self._record.modules[name] = _origin(spec)
@@ -194,7 +180,7 @@ _watching: list[Record | None] = []
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    """Record the events of files, programs and the network that Python reports while a user's code runs."""
+    """Record what Python's audit events tell of files, programs and the network while a user's code runs."""
     if not _watching or (event != "open" and event not in _OUTSIDE):
         return
     if sys._getframe(1).f_code.co_filename.startswith("<frozen importlib"):
@@ -223,19 +209,19 @@ def _watch(event: str, arguments: tuple[Any, ...]) -> None:
 
 @cache
 def _begin_watching() -> None:
-    """Install `_watch` as an audit hook; Python cannot remove such a hook while the process lives."""
+    """Install `_watch` as an audit hook, which Python cannot remove while the process lives."""
     sys.addaudithook(_watch)
 
 
 def depends_on(what: str) -> None:
-    """Record that the user's code that is running, if any, depends on more than the files that it reads."""
+    """Record that the user's code that runs, if any, depends on more than the files it reads."""
     record = _watching[-1] if _watching else None
     if record is not None:
         record.outside = what
 
 
 def load_source(path: Path, name: str, record: Record) -> ModuleType:
-    """Run a file as a module and enter it in `sys.modules` for the length of the session."""
+    """Run a file as a module, which is in `sys.modules` until the session ends."""
     spec = importlib.util.spec_from_file_location(name, path, loader=_Loader(name, str(path), record))
     assert spec is not None and spec.loader is not None, "it has the loader that it was given"
     module = importlib.util.module_from_spec(spec)
@@ -246,19 +232,9 @@ def load_source(path: Path, name: str, record: Record) -> ModuleType:
 
 @contextmanager
 def session(folder: Path | None = None, anew: tuple[str, ...] = ()) -> Iterator[Record]:
-    """Isolate the user's code that runs in the block; one block runs at a time.
+    """Isolate the user's code in the block, one block at a time; the record is complete after the block.
 
-    Parameters
-    ----------
-    folder : Path, optional
-        The folder of its file; what lies there can be imported.
-    anew : tuple of str, optional
-        Installed packages that are imported again too, because they are the user's.
-
-    Yields
-    ------
-    Record
-        The files and modules that the code read; complete after the block.
+    What lies in `folder` can be imported; the installed packages `anew` are imported again, as they are the user's.
     """
     with _ONE_AT_A_TIME:
         record = Record()
@@ -300,7 +276,7 @@ def _is_users(name: str, module: ModuleType | None, anew: tuple[str, ...]) -> bo
 
 
 def _removable(modules: dict[str, ModuleType], anew: tuple[str, ...], record: Record) -> list[str]:
-    """Return the modules of no installed package, but for packages with compiled modules: these cannot load twice."""
+    """Return the modules of no installed package, except packages with compiled modules, which cannot load twice."""
     users = [name for name, module in modules.items() if _is_users(name, module, anew)]
     compiled = {name.partition(".")[0] for name in users if _is_compiled(modules[name])}
     if compiled:

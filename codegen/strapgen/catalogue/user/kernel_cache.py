@@ -1,4 +1,4 @@
-"""Users' kernels in the cache: each is derived again only if its file, a file that it reads, or an option changes."""
+"""Cache of users' kernels: one is derived again only if its file, a file that it reads, or an option changes."""
 
 from __future__ import annotations
 
@@ -25,21 +25,9 @@ _KERNEL, _HEAD, _RECORD = "kernel.pickle", "head.pickle", "record.json"
 
 
 def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kernel, Record]]) -> UserKernel:
-    """Return a user's kernel from the cache, or derive it and put it there.
+    """Return a user's kernel from the cache, or derive and store it.
 
-    Parameters
-    ----------
-    what : list of str
-        Parts of the key: kind and name, the content of the file or the entry point, and the options.
-    folder : Path or None
-        The folder of the file.
-    derive : callable
-        Returns the checked kernel and the record of the files that its code read.
-
-    Raises
-    ------
-    InputError
-        As `derive` does.
+    The key is `what`: kind, name, content or entry point, and options; `folder` is that of the file.
     """
     key = cache.digest([cache.generator_digest(), sys.version, *_installed(), *what])
     with contextlib.suppress(InputError):  # no cache folder: derived every time
@@ -56,7 +44,7 @@ def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kern
 
 
 def _installed() -> list[str]:
-    """Return the installed packages with their versions, as the names of their metadata folders."""
+    """Return the installed packages with their versions: the names of their metadata folders."""
     return sorted(
         path.name
         for folder in map(Path, installed_folders())

@@ -43,25 +43,7 @@ def installed() -> dict[str, EntryPoint]:
 
 
 def load(name: str, **options: Any) -> UserKernel:
-    """Return the checked kernel of a user's algorithm, from the cache if nothing has changed since it was derived.
-
-    Parameters
-    ----------
-    name : str
-        A Python file, or the name of an entry point.
-    **options
-        The options that the user chose, with names in `OPTIONS`.
-
-    Returns
-    -------
-    UserKernel
-        One from the cache loads SymPy when its formulas are needed.
-
-    Raises
-    ------
-    InputError
-        If there is no such algorithm, its code fails, or what it returns is no attitude step.
-    """
+    """Return the checked kernel of a Python file or entry point, cached until it changes; options as in `OPTIONS`."""
     arguments = _arguments(name, options)
     texts = [f"{option} {full_text(value)} {getattr(value, 'file', '')}" for option, value in options.items()]
     isolation.depends_on(f"loads {name}, another algorithm")
@@ -121,7 +103,7 @@ def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isola
 
 
 def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
-    """Return the kernel that a user's function returns, checked."""
+    """Return the checked kernel that a user's function returns."""
     if not callable(function):
         raise InputError(f"{name}: {FUNCTION} is no function; one that returns a Kernel is needed")
     parameters = inspect.signature(function).parameters
@@ -137,7 +119,7 @@ def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
 
 
 def _arguments(name: str, options: dict[str, Any]) -> str:
-    """Return the arguments that choose the kernel on the command line: file or entry point, and the options."""
+    """Return the arguments that choose the kernel on the command line."""
     words = [shlex.quote(checks.text("the name of the file", name))]
     for option, value in options.items():
         if option == "method":
@@ -148,7 +130,6 @@ def _arguments(name: str, options: dict[str, Any]) -> str:
 
 
 def _require(name: str, kernel: Any) -> None:
-    """Check that a user's function returned a kernel that the stages can work on."""
     from strapgen.catalogue.user import admission
     from strapgen.kernel.kernel import Kernel
 

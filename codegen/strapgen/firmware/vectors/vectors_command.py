@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import Algorithm, KernelOptions, option, whole
+from strapgen.cli.options import Algorithm, MethodOptions, option, whole
 from strapgen.cli.output import Folder, Format, check_format, print_json
 from strapgen.ir.exceptions import InputError
 
@@ -18,7 +18,7 @@ from strapgen.ir.exceptions import InputError
 def vectors(
     algorithm: Algorithm,
     *,
-    method: KernelOptions,
+    method: MethodOptions,
     target: Annotated[
         str,
         option("--target", metavar="NAME", help="Kind of code: c-fixed, c or c-float.", panel="Algorithm"),

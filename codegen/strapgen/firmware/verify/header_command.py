@@ -13,7 +13,7 @@ from typer.models import OptionInfo
 
 from strapgen.cli import generate_command
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.options import KernelOptions
+from strapgen.cli.options import MethodOptions
 from strapgen.cli.source_options import SourceOptions
 from strapgen.design.commit_late import window_generate_command
 from strapgen.ir.exceptions import InputError
@@ -38,7 +38,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
     *("algorithm", "file", "window", "target", "sculling", "sample_hz", "cpu", "name", "prefix"),
-    *(field.name for group in (KernelOptions, FixedOptions) for field in fields(group)),
+    *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 
 
@@ -78,7 +78,7 @@ class HeaderCommand:
         _require_named(self.values["algorithm"], algorithms)
         return generate_command.request(
             self.values["algorithm"],
-            self._group(KernelOptions),
+            self._group(MethodOptions),
             self.values["target"],
             self._group(FixedOptions),
             self._group(SourceOptions),

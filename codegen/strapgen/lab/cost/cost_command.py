@@ -8,7 +8,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import KernelOptions, option
+from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import waiting
 from strapgen.ir.exceptions import InputError
@@ -34,7 +34,7 @@ def cost(
             panel="Algorithm",
         ),
     ] = False,
-    method: KernelOptions,
+    method: MethodOptions,
     target: Annotated[
         str | None,
         option(

@@ -1,1 +1,1 @@
-"""How objects and formulas are shown: LaTeX, HTML for notebooks, and the data frames of other libraries."""
+"""Forms of objects and formulas: LaTeX, HTML for notebooks, and the data frames of other libraries."""

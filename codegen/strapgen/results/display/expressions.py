@@ -1,4 +1,4 @@
-"""Writes SymPy's expressions as LaTeX whose sums can be broken at the width of a page."""
+"""SymPy's expressions as LaTeX whose sums can be broken at the width of a page."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ _LEFT = 8.0
 def expression_latex(expression: sp.Expr) -> str:
     r"""Return an expression as LaTeX: as it stands if lines hold its parts, otherwise expanded, a term at a time.
 
-    Examples
-    --------
     >>> x = sp.Symbol("x")
     >>> expression_latex((x - 1) / 2)
     '\\frac{x}{2} - \\frac{1}{2}'
@@ -40,20 +38,7 @@ def expression_latex(expression: sp.Expr) -> str:
 def named_equations(sides: Iterable[tuple[str, sp.Expr]], names: Mapping[sp.Symbol, str]) -> str:
     r"""Return equations as one align environment; what no line holds gets a letter with a number, and a line before.
 
-    Parameters
-    ----------
-    sides : iterable of (str, Expr)
-        Left side as LaTeX, and right side, of each.
-    names : mapping of Symbol to str
-        How symbols are written.
-
-    Examples
-    --------
-    >>> x = sp.Symbol("x")
-    >>> print(named_equations([("y", sp.sin(x))], {}))
-    \begin{align*}
-    y &= \sin{\left(x \right)}
-    \end{align*}
+    `names` has the LaTeX of the left sides' symbols.
     """
     pairs = list(sides)
     column = max((width(left) for left, _ in pairs), default=0.0)
@@ -63,7 +48,7 @@ def named_equations(sides: Iterable[tuple[str, sp.Expr]], names: Mapping[sp.Symb
 
 
 class _Naming:
-    """Gives letters to subexpressions that are too wide for a line, each once in all equations."""
+    """Letters for subexpressions that are too wide for a line, each once in all equations."""
 
     def __init__(self, room: float, names: dict[sp.Symbol, str], letter: str) -> None:
         self._room, self._names, self._letter = room, names, letter

@@ -1,4 +1,4 @@
-"""Writes the formulas of kernels and programs as text, LaTeX or plain data."""
+"""Formulas of kernels and programs as text, LaTeX or plain data."""
 
 from __future__ import annotations
 

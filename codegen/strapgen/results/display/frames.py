@@ -1,4 +1,4 @@
-"""Hands records and tables to pandas and xarray, with the units in the names."""
+"""Records and tables for pandas and xarray, with the units in the names."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ def xarray_dataset(value: Any) -> Any:
 
 
 def _library(name: str, what: str) -> Any:
-    """Return a library that is an extra."""
     try:
         return importlib.import_module(name)
     except ImportError:

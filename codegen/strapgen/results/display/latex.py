@@ -1,4 +1,4 @@
-"""Writes LaTeX for several reports: environments of the package amsmath, broken at the width of a page."""
+"""LaTeX for several reports: environments of the package amsmath, broken at the width of a page."""
 
 from __future__ import annotations
 
@@ -22,23 +22,9 @@ def align_environment(rows: Iterable[str]) -> str:
 
 
 def equations(sides: Iterable[tuple[str, str]], page: float = PAGE, head: str = "") -> str:
-    r"""Return equations as one align environment, each broken where the page ends.
+    r"""Return equations, left and right sides, as one align environment, each broken where the page ends.
 
-    Parameters
-    ----------
-    sides : iterable of (str, str)
-        Left side and right side of each.
-    page : float, optional
-        Width of a line of text in widths of a digit.
-    head : str, optional
-        What stands before the left sides.
-
-    Examples
-    --------
-    >>> print(equations([("y", "a + b")]))
-    \begin{align*}
-    y &= a + b
-    \end{align*}
+    `page` is in widths of a digit; `head` stands before the left sides.
     """
     pairs = list(sides)
     column = max((width(left) for left, _ in pairs), default=0.0)
@@ -46,14 +32,7 @@ def equations(sides: Iterable[tuple[str, str]], page: float = PAGE, head: str = 
 
 
 def broken(text: str, room: float) -> str:
-    """Break a formula of an align environment before the signs of its sums and products, where a line is full.
-
-    Parameters
-    ----------
-    text : str
-    room : float
-        Width to the right of the relation, in widths of a digit.
-    """
+    """Break a formula of an align environment before signs, where a line of so many widths of a digit is full."""
     lines: list[str] = []
     line = ""
     if any(width(part) > room for part in parts(text)):
@@ -72,8 +51,6 @@ def broken(text: str, room: float) -> str:
 def width(text: str) -> float:
     r"""Return about how wide a formula is, in widths of a digit.
 
-    Examples
-    --------
     >>> width("a + b"), width(r"\tfrac{1}{48} A"), width(r"\boldsymbol\sigma")
     (4.8, 2.6, 1.2)
     """
@@ -94,8 +71,6 @@ def fits(text: str, room: float) -> bool:
 def sum_text(terms: Sequence[tuple[Fraction, str]]) -> str:
     r"""Return a sum of numbers times factors; a factor "" stands for 1.
 
-    Examples
-    --------
     >>> sum_text([(Fraction(1, 2), ""), (Fraction(-1, 48), "A")])
     '\\tfrac{1}{2} - \\tfrac{1}{48} A'
     """

@@ -1,4 +1,4 @@
-"""Writes tableaux, order conditions, coning coefficients and stretches as LaTeX, as the literature prints them."""
+"""Tableaux, order conditions, coning coefficients and windows as LaTeX, as the literature prints them."""
 
 from __future__ import annotations
 
@@ -37,15 +37,7 @@ def tableau_latex(tableau: Tableau) -> str:
 
 
 def array_latex(rows: Sequence[Sequence[str]], bottom: Sequence[Sequence[str]]) -> str:
-    """Return a tableau as an array with rules.
-
-    Parameters
-    ----------
-    rows : sequence of sequence of str
-        For each stage its node and its row of the matrix, as LaTeX.
-    bottom : sequence of sequence of str
-        Rows of weights.
-    """
+    """Return rows of node and matrix, and rows of weights, all as LaTeX, as an array with rules."""
     stages = len(rows)
     filled = [[*row, *[""] * (1 + stages - len(row))] for row in (*rows, *(["", *row] for row in bottom))]
     lines = [" & ".join(row) for row in filled]
@@ -57,13 +49,6 @@ def array_latex(rows: Sequence[Sequence[str]], bottom: Sequence[Sequence[str]]) 
 def order_conditions_latex(order: int) -> str:
     r"""Return the conditions up to an order, one for each rooted tree, as an align environment.
 
-    Parameters
-    ----------
-    order : int
-        From 1.
-
-    Examples
-    --------
     >>> print(order_conditions_latex(2))
     \begin{align*}
     \sum b_{i} &= 1 \\
@@ -133,7 +118,7 @@ def _decimal_sum(terms: Iterable[tuple[Fraction, str]]) -> str:
 
 
 def _by_stage(tableau: Tableau) -> str:
-    """Return what is not zero in a tableau, a row for each stage and one for the weights."""
+    """Return the nonzero coefficients of a tableau, a row for each stage and one for the weights."""
     rows = []
     for stage, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
         parts = [rf"a_{{{stage},{place}}} = {_number(x)}" for place, x in enumerate(row, 1) if x]

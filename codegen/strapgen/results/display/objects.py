@@ -1,4 +1,4 @@
-"""Shows objects in a notebook: formulas as LaTeX, code and tables as HTML.
+"""Objects in a notebook: formulas as LaTeX, code and tables as HTML.
 
 An application registers the forms of its objects in its module ``display``, which `strapgen.ir.notebook_display` loads
 when one of them is first shown.
@@ -110,7 +110,7 @@ def plot(records: Any, path: str | Path | None, title: str) -> Any:
 
 
 def _code(text: str, title: str) -> str:
-    """Return code under a title that opens it; what follows many lines is counted."""
+    """Return code under a title that opens it; the lines after many are counted."""
     lines = text.split("\n")
     if len(lines) > _CODE_LINES:
         lines = [*lines[:_CODE_LINES], f"... {len(lines) - _CODE_LINES} more lines"]

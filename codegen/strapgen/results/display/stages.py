@@ -1,4 +1,4 @@
-"""Writes the stages of a kernel as vectors, quaternions and matrices, where they are sums and products of such."""
+"""Stages of a kernel as vectors, quaternions and matrices, where they are sums and products of such."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _term(number: sp.Expr, letters: str) -> tuple[Fraction, str]:
 
 
 def _exponential(kind: str, expressions: Sequence[sp.Expr], vector: _Quantity) -> str | None:
-    """Return the exponential of a rotation vector, if that is what the expressions are."""
+    """Return the exponential of a rotation vector, if the expressions are that."""
     v = sp.Matrix(vector.elements)
     makers: dict[str, tuple[Callable[[sp.Matrix], sp.Matrix], str]] = {
         "quaternion": (rotations.quaternion, rf"\exp(\tfrac{{1}}{{2}} {vector.letter})"),

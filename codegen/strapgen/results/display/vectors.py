@@ -1,4 +1,4 @@
-"""Writes the vector form of a step as LaTeX, in the letters of the literature."""
+"""The vector form of a step as LaTeX, in the letters of the literature."""
 
 from __future__ import annotations
 
@@ -18,16 +18,9 @@ _NAMED = {"sigma": r"\boldsymbol{\sigma}", "delta": r"\boldsymbol{\delta}"}
 
 
 def vectors_latex(form: VectorForm, state: str = "") -> str:
-    """Return a step in vectors as one align environment of the package amsmath.
+    """Return a step in vectors as one align environment: vectors, products, the transition, and its use on a state.
 
-    The vectors and their products come first, then the transition; d_k are the increments, w the rates at nodes times
-    the step, both in rad.
-
-    Parameters
-    ----------
-    form : VectorForm
-    state : str, optional
-        What the transition is applied to, a letter as "e" or "C", for a last line; "" for none.
+    d_k are the increments, w the rates at nodes times the step, both in rad.
     """
     names = _vector_names(form)
     squares_first = sorted(form.products, key=lambda product: (len(set(product)) > 1, product))
@@ -59,7 +52,7 @@ def vectors_latex(form: VectorForm, state: str = "") -> str:
 def _matrix(
     form: VectorForm, names: Mapping[str, str], products: Mapping[tuple[str, ...], str]
 ) -> list[tuple[str, str]]:
-    """Return the rows of a transition matrix: its parts, then what they are."""
+    """Return the rows of a transition matrix and of its parts."""
     several = len(form.outers) > 1
     partners = {
         name: rf"\mathbf{{y}}_{{{k}}}" if several else r"\mathbf{y}" for k, name in enumerate(form.outers, 1)
