@@ -56,7 +56,7 @@ def built(folder: Path, narrow: bool) -> ctypes.CDLL:
     code = Path(__file__).with_name("throughput.c")
     library = folder / "throughput.so"
     options = [*compiler.C_FLAGS, "-shared", "-fPIC", f"-I{folder}", str(code), "-o", str(library), "-lm"]
-    subprocess.run([*compiler.command(), *options], check=True)
+    subprocess.run([*compiler.C.command(), *options], check=True)
     return ctypes.CDLL(str(library))
 
 

@@ -26,9 +26,9 @@ from strapgen.catalogue import ALGORITHMS
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.results import figures
-from strapgen.run import compiler, octave_process, processes, shared_libraries
+from strapgen.run import compiler, octave_process, processes
 from strapgen.run.backends import BACKENDS, Backend
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 from strapgen.targets import BUILT_IN
 
 if TYPE_CHECKING:
@@ -208,12 +208,10 @@ def optimization(pytestconfig: pytest.Config) -> Iterator[None]:
 
     The tests of the C text itself compile as a user does, and long ones look for undefined behaviour.
     """
-    less = "-O0" if pytestconfig.getoption("markexpr") in ("not long", "long") else "-O3"
     with pytest.MonkeyPatch.context() as patch:
-        assert "-O3" in compiler.C_FLAGS
-        patch.setattr(compiler, "_flags", tuple(less if f == "-O3" else f for f in compiler.C_FLAGS))
-        if less == "-O0":
-            patch.setattr(shared_libraries, "OPTIMIZATION", {"C++": "-O0", "Rust": "-Copt-level=1"})
+        assert compiler.OPTIMIZATION["C"] == "-O3"
+        if pytestconfig.getoption("markexpr") in ("not long", "long"):
+            patch.setattr(compiler, "OPTIMIZATION", {"C": "-O0", "C++": "-O0", "Rust": "-Copt-level=1"})
         yield
 
 

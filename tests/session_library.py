@@ -29,7 +29,7 @@ from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler, generated_sources
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 from strapgen.storage import cache
 from strapgen.targets import TARGETS
 
@@ -164,7 +164,7 @@ def provide(forecast: Path) -> None:
     entries = [
         entry for entry in map(json.loads, forecast.read_text().splitlines()) if _has_compiler(entry[1])
     ]
-    state = cache.digest([cache.generator_digest(), forecast.read_bytes(), *compiler._flags])
+    state = cache.digest([cache.generator_digest(), forecast.read_bytes(), *compiler.OPTIMIZATION.values()])
     folder = cache.root() / "session-library" / state
 
     @memoized

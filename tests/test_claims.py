@@ -19,7 +19,7 @@ import strapgen
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.simulate.runs import simulate
 from strapgen.run.backends import BACKENDS
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 from strapgen.targets import BUILT_IN
 
 #: Every combination has its own number in the source.

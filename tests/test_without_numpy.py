@@ -15,7 +15,7 @@ import pytest
 from strapgen import derive, generate, lower, rounding_bounds
 from strapgen.fixedpoint.floating import proved
 
-MISSING = ("numpy", "scipy", "matplotlib", "cffi", "setuptools", "typer", "click", "rich", "flint", "gmpy2")
+MISSING = ("numpy", "scipy", "matplotlib", "cffi", "platformdirs", "typer", "click", "rich", "flint", "gmpy2")
 HEAD = f"import json, sys\nfor name in {MISSING!r}:\n    sys.modules[name] = None\n"
 PROGRAM = """
 import strapgen

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.run import backends as run
-from strapgen.run import compiler, compiler_service
+from strapgen.run import compiler
 
 SIMULATE = ["simulate", "euler", "--method", "rk1", "--increments", "1", "--step", "1", "--duration", "2"]
 SIMULATE += ["--motion", "constant", "--set", "x_deg_s=1"]
@@ -94,7 +95,7 @@ def test_other_text_and_another_compiler_compile_again(sources, counting, root, 
 def test_blank_choice_of_compiler_is_none(sources, monkeypatch):
     for blank in ("", "  "):
         monkeypatch.setenv("CC", blank)
-        assert compiler.compiler() == shutil.which("cc")
+        assert compiler.C.path() == shutil.which("cc")
     assert compiler.load(sources).lib.euler_normalize
     assert os.environ["CC"] == "  "
 
@@ -209,16 +210,16 @@ def many() -> list[Sources]:
 
 
 @pytest.mark.long
-def test_many_sources_become_one_module_in_three_commands(many, counting, root, monkeypatch, tmp_path):
-    """One compiles all kernels, one the wrapper, and one links; each function is the one that it is alone."""
+def test_many_sources_become_one_module_in_one_command(many, counting, root, monkeypatch, tmp_path):
+    """Each function is the one that it is alone."""
     compiler.compile_together(many)
-    assert counting() == 3
+    assert counting() == 1
     (place,) = (root / "builds").iterdir()
     modules = {compiler.load(sources) for sources in many if sources.target != "numpy"}
     assert {Path(module.__file__).parent for module in modules} == {place}
     assert len(modules) == 1
     together = [run.of_sources(sources) for sources in many]
-    assert counting() == 3
+    assert counting() == 1
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "other"))
     monkeypatch.setattr(compiler, "_loaded", {})
     rng = np.random.default_rng(7)
@@ -239,7 +240,7 @@ def test_what_is_there_is_not_compiled_again(many, counting):
     compiler.compile_together([first])
     assert counting() == calls
     compiler.compile_together(many)
-    assert counting() == calls + 3
+    assert counting() == calls + 1
     calls = counting()
     compiler.compile_together(many)
     assert counting() == calls
@@ -287,7 +288,7 @@ def test_one_of_many_that_does_not_compile(many, root):
     assert not (root / "shared").exists()
 
 
-# The process that compiles
+# Sources that differ
 
 
 def other(sources: Sources, number: int) -> Sources:
@@ -299,47 +300,26 @@ def other(sources: Sources, number: int) -> Sources:
     return Sources.restore(sources.interface(), files)
 
 
-def test_one_process_compiles_one_source_after_the_other(sources):
-    process = compiler_service.compiling_process()
-    compiler.load(sources)
-    assert compiler_service.compiling_process() is process
-
-
-def test_a_compiling_process_that_has_ended_is_replaced(sources, root):
-    process = compiler_service.compiling_process()
-    process.stop()
-    assert compiler.load(sources).lib.euler_normalize
-    assert compiler_service.compiling_process() is not process
-
-
-def test_a_compiling_process_that_ends_at_work_says_so(sources, root, tmp_path, monkeypatch):
-    """The compiler kills what called it; the next compilation has a process of its own again."""
-    script = tmp_path / "killing-cc"
-    script.write_text("#!/bin/sh\nkill -9 $PPID\n")
-    script.chmod(0o755)
-    with monkeypatch.context() as patched, pytest.raises(CompilerError, match="has ended before"):
-        patched.setenv("CC", str(script))
-        compiler.load(sources)
-    assert list((root / "builds").iterdir()) == []
-    assert compiler.load(sources).lib.euler_normalize
-
-
-def _compile_in_a_fork(text_number: int, sources: Sources, made) -> None:
-    made.put(
-        (compiler.load(other(sources, text_number)) is not None, compiler_service.compiling_process()._owner)
-    )
+def _compile_in_a_fork(sources: Sources, made) -> None:
+    made.put(compiler.load(sources) is not None)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
-def test_a_fork_compiles_in_a_process_of_its_own(sources):
-    assert compiler_service.compiling_process().serves
+def test_a_fork_compiles_beside_the_process_that_it_comes_from(sources):
+    compiler.load(sources)
     context = multiprocessing.get_context("fork")
     made = context.SimpleQueue()
-    child = context.Process(target=_compile_in_a_fork, args=(2, sources, made))
+    child = context.Process(target=_compile_in_a_fork, args=(other(sources, 2), made))
     child.start()
-    child.join(60)
-    assert made.get() == (True, child.pid)
     assert compiler.load(other(sources, 3)).lib.euler_normalize
+    child.join(60)
+    assert made.get()
+
+
+def test_threads_compile_at_once(sources):
+    with ThreadPoolExecutor(2) as pool:
+        modules = list(pool.map(lambda number: compiler.load(other(sources, number)), (4, 5)))
+    assert all(module.lib.euler_normalize for module in modules) and len({*map(id, modules)}) == 2
 
 
 def test_stages_of_a_system_are_compiled_together_and_only_where_they_are_called(sources, counting, tmp_path):
@@ -357,5 +337,5 @@ def test_back_ends_that_are_compared_are_compiled_together(sources, counting):
     of_one_module = counting()
     rows = strapgen.compare("euler", "rk1", 1, ["c", "c-float", "c-fixed32"], np.full((5, 1, 3), 0.01))
     assert [row.backend for row in rows] == ["c", "c-float", "c-fixed32"]
-    # Six kernels; those in double and in float have the same names, and go into two modules.
-    assert counting() == 3 * of_one_module
+    # One module has all kernels that are missing; the size of each step's code takes a call of its own.
+    assert counting() == 2 * of_one_module + len(rows)

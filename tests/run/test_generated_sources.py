@@ -19,7 +19,7 @@ import sys
 import numpy as np
 import strapgen
 from strapgen.run import compiler
-compiler._flags = tuple(sys.argv[1:])
+compiler.OPTIMIZATION['C'] = sys.argv[1]
 for backend in ("numpy", "c"):
     strapgen.backend("euler", "rk1", 2, backend).propagate(np.zeros((4, 2, 3)))
 print(*sorted({"sympy", "jinja2", "cffi"} & set(sys.modules)))
@@ -29,7 +29,7 @@ print(*sorted({"sympy", "jinja2", "cffi"} & set(sys.modules)))
 def test_a_second_use_loads_neither_sympy_nor_jinja_nor_a_compiler():
     for backend in ("numpy", "c"):
         strapgen.backend("euler", "rk1", 2, backend).propagate(np.zeros((4, 2, 3)))
-    command = [sys.executable, "-c", RUN, *compiler._flags]
+    command = [sys.executable, "-c", RUN, compiler.OPTIMIZATION["C"]]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == ""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pwd
 import shutil
 import subprocess
 import sys
@@ -318,12 +319,12 @@ def test_an_entry_in_use_is_not_pruned(root):
 
 
 def test_a_user_without_a_home_folder_is_told_what_to_set(monkeypatch):
-    def no_home(_cls=None):
-        raise RuntimeError("Could not determine home directory.")
+    def unknown(_user):
+        raise KeyError
 
-    for name in ("STRAPGEN_CACHE_DIR", "XDG_CACHE_HOME"):
+    for name in ("STRAPGEN_CACHE_DIR", "XDG_CACHE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(Path, "home", no_home)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
     with pytest.raises(InputError, match=r"^no home folder .* set STRAPGEN_CACHE_DIR"):
         cache.root()
 
@@ -559,7 +560,7 @@ def test_a_planted_library_is_not_loaded(root, tmp_path, when, monkeypatch, warn
     marker = tmp_path / "ran"
     (tmp_path / "planted.c").write_text(PLANTED.format(marker))
     planted_library = tmp_path / "planted.so"
-    command = [compiler.compiler(), "-shared", "-fPIC", "-o", planted_library, tmp_path / "planted.c"]
+    command = [compiler.C.path(), "-shared", "-fPIC", "-o", planted_library, tmp_path / "planted.c"]
     subprocess.run(command, check=True)
     assert not marker.exists()
 
@@ -592,7 +593,7 @@ def test_a_planted_library_would_have_run(tmp_path):
     """The library of the test above does what that test looks for."""
     marker = tmp_path / "ran"
     (tmp_path / "planted.c").write_text(PLANTED.format(marker))
-    command = [compiler.compiler(), "-shared", "-fPIC", "-o", tmp_path / "planted.so", tmp_path / "planted.c"]
+    command = [compiler.C.path(), "-shared", "-fPIC", "-o", tmp_path / "planted.so", tmp_path / "planted.c"]
     subprocess.run(command, check=True)
     subprocess.run(
         [sys.executable, "-c", f"import ctypes; ctypes.CDLL({str(tmp_path / 'planted.so')!r})"], check=True

@@ -16,7 +16,7 @@ from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.run import generated_sources
 from strapgen.run.backends import of_sources
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.cpp.fixed import _word
 from strapgen.targets.cpp.text import constants

@@ -15,7 +15,7 @@ from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.run import generated_sources
 from strapgen.run.backends import of_sources
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 from strapgen.targets.contract_lines import Contract
 
 LANGUAGES = {"cpp-fixed": "C++", "rust-fixed": "Rust"}

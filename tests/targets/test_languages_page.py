@@ -13,7 +13,7 @@ import pytest
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.run import octave_process
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "languages.md").read_text()

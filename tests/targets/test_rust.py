@@ -15,7 +15,7 @@ from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.run import generated_sources
 from strapgen.run.backends import of_sources
-from strapgen.run.shared_libraries import COMPILERS
+from strapgen.run.compiler import COMPILERS
 from strapgen.targets.contract_lines import Contract
 from strapgen.targets.names import Naming
 from strapgen.targets.rust.fixed import _WORDS, _RustStatementPrinter

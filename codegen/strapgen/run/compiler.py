@@ -1,76 +1,137 @@
 """Building turns source text into a module that can be called.
 
-Python code is executed as it is. C is compiled through cffi in API mode, C++ and Rust into shared libraries; all are
-cached by content, so that a second call compiles nothing. Many sources can be compiled into one module, which costs
-little more than one of them: starting the compiler, reading Python's headers and linking take longer than a kernel.
+Python code is executed as it is. C is compiled with the wrapper that cffi writes in API mode; C++ and Rust, which bring
+a C interface, into shared libraries with the declarations of their functions beside them. All are cached by content, so
+that a second call compiles nothing. Many sources can be compiled into one module, which costs little more than one of
+them: starting the compiler, reading Python's headers and linking take longer than a kernel.
 """
 
 from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
-import json
 import os
 import platform
 import re
 import shlex
 import shutil
+import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterable, Sequence
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.sources import Sources
 from strapgen.ir.timing import timed
-from strapgen.run import shared_libraries
-from strapgen.run.compiler_service import compiling_process, one_at_a_time
-from strapgen.run.shared_libraries import COMPILERS, declarations
 from strapgen.storage import cache
 from strapgen.targets import TARGETS
 
-#: Flags in addition to those of Python. Without contraction to fused multiply-add every machine computes the same bits.
-#: Without notes for debuggers, which Python's flags switch on, compiling takes a tenth less time.
-C_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-g0")
-
-#: A module calls its own functions, whatever other functions of the same names the process has.
-_VISIBILITY = "-fvisibility=hidden"
-#: The flags in effect; tests that are not about optimization compile with less of it.
-_flags: tuple[str, ...] = C_FLAGS
+#: How far the compilers optimize, by language; tests that are not about optimization compile with less of it.
+OPTIMIZATION = {"C": "-O3", "C++": "-O3", "Rust": "-Copt-level=3"}
+#: Without contraction to fused multiply-add every machine computes the same bits.
+C_FLAGS = ("-std=c99", OPTIMIZATION["C"], "-ffp-contract=off", "-g0")
 #: Text after the headers. The wrappers of cffi only pass arguments on and are not worth optimizing.
-_UNOPTIMIZED = '#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize ("O0")\n#endif\n'
-#: Kind of cache entry that says in which module of many a source was compiled.
-_SHARED = "shared"
+_UNOPTIMIZED = '\n#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC optimize ("O0")\n#endif\n'
+#: The root of a library in Rust. Generated code never panics: the handler is there because the language needs one.
+_CRATE = """#![no_std]
+#[panic_handler]
+fn panicked(_: &core::panic::PanicInfo) -> ! {
+    loop {}
+}
+#[no_mangle]
+pub extern "C" fn rust_eh_personality() {}
+"""
+#: Kind of cache entry that says in which module of many a source was compiled, its file, and that beside a library.
+_SHARED, _POINTER, _DECLARATIONS = "shared", "build", "declarations.h"
+#: What compiled modules begin with: ELF, Mach-O of one and of several processors, and PE.
+_LIBRARIES = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
 
 _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
 
 
+@dataclass(frozen=True)
+class Compiler:
+    """A compiler of one language: the variable with its command, the command without one, and what to install."""
+
+    language: str
+    variable: str
+    default: str
+    package: str
+    flags: tuple[str, ...]
+    ending: str  # of its files
+
+    def command(self) -> list[str]:
+        """Return the path of the compiler and its own options."""
+        text = os.environ.get(self.variable, "").strip() or self.default
+        try:
+            program, *options = shlex.split(text)
+        except ValueError:  # a quotation mark that is not closed
+            program, options = text, []
+        path = shutil.which(program)
+        if path is None:
+            raise CompilerError(
+                f"no {self.language} compiler: {program!r} is not on the PATH; install {self.package} (or set "
+                f"{self.variable}), or use the numpy back end"
+            )
+        return [str(Path(path).absolute()), *options]
+
+    def path(self) -> str:
+        """Return the path of the compiler."""
+        return self.command()[0]
+
+    def identity(self) -> str:
+        """Return what tells this compiler from others, and from the same one before it was installed anew."""
+        path, *options = self.command()
+        status = Path(path).resolve().stat()
+        named = [self.language, str(Path(path).resolve()), *options]
+        return shlex.join([*named, str(status.st_size), str(status.st_mtime_ns)])
+
+    def flags_in_effect(self) -> list[str]:
+        """Return the flags of a library that computes the bits of the C."""
+        return [OPTIMIZATION[self.language], *self.flags]
+
+
+#: A module calls its own functions, whatever others of the same names the process has.
+C = Compiler(
+    "C", "CC", "cc", "gcc", ("-std=c99", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden"), ".c"
+)
+_CPP = ("-std=c++17", "-ffp-contract=off", "-g0", "-fPIC", "-shared", "-fvisibility-inlines-hidden")
+_RUST = ("--edition=2021", "--crate-type=cdylib", "--crate-name=strapgen", "-Cpanic=abort")
+#: The compilers of shared libraries by language.
+COMPILERS = {
+    "C++": Compiler("C++", "CXX", "c++", "g++", _CPP, ".cpp"),
+    "Rust": Compiler("Rust", "RUSTC", "rustc", "rustc", _RUST, ".rs"),
+}
+
+
 def load(sources: Sources) -> Any:
     """Return the module through which a generated function is called.
 
-    Parameters
-    ----------
-    sources : Sources
-
-    Returns
-    -------
-    module
-        For Python the generated module; for compiled languages a cffi module with ``ffi`` and ``lib``, which may hold
-        other functions too.
-
-    Raises
-    ------
-    CompilerError
-        If there is no C compiler, or it fails.
+    For Python it is the generated module; for compiled languages it has ``ffi`` and ``lib`` of cffi, which may hold
+    other functions too.
     """
-    key = cache.digest([sources.target, *sources.files, *sources.files.values()])
+    key, language = (
+        cache.digest([sources.target, *sources.files, *sources.files.values()]),
+        _language(sources),
+    )
     if key not in _loaded:
         with timed("build", f"{sources.kernel} for {sources.target}"):
-            _loaded[key] = _module(sources)
+            if _compiler_of(sources):
+                _loaded[key] = _compiled(sources)
+            elif language == "Python":
+                _loaded[key] = _import_text(sources)
+            else:
+                raise InputError(
+                    f"sources of {sources.kernel} for {sources.target} are {language or 'of no stated language'}; "
+                    "C, C++ and Rust can be compiled, and Python imported"
+                )
     return _loaded[key]
 
 
@@ -87,53 +148,28 @@ def compile_together(many: Iterable[Sources]) -> None:
     CompilerError
         If there is no C compiler, or it fails.
     """
-    missing: dict[str, Sources] = {}
-    for sources in many:
-        if _is_compiled(sources):
-            key = build_key([sources])
-            if _shared(key) is None and cache.lookup("builds", key) is None:
-                missing[key] = sources
-    for group in _groups(missing):
-        if len(group) == 1:  # as `load` compiles it, which finds it without a pointer
-            for key, sources in group.items():
-                _alone(sources, key)
+    last: dict[str, int] = {}
+    groups: dict[
+        tuple[str, int], dict[str, Sources]
+    ] = {}  # of one language, in which no file has its name twice
+    for key, sources in {build_key([sources]): sources for sources in many if _compiler_of(sources)}.items():
+        if not _shared(key) and not cache.lookup("builds", key):
+            turn = max(last.get(file, -1) for file in sources.files) + 1
+            last.update(dict.fromkeys(sources.files, turn))
+            groups.setdefault((_language(sources), turn), {})[key] = sources
+    for group in groups.values():
+        (key, sources), *others = group.items()
+        if not others:  # as `load` compiles it, which finds it without a pointer
+            _alone(sources, key)
             continue
         together = build_key(group.values())
-        name = f"strapgen_{together}"
-        folder = _build(list(group.values()), name, together)
-        pointer = json.dumps({"name": name, "build": folder.name})
+        _build([*group.values()], f"strapgen_{together}", together)
         for key in group:
-            cache.entry(_SHARED, key, partial(_point, pointer))
+            cache.entry(_SHARED, key, partial(_point, together))
 
 
-def _point(pointer: str, draft: Path) -> None:
-    (draft / "module.json").write_text(pointer)
-
-
-def _groups(missing: dict[str, Sources]) -> list[dict[str, Sources]]:
-    """Return sources by their keys, in groups of one language in which no file and no function has its name twice."""
-    groups: list[dict[str, Sources]] = []
-    for key, sources in missing.items():
-        for group in groups:
-            if all(
-                _language(sources) == _language(other) and not sources.files.keys() & other.files.keys()
-                for other in group.values()
-            ):
-                group[key] = sources
-                break
-        else:
-            groups.append({key: sources})
-    return groups
-
-
-def _shared(key: str) -> Path | None:
-    """Return the module of many in which a source was compiled, if it is still there."""
-    place = cache.lookup(_SHARED, key)
-    if place is None:
-        return None
-    module = json.loads(cache.read(place, "module.json"))
-    folder = cache.lookup("builds", module["build"])
-    return folder and folder / _library(module["name"])
+def _point(together: str, draft: Path) -> None:
+    (draft / _POINTER).write_text(together)
 
 
 def _language(sources: Sources) -> str:
@@ -141,21 +177,10 @@ def _language(sources: Sources) -> str:
     return TARGETS[sources.target].language if sources.target in TARGETS else ""
 
 
-def _is_compiled(sources: Sources) -> bool:
-    return _language(sources) in ("C", *COMPILERS)
-
-
-def _module(sources: Sources) -> Any:
-    """Compile or import sources by their language."""
+def _compiler_of(sources: Sources) -> Compiler | None:
+    """Return the compiler of sources; None if they are not compiled."""
     language = _language(sources)
-    if _is_compiled(sources):
-        return _compiled(sources)
-    if language == "Python":
-        return _import_text(sources)
-    raise InputError(
-        f"sources of {sources.kernel} for {sources.target} are {language or 'of no stated language'}; "
-        "C, C++ and Rust can be compiled, and Python imported"
-    )
+    return C if language == "C" else COMPILERS.get(language)
 
 
 def _import_text(sources: Sources) -> ModuleType:
@@ -163,43 +188,6 @@ def _import_text(sources: Sources) -> ModuleType:
     module = ModuleType(name.removesuffix(".py"))
     exec(compile(text, f"<generated {name}>", "exec"), module.__dict__)
     return module
-
-
-def compiler() -> str:
-    """Return the path of the C compiler: $CC, or `cc`.
-
-    Raises
-    ------
-    CompilerError
-        If there is no such program.
-    """
-    chosen = chosen_compiler() or "cc"
-    try:
-        command = shlex.split(chosen)[0]
-    except ValueError:  # a quotation mark that is not closed
-        command = chosen
-    path = shutil.which(command)
-    if path is None:
-        raise CompilerError(
-            f"no C compiler: {command!r} is not on the PATH; install gcc (or set CC), or use the numpy back end"
-        )
-    return path
-
-
-def command() -> list[str]:
-    """Return the words of the compiler's command, its own options included.
-
-    Raises
-    ------
-    CompilerError
-        If there is no such program.
-    """
-    return [compiler(), *shlex.split(chosen_compiler())[1:]]
-
-
-def chosen_compiler() -> str:
-    """Return the command of $CC; "" if it is not set."""
-    return os.environ.get("CC", "").strip()
 
 
 def _compiled(sources: Sources) -> Any:
@@ -212,18 +200,37 @@ def _compiled(sources: Sources) -> Any:
     return cache.persistently(module)
 
 
+def _shared(key: str) -> Path | None:
+    """Return the module of many in which a source was compiled, if it is still there."""
+    place = cache.lookup(_SHARED, key)
+    if place is None:
+        return None
+    together = cache.read(place, _POINTER).decode()
+    folder = cache.lookup("builds", together)
+    return folder and folder / _library(f"strapgen_{together}")
+
+
 def _alone(sources: Sources, key: str) -> Path:
     """Return the file of the module of one source, compiled if it is not in the cache."""
     name = f"strapgen_{sources.function.name}"
     return _build([sources], name, key) / _library(name)
 
 
+def _library(name: str) -> str:
+    """Return the file name of a compiled module."""
+    return name + importlib.machinery.EXTENSION_SUFFIXES[0]
+
+
 def _import_file(file: Path) -> Any:
     """Import a compiled module of the cache: the very file of which it was checked that it is the user's alone."""
-    if shared_libraries.is_library(file):
-        return shared_libraries.opened(file)
     name = file.name.partition(".")[0]
     with cache.loadable(file) as (path, _):
+        if (file.parent / _DECLARATIONS).is_file():
+            from cffi import FFI
+
+            ffi = FFI()
+            ffi.cdef(cache.read(file.parent, _DECLARATIONS).decode())
+            return SimpleNamespace(ffi=ffi, lib=ffi.dlopen(path))
         loader = importlib.machinery.ExtensionFileLoader(name, path)
         spec = importlib.util.spec_from_file_location(name, path, loader=loader)
         if spec is None:
@@ -234,135 +241,109 @@ def _import_file(file: Path) -> Any:
     return module
 
 
-#: What compiled modules begin with: ELF, Mach-O of one and of several processors, and PE.
-_LIBRARIES = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
-
-
 def build_key(many: Iterable[Sources], flags: Sequence[str] | None = None) -> str:
     """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
+    import _cffi_backend
+
     many = list(many)
-    text = [part for sources in many for part in (*sources.files, *sources.files.values())]
-    if many and _language(many[0]) in COMPILERS:
-        return cache.digest([*text, *COMPILERS[_language(many[0])].identity()])
-    executable = Path(compiler()).resolve()
-    stat = executable.stat()
+    chosen = (_compiler_of(many[0]) if many else None) or C
     return cache.digest(
         [
-            *text,
-            *(_flags if flags is None else flags),
-            _VISIBILITY,
-            _UNOPTIMIZED,
-            chosen_compiler(),
-            f"{executable} {stat.st_size} {stat.st_mtime_ns}",
+            *(part for sources in many for part in (*sources.files, *sources.files.values())),
+            *(chosen.flags_in_effect() if flags is None else flags),
+            *(_UNOPTIMIZED, _CRATE, chosen.identity()),
             f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
-            _cffi_version(),
+            str(_cffi_backend.__version__),
         ]
     )
 
 
 def _build(many: Sequence[Sources], name: str, key: str) -> Path:
     """Return the folder of a compiled module."""
-    kernels = ", ".join(sources.kernel for sources in many)
+    chosen, kernels = _compiler_of(many[0]) or C, ", ".join(sources.kernel for sources in many)
+    files = {file: text for sources in many for file, text in sources.files.items()}
+    headers = [file for file in files if file.endswith(".h")]
+    cdef = "\n".join(declarations(files[header]) for header in headers)
 
     def fill(draft: Path) -> None:
         with timed("compile", kernels):
-            if _language(many[0]) in COMPILERS:
-                COMPILERS[_language(many[0])].build(many, draft / _library(name))
+            if chosen is C:
+                included = "".join(f'#include "{header}"\n' for header in headers)
+                reasons = compile_module(draft, name, files, cdef, included, chosen.flags_in_effect())
             else:
-                _compile(many, name, compiler(), draft)
+                (draft / _DECLARATIONS).write_text(cdef)
+                command = [*chosen.command(), *chosen.flags_in_effect()]
+                reasons = _compile(command, files, chosen.ending, draft / _library(name))
+        if reasons:
+            raise CompilerError(f"{chosen.path()} failed on {name if chosen is C else kernels}: {reasons[0]}")
 
     return cache.entry("builds", key, fill, f"compiled {kernels}")
 
 
-def _cffi_version() -> str:
-    import _cffi_backend
+def compile_module(
+    draft: Path,
+    name: str,
+    files: Mapping[str, str],
+    cdef: str,
+    header: str,
+    flags: Sequence[str],
+    of: Compiler = C,
+) -> list[str]:
+    """Compile files into a module of cffi, which alone is left in a folder; return the errors if there is none.
 
-    return str(_cffi_backend.__version__)
-
-
-def _compile(many: Sequence[Sources], name: str, path: str, draft: Path) -> None:
-    files = {file: text for sources in many for file, text in sources.files.items()}
-    for file, text in files.items():
-        (draft / file).write_text(text)
-    headers = [file for file in files if file.endswith(".h")]
-    code = [file for file in files if file.endswith(".c")]
-    if len(code) > 1:  # one translation unit: loops can take steps in, and the compiler is called once
-        (draft / f"{name}_kernels.c").write_text("".join(f'#include "{file}"\n' for file in code))
-        code = [f"{name}_kernels.c"]
-    request = {
-        "name": name,
-        "cdef": "\n".join(declarations(files[header]) for header in headers),
-        "header": "".join(f'#include "{header}"\n' for header in headers) + _UNOPTIMIZED,
-        "sources": [str(draft / file) for file in code],
-        "flags": [*_flags, _VISIBILITY],
-        "libraries": [] if sys.platform == "win32" else ["m"],
-        "folder": str(draft),
-    }
-    built, reasons = run_request(request)
-    if built is None:
-        raise CompilerError(f"{path} failed on {name}: {reasons[0]}")
-    leave_only(built, draft)
-
-
-def leave_only(built: Path, draft: Path) -> None:
-    """Leave nothing in a folder but the compiled module, under the name that Python imports.
-
-    Parameters
-    ----------
-    built : Path
-        The module, anywhere.
-    draft : Path
-        The folder.
+    `cdef` declares its functions, `header` is the text that its wrapper begins with.
     """
-    library = draft / _library(built.name.partition(".")[0])
-    built.rename(library)
-    for leftover in draft.iterdir():
-        if leftover.is_dir():
-            shutil.rmtree(leftover)
-        elif leftover != library:
-            leftover.unlink()
+    from cffi import FFI
+
+    ffi = FFI()
+    ffi.cdef(cdef)
+    ffi.set_source(name, header + _UNOPTIMIZED, compiler_verbose=0)
+    linking = shlex.split(sysconfig.get_config_var("LDSHARED") or "cc -shared")[1:]
+    command = [*of.command(), *flags, f"-I{sysconfig.get_path('include')}", *linking]
+    return _compile(command, files, of.ending, draft / _library(name), ffi)
 
 
-def run_request(request: dict[str, Any]) -> tuple[Path | None, list[str]]:
-    """Let the process that compiles answer a request, see ``worker.py``.
+def _compile(
+    command: list[str], files: Mapping[str, str], ending: str, library: Path, wrapper: Any = None
+) -> list[str]:
+    """Compile files as one unit, so that loops can take steps in; return the errors if there is no library."""
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        parts = [file for file in files if file.endswith(ending)]
+        included = "".join(f'#include "{file}"\n' for file in parts)
+        crate = _CRATE + "".join(f"pub mod {Path(file).stem};\n" for file in parts)
+        root = f"{library.name.partition('.')[0]}_root{ending}"
+        for file, text in {**files, root: crate if ending == ".rs" else included}.items():
+            Path(folder, file).write_text(text)
+        words = [*command, "-o", library.name, root]
+        if wrapper is not None:
+            text = f"{library.name.partition('.')[0]}_wrapper.c"
+            wrapper.emit_c_code(str(Path(folder, text)))
+            words += ["-x", "c", text, "-x", "none", "-lm"]
+        try:
+            done = subprocess.run(
+                words,
+                cwd=folder,
+                env=os.environ | {"LC_ALL": "C"},
+                capture_output=True,
+                text=True,
+                errors="replace",
+                check=False,
+            )
+        except OSError as error:
+            return [str(error.strerror)]
+        built = Path(folder, library.name)
+        if done.returncode == 0 and built.is_file():
+            if not built.read_bytes().startswith(_LIBRARIES):
+                return ["it reports success and writes no library"]
+            built.rename(library)
+            return []
+    said = [line.strip() for line in (done.stderr + done.stdout).splitlines() if line.strip()]
+    status = f"exit status {done.returncode}" if done.returncode else "no output file"
+    return [line for line in said if "error" in line.lower()] or said[-1:] or [status]
 
-    Parameters
-    ----------
-    request : dict
-        Without the environment, which is that of this process.
 
-    Returns
-    -------
-    Path or None
-        The compiled module.
-    list of str
-        Where there is none, what the compiler said of it: its errors, at least one line.
-
-    Raises
-    ------
-    CompilerError
-        If there is no C compiler, or the process ends.
-    """
-    path = compiler()
-    # Flags in the environment would change the bits of the result, but the key of the cache does not include them.
-    environment = {
-        k: v for k, v in os.environ.items() if k not in ("CFLAGS", "CPPFLAGS", "LDFLAGS", "LDSHARED")
-    }
-    with one_at_a_time:
-        answer = compiling_process().ask(
-            request | {"environment": environment | {"CC": chosen_compiler() or path}}
-        )
-    built = Path(answer["path"] or request["folder"])
-    if built.is_file():
-        with built.open("rb") as file:
-            is_library = file.read(4).startswith(_LIBRARIES)
-        return (built, []) if is_library else (None, ["it reports success and writes no library"])
-    said = [line.strip() for line in answer["said"].splitlines() if line.strip()]
-    reasons = [line for line in said if "error" in line.lower()] or said[-1:]
-    status = re.search(r"exit (?:code|status) -?\d+", answer["failure"])
-    return None, reasons or [status[0] if status else " ".join(answer["failure"].split()) or "no output file"]
-
-
-def _library(name: str) -> str:
-    """Return the file name of a compiled module."""
-    return name + importlib.machinery.EXTENSION_SUFFIXES[0]
+def declarations(header: str) -> str:
+    """Return the declarations of a generated header, without its preprocessor lines."""
+    text = re.sub(r"^#(?:.*\\\n)*.*$", "", header, flags=re.MULTILINE).replace('extern "C" {', "")
+    head, _, tail = text.rpartition("}")
+    return head + tail

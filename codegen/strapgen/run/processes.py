@@ -22,10 +22,7 @@ def prepare_for_derivations() -> None:
 
 
 def begin_worker() -> None:
-    """Begin a process of a pool: an interrupt is the parent's to handle, and the end of the parent ends it.
-
-    Without that, a worker whose parent is killed waits for work until the machine is switched off.
-    """
+    """Begin a process of a pool: an interrupt is the parent's to handle, and the end of the parent ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     prepare_for_derivations()
     end_with_parent()
@@ -33,11 +30,12 @@ def begin_worker() -> None:
 
 def end_with_parent() -> None:
     """End this process when the one that started it has ended; in a process that nobody started, do nothing."""
-    parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_wait_for, args=(parent.sentinel,), daemon=True).start()
 
+    def wait(sentinel: int) -> None:
+        connection.wait([sentinel])
+        os._exit(1)
 
-def _wait_for(sentinel: int) -> None:
-    connection.wait([sentinel])
-    os._exit(1)
+    if (
+        parent := parent_process()
+    ) is not None:  # else a worker waits for work until the machine is switched off
+        threading.Thread(target=wait, args=(parent.sentinel,), daemon=True).start()

@@ -4,42 +4,32 @@ from __future__ import annotations
 
 import platform
 import subprocess
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.version import VERSION
 from strapgen.run import compiler
 
+_MISSING = "is not installed"
 _SHAPES_OUTPUT = ("sympy", "numpy", "jinja2", "cffi", "typer", "rich")
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of strapgen, Python, the packages that shape the output, and the C compiler.
-
-    Returns
-    -------
-    dict of str to str
-        By their names; "is not installed" for what is missing.
-
-    Examples
-    --------
-    >>> [*versions()][:3]
-    ['strapgen', 'python', 'sympy']
-    """
+    """Return the versions of strapgen, Python, the packages that shape the output, and the C compiler, by name."""
     known = {"strapgen": VERSION, "python": platform.python_version()}
     for name in _SHAPES_OUTPUT:
-        try:
+        known[name] = _MISSING
+        with suppress(PackageNotFoundError):
             known[name] = version(name)
-        except PackageNotFoundError:
-            known[name] = "is not installed"
     return known | {"C compiler": _compiler()}
 
 
 def _compiler() -> str:
     """Return what the compiler says of itself."""
     try:
-        path = compiler.compiler()
+        path = compiler.C.path()
     except CompilerError:
-        return "is not installed"
+        return _MISSING
     said = subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout
     return said.splitlines()[0] if said else path

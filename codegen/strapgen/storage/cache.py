@@ -7,9 +7,6 @@ files, and a damaged one is created again.
 What is in the cache runs. Nothing is taken from it that anybody but the user could have put there: the cache folder and
 all below it must belong to the user and be writable by nobody else, see `ownership`. An entry for which this does not
 hold is created again; where it does not hold for the folder, a temporary one takes its place.
-
-The cache is part of the ground, and not of the library that fills most of it, because the catalogue needs it too: it
-keeps the kernels of users' files here.
 """
 
 from __future__ import annotations
@@ -18,18 +15,18 @@ import atexit
 import hashlib
 import json
 import os
+import pickle
 import secrets
 import shutil
 import stat
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
+from contextlib import contextmanager, suppress
+from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.timing import LOGGER, from_cache
@@ -38,33 +35,33 @@ from strapgen.storage.ownership import ForeignFileError
 
 _UNUSED_DAYS = 60
 _MANIFEST = "manifest.json"
-#: Beginning of the name of a folder in which an entry is filled, and of one that is to be removed.
-_DRAFT, _REMOVED = ".filling-", ".removed-"
-#: Beginning of the name of a folder that stands for a cache folder which others can write.
-_TEMPORARY = "strapgen-cache-"
+#: The file of an entry that holds the result of a function.
+_RESULT = "result.pickle"
+#: Beginning of the name of a folder in which an entry is filled, of one that is to be removed, and of one that stands
+#: for a cache folder which others can write.
+_DRAFT, _REMOVED, _TEMPORARY = ".filling-", ".removed-", "strapgen-cache-"
 #: How often work is begun again whose entries others remove.
 _TRIALS = 5
-#: As many entries of a kind are filled before the folder is not looked through after every one.
-_FEW = 16
 #: The number of folders that are the user's alone: the cache folder, that of a kind, that of an entry.
 _PRIVATE = 3
 
+#: Temporary folders by the cache folders that they stand for; a process that is forked uses them too.
+_replaced: dict[Path, Path] = {}
+#: Folders of a kind in which this process has looked for what others have left.
+_tidied: set[Path] = set()
+
+Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
 def root() -> Path:
-    """Return the cache folder: $STRAPGEN_CACHE_DIR, or `strapgen` in the user's cache folder.
-
-    Raises
-    ------
-    InputError
-        If the folder would be in the user's home folder, but there is none.
-    """
+    """Return the cache folder: $STRAPGEN_CACHE_DIR, or the place for caches of the user on this system."""
     try:
-        chosen = os.environ.get("STRAPGEN_CACHE_DIR")
-        if chosen:
+        if chosen := os.environ.get("STRAPGEN_CACHE_DIR"):
             return Path(chosen).expanduser().absolute()
-        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "strapgen"
+        from platformdirs import user_cache_path  # here, since most have chosen a folder or need none
+
+        return user_cache_path("strapgen", appauthor=False).expanduser().absolute()
     except RuntimeError:  # a user without a home folder, as in some containers
         raise InputError(
             "no home folder to keep the cache in; set STRAPGEN_CACHE_DIR to a folder that can be written"
@@ -72,17 +69,7 @@ def root() -> Path:
 
 
 def digest(parts: Iterable[str | bytes]) -> str:
-    """Return a hash of a sequence of texts or bytes.
-
-    Parameters
-    ----------
-    parts : iterable of str or bytes
-
-    Returns
-    -------
-    str
-        24 hexadecimal digits.
-    """
+    """Return a hash of a sequence of texts or bytes, 24 hexadecimal digits."""
     total = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part
@@ -96,50 +83,51 @@ def generator_digest() -> str:
     return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
 
 
-def lookup(kind: str, key: str) -> Path | None:
-    """Return the folder of a cache entry; None if there is none, if it is damaged, or if it is not the user's alone.
+def cached(
+    kind: str,
+    key: Callable[Arguments, Iterable[str | bytes]],
+    what: Callable[Arguments, str] = lambda *_, **__: "",
+) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
+    """Decorate a function whose result, which can be pickled, depends on this package and the parts of a key alone.
 
-    Parameters
-    ----------
-    kind, key : str
-        As for `entry`.
+    `key` and `what` take the arguments of the function; `what` returns the name of the result in the log.
     """
+
+    def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+        @wraps(function)
+        def stored(*args: Arguments.args, **options: Arguments.kwargs) -> Result:
+            def fill(draft: Path) -> None:
+                (draft / _RESULT).write_bytes(pickle.dumps(function(*args, **options)))
+
+            parts, name = digest([generator_digest(), *key(*args, **options)]), what(*args, **options)
+            content = persistently(lambda: read(entry(kind, parts, fill, name), _RESULT))
+            result: Result = pickle.loads(content)
+            return result
+
+        return stored
+
+    return decorate
+
+
+def lookup(kind: str, key: str) -> Path | None:
+    """Return the folder of an entry; None if there is none, if it is damaged, or if it is not the user's alone."""
     place = _folder(create=False) / kind / key
-    if (
-        place.parent not in _tidied
-    ):  # once, since another process may have made the entry that a killed one began
+    if place.parent not in _tidied:  # once: another process may have made the entry that a killed one began
         _tidied.add(place.parent)
-        _tidy(place.parent)
+        drafts.remove_forgotten(place.parent, _DRAFT)
     return place if _is_whole(place) else None
 
 
 def discard(kind: str, key: str) -> None:
-    """Remove a cache entry whose content no longer holds."""
+    """Remove an entry whose content no longer holds."""
     shutil.rmtree(_folder(create=False) / kind / key, ignore_errors=True)
 
 
 def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> Path:
-    """Return the folder of a cache entry; if there is none, create it by `fill`.
+    """Return the folder of an entry; if there is none, create it by `fill`, which writes files into an empty folder.
 
-    Parameters
-    ----------
-    kind : str
-        Kind of entry, which is the name of a folder in the cache.
-    key : str
-        Hash of everything that the content depends on.
-    fill : callable
-        ``fill(folder)`` writes the files of the entry into an empty folder.
-    what : str, optional
-        What the entry holds, for the log: a line says that it comes from the cache, if it does.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputError
-        If the cache folder cannot be written.
+    The name of the kind is that of a folder in the cache, the key a hash of all that the content depends on. The log
+    says of `what` that it comes from the cache, if it does.
     """
     if (there := lookup(kind, key)) is not None:
         if what:
@@ -155,23 +143,20 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
 
 def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
     """Fill an entry beside its place, and rename it there."""
-    with ExitStack() as stack:
-        try:
-            place = _folder(create=True) / kind / key
-            _make_way(place)
-            draft = stack.enter_context(drafts.draft_folder(place.parent, _DRAFT))
-        except OSError as error:
-            raise InputError(
-                f"cache folder {root()} cannot be written ({error.strerror}); set STRAPGEN_CACHE_DIR to one that can"
-            ) from None
-        try:
+    advice = "; set STRAPGEN_CACHE_DIR to one that can"
+    try:
+        place = _folder(create=True) / kind / key
+        _make_way(place)
+        with drafts.draft_folder(place.parent, _DRAFT) as draft:
+            advice = ""
             fill(draft)
             (draft / _MANIFEST).write_text(json.dumps(_hashes(draft)))
-            _protect(draft)
+            for path in draft.iterdir():  # the user's alone, whatever the umask
+                path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o022)
             with suppress(OSError):  # another process was first: its entry is the same
                 draft.rename(place)
-        except OSError as error:
-            raise InputError(f"cache folder {root()} cannot be written ({error.strerror})") from error
+    except OSError as error:
+        raise InputError(f"cache folder {root()} cannot be written ({error.strerror}){advice}") from error
     return place
 
 
@@ -179,11 +164,6 @@ def persistently(work: Callable[[], Result]) -> Result:
     """Return what some work with entries returns; begin it again if another process removes one meanwhile.
 
     A clock that was set wrong makes entries look as if nobody had used them for long.
-
-    Parameters
-    ----------
-    work : callable
-        It gets its entries by `entry` or `lookup`.
     """
     for _ in range(_TRIALS - 1):
         with suppress(FileNotFoundError):
@@ -192,43 +172,17 @@ def persistently(work: Callable[[], Result]) -> Result:
 
 
 def read(place: Path, name: str) -> bytes:
-    """Return the content of a file of an entry.
-
-    Parameters
-    ----------
-    place : Path
-        The folder of the entry, from `entry` or `lookup`.
-    name : str
-
-    Raises
-    ------
-    OSError
-        If it cannot be read, or is not the user's alone.
-    """
+    """Return the content of a file in the folder of an entry; an OSError if it is not the user's alone."""
     with ownership.private_folder(place, _PRIVATE) as folder:
         return folder.read(name)
 
 
 @contextmanager
 def loadable(file: Path) -> Iterator[tuple[str, int]]:
-    """Open a file of an entry for what loads it by a path.
+    """Open a file of an entry for what loads it by a path; an OSError if it is not the user's alone.
 
-    Parameters
-    ----------
-    file : Path
-        Below the folder of the entry.
-
-    Yields
-    ------
-    str
-        A path to the very file that was checked, wherever the system has one.
-    int
-        The descriptor of the file, which the path needs in a process that is started.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read, or is not the user's alone.
+    Yields a path to the very file that was checked, wherever the system has one, and its descriptor, which the path
+    needs in a process that is started.
     """
     with ownership.private_folder(file.parent, _PRIVATE) as folder, folder.opened(file.name) as descriptor:
         yield ownership.path_of(descriptor, file), descriptor
@@ -240,37 +194,24 @@ def _folder(create: bool) -> Path:
     place = nominal.resolve()
     if place in _replaced and _replaced[place].is_dir():
         return _replaced[place]
-    if not create and place in _private:  # every entry is checked from the root of the file system down
-        return place
     try:
         if create:
             _make_private(place)
         with ownership.private_folder(place):
-            _private.add(place)
+            return place
     except ForeignFileError as error:
         _replaced[place] = _temporary(nominal, error.reason)
         return _replaced[place]
     except OSError:  # there is none, or it cannot be opened: then neither can its entries
         if create:
             raise
-    return place
-
-
-#: Temporary folders by the cache folders that they stand for; a process that is forked uses them too.
-_replaced: dict[Path, Path] = {}
-#: Cache folders that were the user's alone when they were looked at first.
-_private: set[Path] = set()
-#: How many entries this process has filled in the folder of a kind.
-_filled_here: Counter[Path] = Counter()
-#: Folders of a kind in which this process has looked for what others have left.
-_tidied: set[Path] = set()
+        return place
 
 
 def _temporary(nominal: Path, reason: str) -> Path:
     """Return a folder in place of the cache folder until the process ends, and say so."""
     parent = Path(tempfile.gettempdir()).resolve()
-    for gone in drafts.forgotten(parent, _TEMPORARY):
-        shutil.rmtree(gone, ignore_errors=True)
+    drafts.remove_forgotten(parent, _TEMPORARY)
     folder = drafts.draft_folder(parent, _TEMPORARY)
     try:
         place = folder.__enter__()
@@ -281,21 +222,16 @@ def _temporary(nominal: Path, reason: str) -> Path:
             f"cache folder {nominal} is not used, since {reason}; nor is a temporary one ({error.strerror})"
         ) from None
     atexit.register(folder.__exit__, None, None, None)
-    LOGGER.warning(
-        "strapgen: cache folder %s is not used, since %s; what is generated lasts until the program ends",
-        nominal,
-        reason,
-    )
+    lasts = "what is generated lasts until the program ends"
+    LOGGER.warning("strapgen: cache folder %s is not used, since %s; %s", nominal, reason, lasts)
     return place
 
 
 def _make_private(place: Path) -> None:
     """Make a folder and those above it that are missing, for the user alone."""
-    missing = [folder for folder in (place, *place.parents) if not folder.exists()]
-    for folder in reversed(missing):
-        with suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-    place.mkdir(exist_ok=True)  # says what is wrong with what stands there
+    for folder in reversed((place, *place.parents)):
+        if not folder.is_dir():
+            folder.mkdir(mode=0o700, exist_ok=True)
 
 
 def _make_way(place: Path) -> None:
@@ -324,16 +260,8 @@ def _remove(place: Path) -> None:
             removed.unlink()
 
 
-def _protect(folder: Path) -> None:
-    """Let nobody but the user write the files of an entry, whatever the umask."""
-    for path in folder.iterdir():
-        path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o022)
-
-
 def _hashes(folder: Path) -> dict[str, str]:
-    return {
-        path.name: digest([path.read_bytes()]) for path in sorted(folder.iterdir()) if path.name != _MANIFEST
-    }
+    return {path.name: digest([path.read_bytes()]) for path in folder.iterdir() if path.name != _MANIFEST}
 
 
 def _is_whole(place: Path) -> bool:
@@ -341,17 +269,18 @@ def _is_whole(place: Path) -> bool:
     try:
         with ownership.private_folder(place, _PRIVATE) as folder:
             manifest = json.loads(folder.read(_MANIFEST))
-            hashes = {name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST}
-            if manifest != hashes:
+            if manifest != {
+                name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST
+            }:
                 return False
             with suppress(OSError):
                 folder.touch()  # in use: not to be pruned
             return True
     except ForeignFileError as error:
         _warn(error.reason)
-        return False
     except (OSError, ValueError):
-        return False
+        pass
+    return False
 
 
 @cache
@@ -361,25 +290,12 @@ def _warn(reason: str) -> None:
 
 
 def _prune(folder: Path) -> None:
-    """Remove entries that have not been used for long, and what processes that are gone have left.
-
-    A process that fills many entries looks through them now and then.
-    """
-    _filled_here[folder] += 1
-    if _filled_here[folder] > _FEW and _filled_here[folder] % _FEW:
-        return
-    _tidy(folder)
+    """Remove entries that have not been used for long, and what processes that are gone have left."""
+    drafts.remove_forgotten(folder, _DRAFT)
     oldest = time.time() - _UNUSED_DAYS * 86400
     with os.scandir(folder) as places:
         for place in places:
             with suppress(OSError):
-                if place.name.startswith(_REMOVED) or (
-                    not place.name.startswith(_DRAFT) and place.stat().st_mtime < oldest
-                ):
+                is_old = not place.name.startswith(_DRAFT) and place.stat().st_mtime < oldest
+                if is_old or place.name.startswith(_REMOVED):
                     shutil.rmtree(place.path, ignore_errors=True)
-
-
-def _tidy(folder: Path) -> None:
-    """Remove the drafts of processes that are gone."""
-    for gone in drafts.forgotten(folder, _DRAFT):
-        shutil.rmtree(gone, ignore_errors=True)

@@ -34,24 +34,7 @@ _FOLDER = getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
 @contextmanager
 def draft_folder(parent: Path, prefix: str) -> Iterator[Path]:
-    """Make a private folder that is removed after the block, if it is still there.
-
-    Parameters
-    ----------
-    parent : Path
-        The folder that it is made in.
-    prefix : str
-        Beginning of its name, eight hexadecimal digits follow.
-
-    Yields
-    ------
-    Path
-
-    Raises
-    ------
-    OSError
-        If it cannot be made.
-    """
+    """Make a private folder, its name the prefix and eight hexadecimal digits, that is removed after the block."""
     for _ in range(_TRIALS):
         place = parent / f"{prefix}{secrets.token_hex(4)}"
         place.mkdir(mode=0o700)
@@ -72,49 +55,38 @@ def draft_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 
 def forgotten(parent: Path, prefix: str) -> Iterator[Path]:
-    """Yield the folders of processes that are gone, for the caller to remove.
-
-    Parameters
-    ----------
-    parent, prefix
-        As for `draft_folder`.
-
-    Yields
-    ------
-    Path
-        A folder of this user; while the caller has it, nobody else does.
-    """
+    """Yield this user's draft folders of processes that are gone; while the caller has one, nobody else does."""
     name = re.compile(re.escape(prefix) + "[0-9a-f]{8}")
-    try:
-        with os.scandir(parent) as places:
-            folders = [Path(place.path) for place in places if name.fullmatch(place.name)]
-    except OSError:
-        return
+    folders: list[Path] = []
+    with suppress(OSError):
+        folders += [place for place in parent.iterdir() if name.fullmatch(place.name)]
     for place in folders:
         with suppress(OSError):
             status = place.lstat()
-            if not stat.S_ISDIR(status.st_mode) or (hasattr(os, "geteuid") and status.st_uid != os.geteuid()):
+            is_mine = not hasattr(os, "geteuid") or status.st_uid == os.geteuid()
+            if not stat.S_ISDIR(status.st_mode) or not is_mine:
                 continue
             descriptor = _locked(place)
-            if descriptor is None:
-                continue
-            if descriptor < 0:
-                if 0 <= time.time() - status.st_mtime < _FORGOTTEN:
-                    continue
-                yield place
+            if descriptor is None or (descriptor < 0 and 0 <= time.time() - status.st_mtime < _FORGOTTEN):
                 continue
             try:
                 yield place
             finally:
-                os.close(descriptor)
+                if descriptor >= 0:
+                    os.close(descriptor)
+
+
+def remove_forgotten(parent: Path, prefix: str) -> None:
+    """Remove the draft folders of processes that are gone."""
+    for gone in forgotten(parent, prefix):
+        shutil.rmtree(gone, ignore_errors=True)
 
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
     """Make a private folder among the temporary ones that is gone after the block; see `draft_folder`."""
     parent = Path(tempfile.gettempdir())
-    for gone in forgotten(parent, _TEMPORARY):
-        shutil.rmtree(gone, ignore_errors=True)
+    remove_forgotten(parent, _TEMPORARY)
     with draft_folder(parent, _TEMPORARY) as place:
         yield place
 
@@ -129,11 +101,11 @@ def _locked(place: Path) -> int | None:
         return None
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        here, there = os.fstat(descriptor), place.lstat()
+        is_there = os.path.samestat(os.fstat(descriptor), place.lstat())
     except OSError as error:
         os.close(descriptor)
         return None if error.errno in (errno.EWOULDBLOCK, errno.EACCES, errno.ENOENT) else -1
-    if (here.st_dev, here.st_ino) != (there.st_dev, there.st_ino):
+    if not is_there:
         os.close(descriptor)
         return None
     return descriptor

@@ -20,31 +20,14 @@ from strapgen.storage import drafts
 
 #: Beginning of the name of the hidden folder.
 STAGING = ".strapgen-draft-"
-
 #: Flags of a file that must not be there yet.
 _NEW = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)
 
 
 def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Path]:
-    """Write files into a folder, which is created if it does not exist.
+    """Write files, by names that may have folders in them, and return their paths; if one cannot be, change none.
 
     A file that exists keeps its permissions; a new one has those that the umask leaves.
-
-    Parameters
-    ----------
-    folder : path
-    files : mapping of str to str or bytes
-        Content by name, in the order in which they appear; a name may have folders in it.
-
-    Returns
-    -------
-    list of Path
-        The files, in order.
-
-    Raises
-    ------
-    InputError
-        If the folder or a file cannot be written; no file has been changed then.
     """
     folder = Path(folder)
     places = [folder / name for name in files]
@@ -84,18 +67,40 @@ def write_files(folder: str | Path, files: Mapping[str, str | bytes]) -> list[Pa
     return places
 
 
+def write_file(path: str | Path, content: str | bytes) -> Path:
+    """Write one file; see `write_files`."""
+    path = Path(path)
+    return write_files(path.parent, {path.name: content})[0]
+
+
 def is_staged(path: Path) -> bool:
     """Return whether a path leads into the hidden folder of a process that writes files, or was killed doing so."""
     return any(re.fullmatch(re.escape(STAGING) + "[0-9a-f]{8}", part) for part in path.parts)
 
 
+def check_folder(folder: str | Path) -> None:
+    """Check that files can be written into a folder, before the work that makes them; nothing is created."""
+    folder = Path(folder)
+    for place in (folder, *folder.absolute().parents):
+        try:
+            is_folder, is_open = stat.S_ISDIR(place.stat().st_mode), os.access(place, os.W_OK)
+            number = errno.ENOTDIR if not is_folder else 0 if is_open else errno.EACCES
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            number = error.errno or errno.EACCES
+        if number:
+            raise InputError(f"{folder} cannot be written ({os.strerror(number)})")
+        return
+
+
 def _make_folder(folder: Path, added: list[Path]) -> None:
     """Make a folder and those above it that are missing, and add these to a list."""
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
-    for place in reversed(missing):
-        with suppress(FileExistsError):
-            place.mkdir()
-            added.append(place)
+    for place in reversed((folder, *folder.parents)):
+        if not place.exists():
+            with suppress(FileExistsError):
+                place.mkdir()
+                added.append(place)
     folder.mkdir(exist_ok=True)  # says what is wrong with what stands there
 
 
@@ -127,30 +132,6 @@ def _tidy(folders: Iterable[Path]) -> None:
                     gone.rmdir()
 
 
-def check_folder(folder: str | Path) -> None:
-    """Check that files can be written into a folder, before the work that makes them; nothing is created.
-
-    Raises
-    ------
-    InputError
-        If a file stands in its way, or the place for it cannot be written.
-    """
-    folder = Path(folder)
-    for place in (folder, *folder.absolute().parents):
-        try:
-            mode = place.stat().st_mode
-        except FileNotFoundError:
-            continue
-        except OSError as error:
-            raise InputError(f"{folder} cannot be written ({error.strerror})") from None
-        number = 0 if os.access(place, os.W_OK) else errno.EACCES
-        if not stat.S_ISDIR(mode):
-            number = errno.ENOTDIR
-        if number:
-            raise InputError(f"{folder} cannot be written ({os.strerror(number)})")
-        return
-
-
 def _put_in_place(drafts: list[tuple[Path, Path]]) -> None:
     """Rename drafts into their places; put back what was there if one of them cannot be."""
     replaced: list[tuple[Path, bytes | None]] = []
@@ -166,9 +147,3 @@ def _put_in_place(drafts: list[tuple[Path, Path]]) -> None:
             with suppress(OSError):
                 place.unlink() if before is None else place.write_bytes(before)
         raise
-
-
-def write_file(path: str | Path, content: str | bytes) -> Path:
-    """Write one file; see `write_files`."""
-    path = Path(path)
-    return write_files(path.parent, {path.name: content})[0]

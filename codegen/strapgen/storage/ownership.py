@@ -1,9 +1,8 @@
 """Opens folders and files that nobody but the user can change, and refuses others.
 
-What strapgen executes from the cache must come from the user. A folder is therefore opened from the root of the file
-system downwards, each part in the part before it, and every part is checked on its descriptor: once a part has passed,
-nobody but the user and the administrator can put another one in its place. On systems without owners in the sense of
-POSIX nothing is checked.
+What the cache holds is executed. A folder is opened from the root of the file system downwards, each part in the part
+before it, and every part is checked on its descriptor: once a part has passed, nobody but the user and the
+administrator can put another one in its place. On systems without owners in the sense of POSIX nothing is checked.
 """
 
 from __future__ import annotations
@@ -14,16 +13,15 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 #: Whether the system has owners and modes of files, and opens files in folders that are open.
 IS_CHECKED = hasattr(os, "geteuid") and os.open in os.supports_dir_fd
-_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-#: Flags of a folder on the way, which need not be readable, and of one whose files are listed.
-_PASS = getattr(os, "O_PATH", 0) | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
+#: Flags of a folder whose files are listed, of one on the way, which need not be readable, and of a file: no links, and
+#: no waiting for the writer of a pipe.
 _LIST = getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
-#: Flags of a file: neither a link nor a pipe that nobody writes.
+_PASS = getattr(os, "O_PATH", 0) | _LIST
 _READ = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _calls = itertools.count(1)
 
@@ -39,40 +37,30 @@ class ForeignFileError(OSError):
 class PrivateFolder:
     """An open folder that belongs to the user and that nobody else can write."""
 
-    def __init__(self, place: Path, descriptor: int) -> None:
-        self.place = place
-        self._descriptor = descriptor
+    def __init__(self, place: Path, descriptor: int | None) -> None:
+        self._place, self._descriptor = place, descriptor
+        self._here = place if descriptor is None else descriptor
 
     def names(self) -> list[str]:
         """Return the names of what the folder holds."""
-        with os.scandir(self._descriptor if IS_CHECKED else self.place) as entries:
+        with os.scandir(self._here) as entries:
             return sorted(entry.name for entry in entries)
 
     def touch(self) -> None:
         """Set the time of the folder's last change to now."""
-        os.utime(self._descriptor if IS_CHECKED else self.place)
+        os.utime(self._here)
 
     @contextmanager
     def opened(self, name: str) -> Iterator[int]:
-        """Open a file of the folder, and yield its descriptor.
-
-        Raises
-        ------
-        ForeignFileError
-            If it is no ordinary file, belongs to another user, or others can write it.
-        OSError
-            If it cannot be opened.
-        """
-        if IS_CHECKED:
-            descriptor = os.open(name, os.O_RDONLY | _READ, dir_fd=self._descriptor)
-        else:
-            descriptor = os.open(self.place / name, os.O_RDONLY | _READ)
+        """Open an ordinary file of the folder that is the user's alone, and yield its descriptor."""
+        path = name if IS_CHECKED else self._place / name
+        descriptor = os.open(path, os.O_RDONLY | _READ, dir_fd=self._descriptor)
         try:
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
-                raise ForeignFileError(self.place / name, "is no ordinary file")
-            if IS_CHECKED and (reason := _foreign(status)):
-                raise ForeignFileError(self.place / name, reason)
+                raise ForeignFileError(self._place / name, "is no ordinary file")
+            if IS_CHECKED and (reason := _fault(status, private=True)):
+                raise ForeignFileError(self._place / name, reason)
             yield descriptor
         finally:
             os.close(descriptor)
@@ -85,42 +73,24 @@ class PrivateFolder:
 
 @contextmanager
 def private_folder(place: Path, parts: int = 1) -> Iterator[PrivateFolder]:
-    """Open a folder that nobody but the user can change.
+    """Open a folder, given by an absolute path without links, that nobody but the user can change.
 
-    Parameters
-    ----------
-    place : Path
-        Absolute, and without links.
-    parts : int, optional
-        Number of folders, this one and those above it, that must belong to the user and be writable by nobody else. A
-        folder above these may be the administrator's, and others may write it if it is sticky.
-
-    Yields
-    ------
-    PrivateFolder
-
-    Raises
-    ------
-    ForeignFileError
-        If a folder does not comply.
-    OSError
-        If one cannot be opened.
+    This folder and the `parts` - 1 above it must belong to the user and be writable by nobody else. Those above may be
+    the administrator's, and others may write them if they are sticky.
     """
     if not IS_CHECKED:
-        yield PrivateFolder(place, -1)
+        yield PrivateFolder(place, None)
         return
+    way = [*reversed(place.parents), place]
     descriptor = os.open(place.anchor, _PASS)
     try:
-        reason, count = _unsafe(os.fstat(descriptor)), len(place.parts)
-        for number, part in enumerate(place.parts[1:], 2):
-            if reason:
-                raise ForeignFileError(Path(*place.parts[: number - 1]), reason)
-            inner = os.open(part, _LIST if number == count else _PASS, dir_fd=descriptor)
-            os.close(descriptor)
-            descriptor = inner
-            reason = (_foreign if number > count - parts else _unsafe)(os.fstat(descriptor))
-        if reason:
-            raise ForeignFileError(place, reason)
+        for number, folder in enumerate(way):
+            if number:
+                inner = os.open(folder.name, _LIST if folder is place else _PASS, dir_fd=descriptor)
+                os.close(descriptor)
+                descriptor = inner
+            if reason := _fault(os.fstat(descriptor), private=number >= len(way) - parts):
+                raise ForeignFileError(folder, reason)
         yield PrivateFolder(place, descriptor)
     finally:
         os.close(descriptor)
@@ -140,27 +110,18 @@ def path_of(descriptor: int, place: Path) -> str:
     return str(place)
 
 
-def _foreign(status: os.stat_result) -> str:
-    """Return why a file or a folder is not the user's alone; "" if it is."""
-    if status.st_uid != os.geteuid():
+def _fault(status: os.stat_result, private: bool) -> str:
+    """Return why others could change what is open, or what it holds if it need not be private; "" if they cannot."""
+    is_trusted = status.st_uid == 0 or _is_outside(status.st_uid)
+    if status.st_uid != os.geteuid() and (private or not is_trusted):
         return "belongs to another user"
-    return "can be written by other users" if _others_write(status) else ""
+    by_group = status.st_mode & stat.S_IWGRP and not _is_alone(status.st_gid, os.geteuid())
+    is_sticky = not private and status.st_mode & stat.S_ISVTX
+    is_open = (status.st_mode & stat.S_IWOTH or by_group) and not is_sticky
+    return "can be written by other users" if is_open else ""
 
 
-def _unsafe(status: os.stat_result) -> str:
-    """Return why others could replace what a folder holds; "" if they cannot."""
-    if status.st_uid not in (0, os.geteuid()) and not _is_outside(status.st_uid):
-        return "belongs to another user"
-    is_sticky = status.st_mode & stat.S_ISVTX
-    return "can be written by other users" if _others_write(status) and not is_sticky else ""
-
-
-def _others_write(status: os.stat_result) -> bool:
-    mode = status.st_mode & _OTHERS_WRITE
-    return bool(mode & stat.S_IWOTH or (mode & stat.S_IWGRP and not _is_alone(status.st_gid, os.geteuid())))
-
-
-@lru_cache(maxsize=64)
+@cache
 def _is_alone(group: int, user: int) -> bool:
     """Return whether a group is that of one user alone, as some systems make one for each user."""
     import grp
@@ -173,15 +134,14 @@ def _is_alone(group: int, user: int) -> bool:
     return False
 
 
-@lru_cache(maxsize=64)
+@cache
 def _is_outside(owner: int) -> bool:
     """Return whether an owner is nobody of this user namespace, as the administrator is in a container without one."""
     with suppress(OSError, ValueError):
-        ranges = [
-            tuple(map(int, line.split())) for line in Path("/proc/self/uid_map").read_text().splitlines()
+        lines = Path("/proc/self/uid_map").read_text().splitlines()
+        mapped = [
+            range(first, first + count) for first, _, count in (map(int, line.split()) for line in lines)
         ]
-        has_root = any(first == 0 for first, _, _ in ranges)
-        is_mapped = any(first <= owner < first + count for first, _, count in ranges)
         overflow = int(Path("/proc/sys/kernel/overflowuid").read_text())
-        return owner == overflow and not has_root and not is_mapped
+        return owner == overflow and not any(user in users for users in mapped for user in (0, owner))
     return False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -24,13 +23,13 @@ def folder(name: str) -> Path:
 
 def package_files() -> list[Path]:
     """Return every file whose content decides what is generated, in a fixed order."""
-    code = [path for path in _files(PACKAGE, without=_INSTALLED) if path.endswith((".py", ".toml"))]
+    shipped = f"{_INSTALLED}{os.sep}"
+    code = [
+        path for path in _files(PACKAGE) if path.endswith((".py", ".toml")) and not path.startswith(shipped)
+    ]
     return [Path(path) for path in (*sorted(code), *sorted(_files(folder("templates"))))]
 
 
-def _files(top: Path, without: Path | None = None) -> Iterator[str]:
-    """Yield the files below a folder: every command looks, and pathlib would take ten times as long."""
-    for place, folders, names in os.walk(top):
-        if without is not None and place == str(without.parent):
-            folders[:] = [name for name in folders if name != without.name]
-        yield from (os.path.join(place, name) for name in names)  # noqa: PTH118
+def _files(top: Path) -> list[str]:
+    """Return the files below a folder: every command looks, and pathlib would take ten times as long."""
+    return [os.path.join(place, name) for place, _, names in os.walk(top) for name in names]  # noqa: PTH118

@@ -112,7 +112,7 @@ def runnable() -> tuple[str, ...]:
     from strapgen.thesis.thesis_tables import DEFAULT_BACKENDS
 
     try:
-        compiler.compiler()
+        compiler.C.path()
     except CompilerError as error:
         typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
         return ("numpy",)

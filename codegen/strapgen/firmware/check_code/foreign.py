@@ -5,7 +5,6 @@ What the function does wrong stays in the process that runs it: a crash or an en
 
 from __future__ import annotations
 
-import os
 import re
 import signal
 import subprocess
@@ -29,7 +28,7 @@ from strapgen.storage import cache, drafts
 PATIENCE = 20
 
 #: Without contraction to fused multiply-add every machine computes the same bits.
-_FLAGS = ("-O1", "-ffp-contract=off", "-g0", "-fvisibility=hidden")
+_FLAGS = ("-O1", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden")
 _MODULE = "strapgen_foreign"
 _DECLARATION = (
     "int strapgen_foreign_run(long calls, const double *identity, const double *input, double *output);"
@@ -73,17 +72,20 @@ def compile_foreign(source: ForeignSource) -> Path:
     CompilerError
         If there is no compiler, or the file or the call of the function does not compile: the first error.
     """
-    bridge = bridge_text(source)
-    suffix = ".cpp" if source.is_cpp else ".c"
+    bridge, of = bridge_text(source), compiler.COMPILERS["C++"] if source.is_cpp else compiler.C
     with drafts.temporary_folder() as folder:
-        text = folder / f"bridge{suffix}"
+        text = folder / f"bridge{of.ending}"
         text.write_text(bridge)
         preprocessed = _preprocessed(source, text)
-    key = cache.digest([preprocessed, bridge, compiler.build_key([], _FLAGS), os.environ.get("CXX", "")])
+    key = cache.digest([preprocessed, bridge, compiler.build_key([], _FLAGS), of.identity()])
 
     def fill(draft: Path) -> None:
         with timed("compile", source.function):
-            _compile(source, bridge, suffix, draft)
+            files, flags = {f"bridge{of.ending}": bridge}, [*_options(source), *_FLAGS]
+            if reasons := compiler.compile_module(
+                draft, _MODULE, files, _DECLARATION, _DECLARATION, flags, of
+            ):
+                raise CompilerError(_said(source, reasons))
 
     folder_of_build = cache.entry("builds", key, fill, f"compiled {source.function}")
     return next(path for path in folder_of_build.iterdir() if path.name.startswith(f"{_MODULE}."))
@@ -159,33 +161,16 @@ def _reason(status: int) -> str:
 def _preprocessed(source: ForeignSource, text: Path) -> str:
     """Return all that the compiler reads, headers included."""
     language = "c++" if source.is_cpp else "c"
-    command = [*compiler.command(), "-E", "-x", language, str(text)]
+    command = [*compiler.C.command(), "-E", "-x", language, str(text)]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
         raise CompilerError(_said(source, done.stderr.splitlines()))
     return done.stdout.replace(str(text), "bridge")
 
 
-def _compile(source: ForeignSource, bridge: str, suffix: str, draft: Path) -> None:
-    (draft / f"bridge{suffix}").write_text(bridge)
-    request = {
-        "name": _MODULE,
-        "cdef": _DECLARATION,
-        "header": _DECLARATION,
-        "sources": [str(draft / f"bridge{suffix}")],
-        "flags": [*_options(source), *_FLAGS],
-        "libraries": [] if sys.platform == "win32" else ["m"],
-        "folder": str(draft),
-    }
-    built, reasons = compiler.run_request(request)
-    if built is None:
-        raise CompilerError(_said(source, reasons))
-    compiler.leave_only(built, draft)
-
-
 def _options(source: ForeignSource) -> list[str]:
     """Return the options of $CC for a file in C++, which another command may compile."""
-    words = compiler.command() if source.is_cpp else []
+    words = compiler.C.command() if source.is_cpp else []
     return list(dropwhile(lambda word: not word.startswith("-"), words))
 
 

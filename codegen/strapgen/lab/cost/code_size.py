@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 import shutil
 import subprocess
 from contextlib import suppress
@@ -11,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from strapgen.ir.sources import Sources
-from strapgen.run.compiler import C_FLAGS, build_key, chosen_compiler, compiler
+from strapgen.run.compiler import C_FLAGS, C, build_key
 from strapgen.storage import cache, drafts
 
 #: Kind of cache entry that holds the size of object code, and its file.
@@ -39,7 +38,7 @@ def code_size(sources: Sources) -> int | None:
     """
     if not any(name.endswith(".c") for name in sources.files):
         return None
-    path, counter = compiler(), shutil.which("size")
+    words, counter = C.command(), shutil.which("size")
     if counter is None:
         return None
     key = build_key([sources], C_FLAGS)
@@ -47,7 +46,7 @@ def code_size(sources: Sources) -> int | None:
     if place is not None:
         with suppress(FileNotFoundError):  # another process has removed it meanwhile
             return int(cache.read(place, _SIZE))
-    size = _measured_size(sources, path, counter)
+    size = _measured_size(sources, words, counter)
     if size is not None:
         cache.entry(_SIZES, key, partial(_note_size, size))
     return size
@@ -57,14 +56,14 @@ def _note_size(size: int, draft: Path) -> None:
     (draft / _SIZE).write_text(str(size))
 
 
-def _measured_size(sources: Sources, path: str, counter: str) -> int | None:
+def _measured_size(sources: Sources, words: list[str], counter: str) -> int | None:
     """Return the size of compiled sources, measured by a program."""
     with drafts.temporary_folder() as folder:
         for name, text in sources.files.items():
             (folder / name).write_text(text)
         code = next(name for name in sources.files if name.endswith(".c"))
-        command = [*shlex.split(chosen_compiler() or path), *C_FLAGS, "-c", code, "-o", "code.o"]
-        if subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode:
+        compiling = [*words, *C_FLAGS, "-c", code, "-o", "code.o"]
+        if subprocess.run(compiling, cwd=folder, capture_output=True, check=False).returncode:
             return None
         said = subprocess.run([counter, "code.o"], cwd=folder, capture_output=True, text=True, check=False)
     match = re.match(r"\s*(\d+)\s", said.stdout.partition("\n")[2])
