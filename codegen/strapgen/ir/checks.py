@@ -354,8 +354,8 @@ def path(what: str, value: Any) -> Path:
 
     Raises
     ------
-    InputTypeError
-        If it is none.
+    InputError
+        If it is none, or holds a null character, which no name of a file has.
 
     Examples
     --------
@@ -364,4 +364,7 @@ def path(what: str, value: Any) -> Path:
     """
     if not isinstance(value, str | os.PathLike):
         raise InputTypeError(f"{what} is {shown(value)}; the path of a file is needed")
-    return Path(value)
+    place = Path(value)
+    if "\0" in str(place):
+        raise InputError(f"{what} is {shown(str(place))}; the path of a file is needed")
+    return place
