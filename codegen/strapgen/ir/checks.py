@@ -171,4 +171,7 @@ def path(what: str, value: Any) -> Path:
     """Return `value` as a path."""
     if not isinstance(value, str | os.PathLike):
         raise InputTypeError(f"{what} is {shown(value)}; the path of a file is needed")
-    return Path(value)
+    place = Path(value)
+    if "\0" in str(place):
+        raise InputError(f"{what} is {shown(str(place))}; the path of a file is needed")
+    return place

@@ -138,6 +138,11 @@ def test_a_damaged_entry_is_derived_again(derives, file, name, damage):
 
 #: Starts a process that ends at once, and waits for it.
 CHILD = "{}\nif not pid:\n    os._exit(0)\nos.waitpid(pid, 0)\nWORD = 'one'\n"
+#: Has another process work something out.
+WORKER = (
+    "import multiprocessing\nworker = multiprocessing.get_context('spawn').Process(target=abs, args=(1,))\n"
+    "worker.start()\nworker.join()\nWORD = worker.exitcode\n"
+)
 
 
 @pytest.mark.parametrize(
@@ -151,8 +156,14 @@ CHILD = "{}\nif not pid:\n    os._exit(0)\nos.waitpid(pid, 0)\nWORD = 'one'\n"
         "import os\n" + CHILD.format("pid, terminal = os.forkpty()"),
         "import os\nos.waitpid(os.posix_spawn('/bin/true', ['true'], {}), 0)\nWORD = 'one'\n",
         "import os\ntry:\n    os.execv(__file__ + '.none', ['none'])\nexcept OSError:\n    WORD = 'one'\n",
+        WORKER,
+        "import sqlite3\nsqlite3.connect(':memory:').close()\nWORD = 'one'\n",
+        "import ctypes\nWORD = ctypes.CDLL(None).abs(-1)\n",
     ],
-    ids=["listing", "pattern", "program", "writing", "fork", "terminal", "spawn", "exec"],
+    ids=[
+        *("listing", "pattern", "program", "writing", "fork", "terminal", "spawn", "exec"),
+        *("worker", "database", "library"),
+    ],
 )
 def test_what_depends_on_more_than_files_is_derived_every_time(derives, file, helper):
     beside(file, helper=helper)

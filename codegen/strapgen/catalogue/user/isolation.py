@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import site
+import stat
 import sys
 import sysconfig
 import threading
@@ -27,6 +28,7 @@ from strapgen.storage.resources import PACKAGE
 
 #: Audit events beyond reading a file. The files read cannot tell whether a kernel that depends on one has changed.
 _OUTSIDE = {
+    "ctypes.dlsym": "calls a compiled library",
     "os.listdir": "lists a folder",
     "os.scandir": "lists a folder",
     "os.exec": "starts a program",
@@ -37,6 +39,7 @@ _OUTSIDE = {
     "subprocess.Popen": "starts a program",
     "socket.connect": "asks the network",
     "socket.getaddrinfo": "asks the network",
+    "sqlite3.connect": "asks a database",
     "urllib.Request": "asks the network",
 }
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
@@ -193,6 +196,9 @@ def _watch(event: str, arguments: tuple[Any, ...]) -> None:
         return
     path, _, flags = arguments
     if isinstance(path, int):
+        # `multiprocessing` starts a process without an event, and writes to it by a pipe.
+        if not stat.S_ISREG(os.fstat(path).st_mode):
+            record.outside = "asks another process, by a pipe"
         return
     place = os.path.realpath(os.fsdecode(path))
     if place.startswith(_roots()):

@@ -196,10 +196,13 @@ def _require_file(name: str, values: Mapping[str, Any]) -> None:
 
 
 def _regular(word: str) -> Path:
-    """Return a path; one that is there must be a regular file, since others can wait or have effects."""
+    """Return a path; one that is there must be a regular file, since others can wait or have effects.
+
+    Files of the kernel, which can wait too, have no size.
+    """
     path = Path(word)
-    if path.exists() and not path.is_file():
-        raise InputError(f"{word} in the header's command is no regular file")
+    if path.exists() and not (path.is_file() and path.stat().st_size):
+        raise InputError(f"{word} in the header's command is no regular file, or empty")
     return path
 
 
