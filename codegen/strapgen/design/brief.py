@@ -64,6 +64,13 @@ class GyroBrief:
     bandwidth_hz: Fraction | None = None
     damping: Fraction | None = None
 
+    def gain(self, frequency_hz: Any) -> Any:
+        """Return the complex factor by which it passes on an oscillation at a frequency, or at many, in Hz."""
+        if self.bandwidth_hz is None or self.damping is None:
+            return 1.0 + 0.0 * frequency_hz
+        ratio = frequency_hz / float(self.bandwidth_hz)
+        return 1 / (1 - ratio**2 + 2j * float(self.damping) * ratio)
+
 
 @dataclass(frozen=True)
 class BudgetBrief:
@@ -295,5 +302,5 @@ def _lines(value: Any) -> tuple[Line, ...]:
             for key in ("theta_x_rad", "theta_y_rad", "acceleration_y_m_s2")
         ]
         phase = float(checks.number(f"{where}phase_rad", one.get("phase_rad", 0)))
-        lines.append(Line(float(frequency), sizes[0], sizes[1], phase, sizes[2]))
+        lines.append(Line(frequency, sizes[0], sizes[1], phase, sizes[2]))
     return tuple(lines)

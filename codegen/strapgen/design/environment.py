@@ -63,7 +63,8 @@ class Line:
 
     Parameters
     ----------
-    frequency_hz : float
+    frequency_hz : float or Fraction
+        Exact for a line of a brief.
     theta_x, theta_y : float
         Amplitudes X and Y in rad.
     phase : float
@@ -72,7 +73,7 @@ class Line:
         Amplitude of the acceleration along y in m/s^2, of the phase P.
     """
 
-    frequency_hz: float
+    frequency_hz: float | Fraction
     theta_x: float
     theta_y: float
     phase: float
@@ -98,7 +99,7 @@ class LineEnvironment:
     @property
     def highest_hz(self) -> float:
         """The highest frequency in Hz."""
-        return max(line.frequency_hz for line in self.stated)
+        return float(max(line.frequency_hz for line in self.stated))
 
     def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the error of the mean rate, see `Environment.error`."""

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from strapgen.analysis.vibration.gyro import through_gyros as through_gyros
     from strapgen.analysis.vibration.mean_rates import Assessment as Assessment
     from strapgen.analysis.vibration.mean_rates import Rates as Rates
+    from strapgen.analysis.vibration.rectification import Rectification as Rectification
+    from strapgen.analysis.vibration.rectification import Tone as Tone
+    from strapgen.analysis.vibration.rectification import rectified as rectified
     from strapgen.analysis.vibration.spectrum import RandomRates as RandomRates
     from strapgen.analysis.vibration.spectrum import Spectrum as Spectrum
     from strapgen.analysis.vibration.spectrum import random_rates as random_rates
@@ -24,11 +27,14 @@ __all__ = [
     "Assessment",
     "RandomRates",
     "Rates",
+    "Rectification",
     "Spectrum",
+    "Tone",
     "drift",
     "of",
     "random_rates",
     "read_spectrum",
+    "rectified",
     "sculling",
     "through_gyro",
     "through_gyros",
@@ -45,6 +51,9 @@ _MODULES = {
     "through_gyros": "gyro",
     "Assessment": "mean_rates",
     "Rates": "mean_rates",
+    "Rectification": "rectification",
+    "Tone": "rectification",
+    "rectified": "rectification",
     "RandomRates": "spectrum",
     "Spectrum": "spectrum",
     "random_rates": "spectrum",

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from strapgen.analysis.vibration import assessment
+from strapgen.analysis.vibration.rectification import Rectification, rectified
 from strapgen.catalogue import Choice
 from strapgen.design.brief import DesignBrief
 from strapgen.design.selection import causes
@@ -68,7 +69,10 @@ class Algorithm(Protocol):
         """Return the drift of a steady turn at the largest rate."""
 
     def coning(self) -> float:
-        """Return the drift under the vibration."""
+        """Return the drift under the vibration, to second order in its angles."""
+
+    def rectification(self) -> Rectification:
+        """Return the error of the mean rate under lines, to fourth order in their angles."""
 
     def line_errors(self) -> list[float]:
         """Return the signed errors whose sum is the drift under lines, see `causes.line_errors`."""
@@ -130,6 +134,10 @@ class AttitudeStep:
     def coning(self) -> float:
         """Return the drift under the vibration, see `causes.coning`."""
         return causes.coning(self.choice, self._brief)
+
+    def rectification(self) -> Rectification:
+        """Return the error of the mean rate under lines, see `rectified`."""
+        return rectified(self.choice, self.step, causes.tones(self._brief))
 
     def line_errors(self) -> list[float]:
         """Return the errors that add up, see `causes.line_errors`."""

@@ -7,6 +7,7 @@ walk leave after the time of the budget. All are lengths of vectors in deg/h.
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -17,6 +18,7 @@ import mpmath
 from strapgen.analysis.vibration import assessment
 from strapgen.analysis.vibration.gyro import through_gyro
 from strapgen.analysis.vibration.mean_rates import Assessment
+from strapgen.analysis.vibration.rectification import Tone
 from strapgen.catalogue import Choice
 from strapgen.design.brief import DesignBrief, GyroBrief
 from strapgen.design.environment import LineEnvironment
@@ -34,6 +36,8 @@ _PI = Fraction(31415926535897932384626433, 10**25)
 CARRIES = ("none", "full")
 #: Bits of a word that are not behind the point of a state.
 _STATE_PLACES = 2
+#: Most lines whose sums and differences are searched for resonances.
+MOST_LINES = 40
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,7 @@ def truncation(choice: Choice, brief: DesignBrief) -> float:
 
 
 def coning(choice: Choice, brief: DesignBrief) -> float:
-    """Return the drift in deg/h that an algorithm computes under the vibration, less the true one.
+    """Return the drift in deg/h that an algorithm computes under the vibration, less the true one, to second order.
 
     Raises
     ------
@@ -143,6 +147,21 @@ def line_errors(
     plain, seen = (brief.environment.errors(one, step, cycles) for one in (assessed, _seen(assessed, brief)))
     return [
         DEG_H * error for error in (*plain, *(both - alone for both, alone in zip(seen, plain, strict=True)))
+    ]
+
+
+def tones(brief: DesignBrief) -> list[Tone]:
+    """Return the lines of a brief as its gyro passes them on; none under another vibration, or too many lines."""
+    environment = brief.environment
+    if not isinstance(environment, LineEnvironment) or len(environment.stated) > MOST_LINES:
+        return []
+    return [
+        Tone(
+            line.frequency_hz,
+            (-1j * line.theta_x, -1j * line.theta_y * cmath.exp(1j * line.phase), 0),
+            brief.gyro.gain(float(line.frequency_hz)),
+        )
+        for line in environment.stated
     ]
 
 

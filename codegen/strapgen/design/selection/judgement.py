@@ -10,6 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from strapgen.analysis.vibration.rectification import Rectification
+from strapgen.analysis.vibration.resonances import DEGREE
 from strapgen.design.brief import DesignBrief, read_brief
 from strapgen.design.selection import causes
 from strapgen.design.selection.algorithm import Algorithm
@@ -55,6 +57,8 @@ class Judgement:
         Why it meets the brief by errors that cancel, and so for these very lines alone; empty if it does not.
     run_deg_h : dict of str to float or None
         Drift by cause in a run in time; None where it was not run.
+    coning_parts_deg_h : dict of str to float or None
+        The largest drift under lines of each order in their angles, "2" to "4"; None where it was not looked at.
     """
 
     name: str
@@ -75,6 +79,7 @@ class Judgement:
     bytes: float | None = None
     fragile: str = ""
     run_deg_h: dict[str, float] | None = None
+    coning_parts_deg_h: dict[str, float] | None = None
 
     @property
     def software_deg_h(self) -> float:
@@ -110,6 +115,7 @@ class _Look:
     drift: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(CAUSES))
     figures: dict[str, float | None] = field(default_factory=dict)
     unknown: dict[str, str] = field(default_factory=dict)
+    coning_parts: dict[str, float] | None = None
     rounding: Rounding = field(default_factory=lambda: Rounding(None, causes.CARRIES[0]))
 
     @property
@@ -221,6 +227,8 @@ def judge(
             look.drift["coning"] = second_order(algorithm.coning)
         if not look.excesses() and brief.budget.limits_velocity:
             _look_at_velocity(look, second_order(algorithm.sculling))
+        if not look.excesses() and causes.tones(brief):
+            _look_at_higher_orders(look, algorithm.rectification())
     except InputError as error:
         look.unknown["coning"] = str(error)
     if not look.excesses():
@@ -254,6 +262,7 @@ def judge(
         figures.get("instructions_per_s"),
         figures.get("bytes"),
         _cancellation(look, second_order(algorithm.line_errors)) if binding is None else "",
+        coning_parts_deg_h=look.coning_parts,
     )
 
 
@@ -286,6 +295,12 @@ def _cancellation(look: _Look, errors: list[float]) -> str:
         f"errors of up to {max(map(abs, errors)):.2g} deg/h, of the algorithm and of the gyro at "
         f"{len(errors) // 2} line{'s' if len(errors) > 2 else ''}, cancel to {look.drift['coning'] or 0.0:.2g} deg/h"
     )
+
+
+def _look_at_higher_orders(look: _Look, found: Rectification) -> None:
+    """Put the largest drift under lines, at whatever phases they begin, in the place of that of second order."""
+    look.drift["coning"] = found.worst() * causes.DEG_H
+    look.coning_parts = {str(order): found.worst(order) * causes.DEG_H for order in range(2, DEGREE + 1)}
 
 
 def _look_at_velocity(look: _Look, error: float | None) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapgen.design.brief import DesignBrief, GyroBrief
 from strapgen.design.environment import Line
@@ -129,20 +130,21 @@ def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
 @lru_cache(maxsize=2)
 def _vibration(lines: tuple[Line, ...], gyro: GyroBrief) -> Vibration:
     """Return the motion of lines, seen by a gyro, once for all algorithms of a brief."""
-    omega = 2 * np.pi * np.array([line.frequency_hz for line in lines])
+    hertz = np.array([float(line.frequency_hz) for line in lines])
+    omega = 2 * np.pi * hertz
     still = np.zeros_like(omega)
     sizes = np.array([[line.theta_x, line.theta_y] for line in lines]).T
-    # Lines begin at phases that have nothing to do with each other, so that they never all add up.
-    begin = 2 * np.pi * (math.sqrt(2) * np.arange(1, len(lines) + 1) % 1)
-    phases = begin + np.array([still, [line.phase for line in lines], still])
+    phases = start_phases(len(lines)) + np.array([still, [line.phase for line in lines], still])
     # The angle X sin(wt) has the rate X w cos(wt).
     rates = CosineSum(np.array([*sizes, still]) * omega, np.tile(omega, (_AXES, 1)), phases)
-    measured = rates
-    if gyro.bandwidth_hz is not None and gyro.damping is not None:
-        ratio = omega / (2 * np.pi * float(gyro.bandwidth_hz))
-        gain = 1 / (1 - ratio**2 + 2j * float(gyro.damping) * ratio)
-        measured = replace(rates, amplitudes=rates.amplitudes * np.abs(gain), phases=phases + np.angle(gain))
+    gain = gyro.gain(hertz)
+    measured = replace(rates, amplitudes=rates.amplitudes * np.abs(gain), phases=phases + np.angle(gain))
     return Vibration(rates=rates, measured=measured)
+
+
+def start_phases(count: int) -> NDArray[np.float64]:
+    """Return phases in rad at which lines begin: they have nothing to do with each other, and never all add up."""
+    return np.asarray(2 * np.pi * (math.sqrt(2) * np.arange(1, count + 1) % 1), np.float64)
 
 
 def algorithm_named(judgement: Judgement, brief: DesignBrief, path: str | Path) -> Algorithm:
@@ -208,8 +210,7 @@ def _largest_turn(brief: DesignBrief) -> Motion:
 def confirmed(brief: DesignBrief, path: str | Path, ordered: Iterable[Judgement]) -> list[Judgement]:
     """Run algorithms that meet a brief, the cheapest first, until one meets it in its run too.
 
-    A prediction is of second order in the angles of the vibration. What is of higher order shows in the run alone:
-    where a frequency is the sum of two others, and at angles of some tenths of a degree.
+    What is above fourth order in the angles of lines, and above second order under a spectrum, shows in a run alone.
 
     Parameters
     ----------

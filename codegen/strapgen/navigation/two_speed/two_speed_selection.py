@@ -11,14 +11,17 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import mpmath
 import numpy as np
 import sympy as sp
 
+from strapgen import pipeline
 from strapgen.analysis.vibration import assessment
+from strapgen.analysis.vibration.rectification import Rectification, Sampling, of_transition
+from strapgen.analysis.vibration.resonances import DEGREE, Oscillations
 from strapgen.catalogue import Choice
 from strapgen.design.brief import DesignBrief
 from strapgen.design.selection import causes
@@ -29,6 +32,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
+from strapgen.kernel import power_series
+from strapgen.kernel.power_series import Powers
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.simulate.runs import Run, drift_between
 from strapgen.lab.step_series.quantization_noise import polynomial_noise
@@ -142,11 +147,34 @@ class TwoSpeedLoops:
         return abs(float(lost)) / float(self.step) * causes.DEG_H
 
     def coning(self) -> float:
-        """Return the drift under the vibration, of both loops together in closed form."""
+        """Return the drift under the vibration, of both loops together in closed form, to second order."""
         return (
             causes.mean_error(assessment.two_speed("drift"), self.brief, self.step, self.increments)
             * causes.DEG_H
         )
+
+    def rectification(self) -> Rectification:
+        """Return the error of the mean rate under lines, of a slow cycle as one step; see `rectified`."""
+        sampling = Sampling(self.step, self.increments, range(-self.previous, self.increments))
+        return of_transition(self._transition, sampling, causes.tones(self.brief))
+
+    def _transition(self, samples: list[list[Powers]], ring: Oscillations) -> list[Powers]:
+        """Return the direction cosine matrix after a slow cycle from no rotation, row by row."""
+
+        def outputs(name: str, *inputs: Sequence[Powers]) -> dict[str, list[Powers]]:
+            kernel = pipeline.derive(Choice(name))
+            elements = [element for signal in kernel.inputs for element in signal.elements]
+            values = [value for vector in inputs for value in vector]
+            return power_series.outputs(kernel, dict(zip(elements, values, strict=True)), ring, DEGREE)
+
+        vector = _rotation_vector(samples, partial(outputs, _FAST), self._programs["vector"])
+        unit = range(0, 9, 4) if self.state == "dcm" else (3,)
+        size = 9 if self.state == "dcm" else 4
+        start = [power_series.constant(ring, int(k in unit), DEGREE) for k in range(size)]
+        (after,) = outputs(f"{self.state}-update", start, vector).values()
+        if self.state != "dcm":
+            (after,) = outputs("dcm-from-euler", after).values()
+        return after
 
     def line_errors(self) -> list[float]:
         """Return the errors that add up, see `causes.line_errors`."""
