@@ -238,7 +238,7 @@ class Naming:
     def _text(self) -> str:
         return self.name or self.prefix or ""
 
-    def of(self, program: Program) -> Program:
+    def of(self, program: _P) -> _P:
         """Return a program with the name.
 
         Raises
@@ -248,6 +248,8 @@ class Naming:
         """
         if not self.option:
             return program
+        if isinstance(program, FixedProgram):
+            return replace(program, program=self.of(program.program))
         chosen = replace(
             program,
             function=self._text if self.prefix is None else f"{self._text}{{}}",
