@@ -65,12 +65,12 @@ def _names(step) -> list[str]:
 
 def write_strapgen(step, folder: Path) -> int:
     """Write the Jacobians of strapgen, and return how many numbers they are."""
+    from strapgen import pipeline
     from strapgen.catalogue import choose
-    from strapgen.run import generated_sources
 
     algorithm, method, increments, previous, _ = step
     choice = choose(f"{algorithm}-jacobian", method, increments, previous=previous or None)
-    sources = generated_sources.sources(choice, "c", None)
+    sources = pipeline.compile(choice, "c", None)
     for name, text in sources.files.items():
         (folder / name).write_text(text)
     function = sources.function

@@ -17,14 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.lab.cost import cost
 from strapgen.lab.cost.cost import Cost
 from strapgen.lab.cost.processors import PROCESSORS
-from strapgen.run import generated_sources
 
 HERE = Path(__file__).resolve().parent / "fixed_point"
 BY_HAND = "by hand"
@@ -50,7 +49,7 @@ def sources(algorithm: str, column: str) -> Sources:
     """Return the files of a step as a column of the tables has it."""
     target, word = COLUMNS[column]
     settings = Settings.of(word=word, max_rate_deg_s=400, step="0.01", increments=2) if word else None
-    generated = generated_sources.sources(catalogue.choose_step(algorithm, "rk4", 2), target, settings)
+    generated = pipeline.compile(catalogue.choose_step(algorithm, "rk4", 2), target, settings)
     if column != BY_HAND:
         return generated
     files = {name: (HERE / name).read_text() for name in ("by_hand.h", "by_hand.c")}
@@ -96,7 +95,7 @@ def errors(column: str, count: int = 2000) -> tuple[float, float]:
     e = np.rint(attitudes / float(state.format.unit)).astype(np.int32)
     d = rng.integers(increments.low, increments.high, (count, 6), endpoint=True).astype(np.int32)
     d[::2] = rng.choice([increments.low, increments.high], (len(d[::2]), 6))
-    program = generated_sources.program(catalogue.choose_step("euler", "rk4", 2))
+    program = pipeline.program(catalogue.choose_step("euler", "rk4", 2))
     apart = []
     for one, angles, result in zip(e, d, _called(sources("euler", column), e, d), strict=True):
         numbers = ([int(x) * a.format.unit for x in row] for row, a in ((one, state), (angles, increments)))

@@ -119,7 +119,7 @@ def main() -> None:
         for word in (16, 32):
             for way, more in WAYS.items():
                 settings = Settings.of(word=word, **stated, **more)
-                sources = strapgen.run.generated_sources.sources(choice, "c-fixed", settings)
+                sources = strapgen.pipeline.compile(choice, "c-fixed", settings)
                 executed = cost(sources, "cortex-m0").executed
                 result = sources.fixed.outputs[-1]
                 places = float(max(result.errors) / result.format.unit)

@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 
 import strapgen
+from strapgen import pipeline
 from strapgen.catalogue import choose
-from strapgen.run import compiler, generated_sources
+from strapgen.run import compiler
 
 #: Runs side by side, and the steps of each.
 RUNS, STEPS = 10_000, 20
@@ -49,7 +50,7 @@ def least(candidates: dict, rounds: int, clock=time.perf_counter) -> dict[str, f
 
 def built(folder: Path, narrow: bool) -> ctypes.CDLL:
     """Return the loops and the chain, compiled into one library; narrow ones take no instructions beyond SSE2."""
-    sources = generated_sources.sources(choose("euler"), "c")
+    sources = pipeline.compile(choose("euler"), "c")
     for name, text in sources.files.items():
         chosen = re.sub(r"__builtin_cpu_supports\(.*?\)", "0", text) if narrow else text
         (folder / name).write_text(chosen)

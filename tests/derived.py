@@ -10,14 +10,13 @@ import numpy as np
 import sympy as sp
 from scipy.spatial.transform import Rotation
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel, evaluate_stages
-from strapgen.run import generated_sources
 from strapgen.run.backends import BACKENDS, fitted
 from strapgen.run.kernel_sources import sources_of_program
 
@@ -42,12 +41,12 @@ def kernel(choice: Choice) -> Kernel:
 
 
 def program(choice: Choice) -> Program:
-    return generated_sources.program(choice)
+    return pipeline.program(choice)
 
 
 def quantized(choice: Choice, settings: Settings) -> FixedProgram:
     """Return a kernel of the catalogue in fixed point."""
-    return generated_sources.fixed_program(choice, settings)
+    return pipeline.fixed_program(choice, settings)
 
 
 @cache

@@ -85,8 +85,8 @@ class _Loader(importlib.machinery.SourceFileLoader):
         super().exec_module(module)
         if module.__name__ == "strapgen.storage.cache":
             _note_entries(module)
-        elif module.__name__ == "strapgen.run.generated_sources":
-            _note_programs(module)
+        elif module.__name__ == "strapgen.storage.stage_cache":
+            _note_results(module)
 
 
 @_real_lru_cache
@@ -193,19 +193,18 @@ def _note_entries(cache: ModuleType) -> None:
     cache.entry, cache.lookup = entered, looked_up
 
 
-def _note_programs(sources: ModuleType) -> None:
-    """Count what filled the entry of a program where a process has it in memory."""
-    program, cache = sources.program, sources.cache
+def _note_results(stages: ModuleType) -> None:
+    """Count what filled the entry of a stage's result where a process has it in memory."""
+    remembered = stages._remembered
 
-    @functools.wraps(program)
-    def called(choice: Any) -> Any:
-        result = program(choice)
-        file = _notes("programs", cache.digest([cache.generator_digest(), choice.identity]))
-        if file.exists():
+    @functools.wraps(remembered)
+    def called(kind: str, key: str, *rest: Any) -> Any:
+        result = remembered(kind, key, *rest)
+        if (file := _notes(kind, key)).exists():
             _count(_known(file))
         return result
 
-    sources.program = called
+    stages._remembered = called
 
 
 # The plugin

@@ -6,11 +6,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.run import compiler, generated_sources
+from strapgen.run import compiler
 from strapgen.run.backends import of_sources
 from strapgen.run.fixed import FixedEvaluator
 
@@ -29,9 +30,7 @@ SAMPLES = 40
 def check_bits_of_c(choices: Iterable[Choice], target: str, c: str, rng: np.random.Generator) -> None:
     """Check that kernels return on a target, as one library, the very bits that C returns."""
     choices = list(choices)
-    compiled, other = (
-        [generated_sources.sources(choice, name) for choice in choices] for name in (target, c)
-    )
+    compiled, other = ([pipeline.compile(choice, name) for choice in choices] for name in (target, c))
     compiler.compile_together(compiled)
     compiler.compile_together(other)
     differing = []
@@ -62,10 +61,7 @@ def check_integers_of_c(
     choices: Iterable[Choice], target: str, settings: Settings, rng: np.random.Generator
 ) -> None:
     """Check that kernels return on a target the integers and the residuals of C, or refuse the same samples."""
-    both = [
-        [generated_sources.sources(choice, name, settings) for name in (target, "c-fixed")]
-        for choice in choices
-    ]
+    both = [[pipeline.compile(choice, name, settings) for name in (target, "c-fixed")] for choice in choices]
     compiler.compile_together(sources for pair in both for sources in pair)
     pairs = [[of_sources(sources) for sources in pair] for pair in both]
     accepted = 0

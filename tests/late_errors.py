@@ -9,12 +9,12 @@ from functools import cache
 import mpmath
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.design.commit_late import commit_late_sources
 from strapgen.design.commit_late.commit_late_sources import LateSources
 from strapgen.design.commit_late.late_filters import polynomial
 from strapgen.design.commit_late.late_unit_fixed import LateUnitOnIntegers, state_argument
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 from strapgen.run.exact import DIGITS, Interpreter, number
 
 #: Samples as integers, three axes each.
@@ -46,7 +46,7 @@ class Exact:
     def __init__(self, sources: LateSources, algorithm: str = "euler") -> None:
         self.sources = sources
         choices = commit_late_sources.kernels(sources.filters, algorithm)
-        self.step, self.rotation = (Interpreter(generated_sources.program(choice)) for choice in choices[:2])
+        self.step, self.rotation = (Interpreter(pipeline.program(choice)) for choice in choices[:2])
         self.unit = state_argument(sources.step).format.unit
         assert sources.step.fixed is not None and sources.fixed is not None
         self.sample = Fraction(2) ** -sources.fixed.fraction

@@ -21,6 +21,7 @@ from typing import Any
 
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice, choose
 from strapgen.catalogue.method_names import ALGORITHMS, METHODS, VECTORS
 from strapgen.catalogue.methods.windows import named_window
@@ -28,7 +29,7 @@ from strapgen.catalogue.names import KERNELS
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.run import compiler, generated_sources
+from strapgen.run import compiler
 from strapgen.run.compiler import COMPILERS
 from strapgen.storage import cache
 from strapgen.targets import TARGETS
@@ -70,7 +71,7 @@ def line(sources: Sources) -> str | None:
     if choice is None:
         return None
     try:
-        again = generated_sources.sources(choice, sources.target, settings)
+        again = pipeline.compile(choice, sources.target, settings)
     except InputError:
         return None
     if again.files != sources.files:
@@ -94,7 +95,7 @@ def sources_of(entry: list[Any]) -> Sources | None:
     kernel, target, settings = entry
     choice = choice_by_name(kernel)
     try:
-        return choice and generated_sources.sources(choice, target, settings_of(settings))
+        return choice and pipeline.compile(choice, target, settings_of(settings))
     except (InputError, TypeError):
         return None
 

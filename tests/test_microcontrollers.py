@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 from derived import FIXED_POINT
 
+from strapgen import pipeline
 from strapgen.lab.cost import cost
 from strapgen.lab.cost.cost import EVERYWHERE, REFERENCE, Cost
 from strapgen.lab.cost.cost_report import catalogue_report
 from strapgen.lab.cost.processors import PROCESSORS
-from strapgen.run import generated_sources
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "microcontrollers.md").read_text()
@@ -114,7 +114,7 @@ def test_the_page_of_the_catalogue_is_what_is_measured(cpu, part):
     pages = {one.kernel: one for one in rows() if one.cpu == cpu}
     for choice in FIXED_POINT:
         if choice.kernel in pages and (part == "steps") == (choice.method is not None):
-            sources = generated_sources.sources(choice, "c-fixed")
+            sources = pipeline.compile(choice, "c-fixed")
             assert cost.cost(sources, cpu) == pages[choice.kernel]
 
 

@@ -16,7 +16,7 @@ from strapgen import pipeline, targets
 from strapgen.catalogue import Choice, choose
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
-from strapgen.run import generated_sources
+from strapgen.storage import stage_cache
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
 #: The modules of the stages themselves.
@@ -31,7 +31,7 @@ TRIP = {
     "strapgen.catalogue.choosing",
     "strapgen.catalogue.choice",
     "strapgen.cli.fixed_options",
-    "strapgen.run.generated_sources",
+    "strapgen.storage.stage_cache",
     "strapgen.run.generation",
     "strapgen.pipeline",
 }
@@ -41,7 +41,6 @@ TRIP = {
 def empty_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Let everything be derived anew: no entry on disk, no program in memory."""
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(generated_sources, "_programs", {})
     return tmp_path
 
 
@@ -164,7 +163,7 @@ def test_verbose_shows_stages_on_stderr_and_what_the_cache_holds(empty_cache, ca
         r"generate euler-rk4-2 for c: \d+\.\d{3} s\n",
         first.err,
     )
-    generated_sources._entries.clear()  # as another process
+    stage_cache._results.clear()  # as another process
     run("--verbose", *words)
     second = capsys.readouterr()
     assert second.err == "sources of euler-rk4-2 for c: from the cache\n"

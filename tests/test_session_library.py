@@ -8,9 +8,9 @@ import pytest
 import session_library
 from session_library import choice_by_name, line, settings_of
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 from strapgen.targets import TARGETS
 
 
@@ -33,7 +33,7 @@ def test_every_line_of_a_forecast_can_be_read(which):
     ],
 )
 def test_a_line_leads_to_the_sources_that_it_was_written_for(target, settings):
-    sources = generated_sources.sources(choose("euler", "rk1", 1), target, settings)
+    sources = pipeline.compile(choose("euler", "rk1", 1), target, settings)
     text = line(sources)
     again = session_library.sources_of(json.loads(text))
     assert again.files == sources.files

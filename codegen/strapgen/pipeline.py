@@ -2,6 +2,9 @@
 
 choice --derive--> Kernel --lower--> Program --quantize--> FixedProgram --generate--> Sources
 
+What `compile`, `fixed_program` and `program` return is cached. A second use loads neither SymPy nor Jinja, another
+target or other settings of a kernel derive nothing again, and the integer model has the integers of the C.
+
 The formulas of a kernel are exact. A program is straight-line code; fixed point alone quantizes it, to integers with
 proved ranges and error bounds. `strapgen.build` makes a back end of the sources, `strapgen.simulate` tests it.
 """
@@ -9,7 +12,7 @@ proved ranges and error bounds. `strapgen.build` makes a back end of the sources
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
@@ -22,6 +25,8 @@ from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.ir.suggestions import some
 from strapgen.ir.timing import timed
+from strapgen.storage.stage_cache import cached
+from strapgen.targets.names import UNNAMED, Naming
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,24 +35,37 @@ if TYPE_CHECKING:
     from strapgen.ir.recipe import Description
     from strapgen.kernel.kernel import Kernel
 
-
-def lowered(choice: Choice) -> Program:
-    """Derive a choice and lower it: the program that all targets share."""
-    return lower(derive(choice))
+_DEFAULTS = Settings()
 
 
-def compile(
-    choice: Choice,
-    target: str,
-    settings: Settings | None = None,
-    lowered: Callable[[Choice], Program] = lowered,
-    quantized: Callable[[Choice, Settings | None], FixedProgram] | None = None,
-) -> Sources:
-    """Compile a choice for a target; `lowered` and `quantized` return its programs, for instance from a cache."""
+def _target_code(target: str, settings: Settings | None, naming: Naming) -> str:
+    """Refuse a target that does not go with the settings or the name; return a hash of an installed one's code."""
     _require_target(target, settings)
-    if not targets.TARGETS[target].fixed:
-        return generate(lowered(choice), target)
-    return generate(quantized(choice, settings) if quantized else quantize(lowered(choice), settings), target)
+    if naming.option and not targets.TARGETS[target].nameable:
+        raise InputError(f"{naming.option} goes with targets in C, C++, Rust and MATLAB, not with {target}")
+    return targets.registry.identity(target)
+
+
+@cached("sources", "sources of {0.kernel} for {1}", depends=_target_code, copies=True)
+def compile(
+    choice: Choice, target: str, settings: Settings | None = None, naming: Naming = UNNAMED
+) -> Sources:
+    """Compile a choice for a target; a user may name the functions of its code."""
+    if targets.TARGETS[target].fixed:
+        return generate(naming.of(fixed_program(choice, settings or _DEFAULTS)), target)
+    return generate(naming.of(program(choice)), target)
+
+
+@cached("fixed-programs", "integers of {0.kernel}")
+def fixed_program(choice: Choice, settings: Settings = _DEFAULTS) -> FixedProgram:
+    """Return the program of a choice in integers, which all targets of fixed point share."""
+    return quantize(program(choice), settings)
+
+
+@cached("programs", "program of {0.kernel}")
+def program(choice: Choice) -> Program:
+    """Return the program of a choice, which all targets share."""
+    return lower(derive(choice))
 
 
 def derive(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.analysis import vibration
 from strapgen.analysis.series.constant_rate import constant_rate
 from strapgen.analysis.series.prediction import predict
@@ -27,7 +27,6 @@ from strapgen.kernel.kernel import Kernel
 from strapgen.lab.compare.comparison import compare
 from strapgen.lab.converge.convergence import converge
 from strapgen.lab.motions.motions import GENERAL
-from strapgen.run import generated_sources
 from strapgen.run.backends import backend
 
 #: A file whose kernel has one name, whatever its options are: Euler parameters by a tableau.
@@ -214,7 +213,7 @@ def test_the_same_tableau_in_two_files_is_generated_by_two_commands(tmp_path):
         file.parent.mkdir()
         file.write_text(text)
         choice = catalogue.choose("euler", tableaux.read(file), 1)
-        (code,) = generated_sources.sources(choice, "numpy").files.values()
+        (code,) = pipeline.compile(choice, "numpy").files.values()
         assert f"--tableau {file} " in " ".join(code.split())
 
 

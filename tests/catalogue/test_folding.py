@@ -13,12 +13,12 @@ from gathering import each
 from precisions import single
 
 import strapgen
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.instruments.gyro_model import source_structure
 from strapgen.navigation.instruments.imu_errors import imu_compensate
-from strapgen.run import generated_sources
 
 #: No term of the error model has products of increments.
 NO_PRODUCTS = {
@@ -148,7 +148,7 @@ def test_every_back_end_takes_the_constants(backend_name, rng):
         (bound,) = evaluator.sources.fixed.outputs[0].errors
     else:
         target = "c-float" if single(backend_name) else "c"  # the operations are the same on all targets
-        (bound,) = generated_sources.sources(choice, target).rounding.errors["compensated"]
+        (bound,) = pipeline.compile(choice, target).rounding.errors["compensated"]
     assert bound < 1e-3
     for _ in range(20):
         inputs = drawn(choice, rng, 8192)
@@ -216,9 +216,7 @@ def test_choices_with_other_constants_are_other_choices():
     assert one != other and one.identity != other.identity != choose("temperature-coefficient").identity
     assert choose("temperature-coefficient", constants={}) == choose("temperature-coefficient")
     assert pickle.loads(pickle.dumps(one)) == one
-    texts = {
-        "".join(generated_sources.sources(choice, "numpy").files.values()) for choice in (one, other, same)
-    }
+    texts = {"".join(pipeline.compile(choice, "numpy").files.values()) for choice in (one, other, same)}
     assert len(texts) == 2
 
 

@@ -172,9 +172,7 @@ def test_length_of_a_row_is_rounded_up():
 def test_transition_stretches_by_what_its_series_leaves_out():
     """At 1/4 rad the rotation vector is at least sqrt(3)/4 long, and a series to second order leaves out its third."""
     late = parts("window-3-3")
-    program = commit_late_sources.generated_sources.program(
-        commit_late_sources.kernels(late.filters, "euler")[1]
-    )
+    program = commit_late_sources.pipeline.program(commit_late_sources.kernels(late.filters, "euler")[1])
     stretch = commit_late_bounds._stretch(
         late.filters,
         late.fixed,

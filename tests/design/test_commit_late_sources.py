@@ -16,8 +16,8 @@ from strapgen.design.commit_late.commit_late_sources import NORMALIZATIONS, TARG
 from strapgen.evidence import style
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.pipeline import program
 from strapgen.run.generated_files import command_of
-from strapgen.run.generated_sources import program
 
 WINDOW = WINDOWS["window-3-3"]
 GYRO = replace(WINDOW, gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction(100)))

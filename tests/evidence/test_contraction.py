@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from derived import program
 
+from strapgen import pipeline
 from strapgen.catalogue import choose_step
-from strapgen.run import generated_sources
 
 CPU = Path("/proc/cpuinfo")
 pytestmark = pytest.mark.skipif(
@@ -29,7 +29,7 @@ STEP = choose_step("euler", "rk4", 2)
 
 def results(folder: Path, inputs: list[np.ndarray], *flags: str) -> np.ndarray:
     """Return what the C computes when it is compiled with some flags."""
-    sources = generated_sources.sources(STEP, "c")
+    sources = pipeline.compile(STEP, "c")
     for name, text in sources.step_files.items():
         (folder / name).write_text(text)
     name = sources.function.name

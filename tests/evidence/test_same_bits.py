@@ -151,9 +151,7 @@ def test_the_random_part_reaches_both_ends_of_every_range():
             seen.append(tuple(elements))
             return super().call(elements, feedback)
 
-    model = same_bits.ModelEvaluator(
-        same_bits.generated_sources.sources(subject.choice, same_bits.MODEL, None)
-    )
+    model = same_bits.ModelEvaluator(same_bits.pipeline.compile(subject.choice, same_bits.MODEL, None))
     same_bits._random(Noted(subject, run, model))
     for place, (low, high) in enumerate(run.limits):
         values = {elements[place] for elements in seen}

@@ -11,6 +11,7 @@ from itertools import cycle, permutations
 
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice, choose
 from strapgen.evidence import style
 from strapgen.evidence.subjects import Subject
@@ -20,7 +21,6 @@ from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.run import generated_sources
 from strapgen.storage.files import write_files
 from strapgen.storage.resources import folder as shipped
 
@@ -59,7 +59,7 @@ def findings(files, folder) -> list[str]:
 
 def project_of(kernel: str, target: str, settings: Settings | None = None) -> dict[str, str]:
     choice = choose(kernel)
-    sources = generated_sources.sources(choice, target, settings)
+    sources = pipeline.compile(choice, target, settings)
     return {**sources.step_files, **project.project_files(choice, target, settings)}
 
 
@@ -70,7 +70,7 @@ def two_speed(algorithm: str, target: str, settings: Settings | None = None) -> 
 
 def with_vectors(choice: Choice, target: str, settings: Settings | None = None) -> dict[str, str]:
     table = vectors_of_choice(choice, target, settings, 20)
-    return {**generated_sources.sources(choice, target, settings).files, **table_files(table)}
+    return {**pipeline.compile(choice, target, settings).files, **table_files(table)}
 
 
 #: A file of each kind; `every_setting` has the others.

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.firmware.check_code import coning_causes as causes
@@ -21,7 +22,6 @@ from strapgen.firmware.check_code.foreign_bridge import ForeignSource
 from strapgen.firmware.check_code.replacement import FIRST_ORDER
 from strapgen.firmware.check_code.runs import Convention, ForeignStep
 from strapgen.ir.exceptions import InputError
-from strapgen.run import generated_sources
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "check_foreign_c"
 FAULTS = {
@@ -425,7 +425,7 @@ def test_a_function_that_corrects_a_delta_angle(outcome, fault, cause):
     [("euler", "rk4", 2), ("dcm", "rk4", 2), ("euler", "coning-uncompressed", 3), ("dcm", "magnus6", 4)],
 )
 def test_generated_steps_hold(tmp_path, algorithm, method, samples):
-    sources = generated_sources.sources(choose(algorithm, method, samples), "c")
+    sources = pipeline.compile(choose(algorithm, method, samples), "c")
     for name, text in sources.step_files.items():
         (tmp_path / name).write_text(text)
     (file,) = tmp_path.glob("*.c")

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from c_programs import COMPILERS, complaints, needed, said, written
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.firmware import changed_files
 from strapgen.firmware.project import project, two_speed_project
@@ -18,7 +19,6 @@ from strapgen.firmware.vectors.vectors_c import file_names, table_files
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.run import generated_sources
 
 SETTINGS = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2, carry="full")
 #: Kernels, targets and settings, with the largest error in deg that the run may print; None for a single call.
@@ -41,7 +41,7 @@ LOOPS = [
 @cache
 def files_of(kernel: str, target: str, settings: Settings | None) -> dict[str, str]:
     choice = choose(kernel)
-    sources = generated_sources.sources(choice, target, settings)
+    sources = pipeline.compile(choice, target, settings)
     return {**sources.step_files, **project.project_files(choice, target, settings)}
 
 
@@ -73,7 +73,7 @@ def run_of(folder: Path, files: dict[str, str], largest: float | None) -> str:
 def test_the_main_program_runs_and_is_near_the_truth(kernel, target, settings, largest, tmp_path):
     files = files_of(kernel, target, settings)
     printed = run_of(written(tmp_path, files), files, largest)
-    function = generated_sources.sources(choose(kernel), target, settings).function
+    function = pipeline.compile(choose(kernel), target, settings).function
     shown = function.outputs[0] if largest is None else function.inputs[0]
     assert {line.split()[0] for line in printed.splitlines()} >= {*shown.elements}
 
@@ -213,7 +213,7 @@ def test_the_project_of_two_speeds_builds_and_tests_itself(tmp_path):
 
 
 def test_the_header_of_a_test_names_its_command():
-    sources = generated_sources.sources(choose("euler"), "c-fixed", SETTINGS)
+    sources = pipeline.compile(choose("euler"), "c-fixed", SETTINGS)
     _, test, _ = file_names(sources.function.name)
     head = " ".join(files_of(*PROJECTS[0][:3])[test].split("*/")[0].replace("*", "").split())
     assert (

@@ -9,12 +9,12 @@ from functools import cache
 import pytest
 from c_programs import COMPILERS, complaints, line_of_avr, needed, said, written
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import VectorTable, file_names, table_files
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 
 SETTINGS = Settings.of(word=32, max_rate_deg_s=400, step="0.01", increments=2, carry="full")
 #: Kernels, targets and settings that differ in what their vectors hold: error feedback, words, codes, functions.
@@ -87,7 +87,7 @@ def test_a_guard_on_the_way_is_refused_with_code_2():
 def test_the_outputs_are_within_the_bound_of_exact_fractions():
     """The integer model against the program in fractions, which knows of no format."""
     table = table_of("euler", "c-fixed", SETTINGS, 60)
-    program = generated_sources.program(choose("euler"))
+    program = pipeline.program(choose("euler"))
     interface = table.sources.fixed
     compared = 0
     for row in table.rows:

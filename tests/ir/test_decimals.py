@@ -8,11 +8,10 @@ from fractions import Fraction
 import pytest
 from derived import program, quantized
 
-from strapgen import catalogue, fixedpoint
+from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import decimals
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 from strapgen.targets import contract
 
 ERROR = re.compile(r"error at most (\S+), (\S+) of the last place")
@@ -47,7 +46,7 @@ def test_headers_of_the_catalogue_state_no_less_than_is_certified():
 def test_bound_that_a_call_attains_is_not_rounded_down():
     """A call of this kernel is off by 2^-24."""
     ranges = dict.fromkeys(("navigation_rotation", "previous_turn", "turn"), Fraction(1, 300))
-    fixed = generated_sources.fixed_program(Choice("navigation-rotation"), Settings(word=16, ranges=ranges))
+    fixed = pipeline.fixed_program(Choice("navigation-rotation"), Settings(word=16, ranges=ranges))
     shown = [ERROR.search(contract.argument_text(output)) for output in fixed.interface.outputs]
     assert max(Fraction(text[1]) for text in shown if text) >= Fraction(1, 2**24)
 

@@ -11,7 +11,6 @@ import pytest
 from gathering import each
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
 
@@ -84,8 +83,6 @@ def test_settings_are_read_as_they_are_written(stated):
     settings = Settings.of(**stated)
     again = Settings.from_dict(json.loads(json.dumps(settings.as_dict())))
     assert again == settings and again.stated == settings.stated
-    interface = Interface(settings, (), (), (), None)
-    assert Interface.from_dict(json.loads(json.dumps(interface.as_dict()))) == interface
 
 
 @each(

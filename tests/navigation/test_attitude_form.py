@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.cli import main
 from strapgen.lab.cost.processors import PROCESSORS
 from strapgen.navigation.attitude_form import attitude_form
 from strapgen.navigation.two_speed import transformation_error
-from strapgen.run import generated_sources
 
 
 def test_the_series_are_those_of_the_integral_of_the_exact_attitude():
@@ -66,8 +66,7 @@ def test_the_page_shows_the_operations_of_the_kernels():
     for part, (_, *shown) in zip(attitude_form.PARTS, rows, strict=True):
         kernels = [kernels[part] for _, kernels in attitude_form.FORMS.values()]
         counts = [
-            sum(generated_sources.program(Choice(kernel)).operations.values()) if kernel else 0
-            for kernel in kernels
+            sum(pipeline.program(Choice(kernel)).operations.values()) if kernel else 0 for kernel in kernels
         ]
         assert list(map(int, shown)) == counts, part
 
@@ -91,7 +90,7 @@ def test_totals_are_those_of_the_kernels_and_close_together(tmp_path, capsys):
     rates = {"navigation": 10}
     for form, (_, kernels) in attitude_form.FORMS.items():
         counts = [
-            rates.get(part, 100) * sum(generated_sources.program(Choice(kernel)).operations.values())
+            rates.get(part, 100) * sum(pipeline.program(Choice(kernel)).operations.values())
             for part, kernel in kernels.items()
             if kernel and part != "orthonormalization"
         ]

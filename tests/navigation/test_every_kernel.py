@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.catalogue.names import KERNELS
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import ANY, Signal
 from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.systems.wiring import read_system
-from strapgen.run import backends, generated_sources
+from strapgen.run import backends
 
 CYCLES = 3
 #: One kernel for each kind of state and of signals that others have too.
@@ -39,7 +40,7 @@ def begin(signal: Signal) -> list[float]:
 
 def described(choice: str, folder: Path) -> tuple[Path, dict[str, str]]:
     """Write the file of a system with one stage; return it and the states with the outputs that they become."""
-    program = generated_sources.program(Choice(choice))
+    program = pipeline.program(Choice(choice))
     states = dict(program.recursion.states) if program.recursion is not None else {}
     lines = ['title = "one stage"', "sample_hz = 1"]
     lines.append(f"outputs = {[f'stage.{result.signal.name}' for result in program.outputs]}")
@@ -77,7 +78,7 @@ def described(choice: str, folder: Path) -> tuple[Path, dict[str, str]]:
 )
 def test_stage_computes_what_its_kernel_does(kernel, target, tmp_path):
     path, states = described(kernel, tmp_path)
-    program = generated_sources.program(Choice(kernel))
+    program = pipeline.program(Choice(kernel))
     if program.recursion is not None and program.recursion.begun_anew:
         with pytest.raises(InputError, match="is a sum that no stage takes"):
             read_system(path)
@@ -114,7 +115,7 @@ def test_states_of_all_kernels_begin_without_rotation():
     """Those that the rule of `begin` covers; a state of length 1 that it does not is refused."""
     seen = set()
     for kernel in KERNELS:
-        program = generated_sources.program(Choice(kernel))
+        program = pipeline.program(Choice(kernel))
         states = dict(program.recursion.states) if program.recursion is not None else {}
         for signal in program.inputs:
             if signal.name in states and signal.constraint:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.navigation.systems.system_python import _moved
-from strapgen.run import generated_sources
 
 
 def test_a_value_is_moved_by_the_places_between_two_formats_and_held_in_the_word_of_its_destination():
-    interface = generated_sources.sources(choose("euler-product"), "c-fixed", Settings(word=16)).fixed
+    interface = pipeline.compile(choose("euler-product"), "c-fixed", Settings(word=16)).fixed
     there = replace(interface.inputs[0], format=Format(16, 12))
     finer, coarser = replace(there, format=Format(32, 20)), replace(there, format=Format(16, 9))
     assert _moved("a.b", there, finer) == f"_moved(a.b, 8, {2**31 - 1})"

@@ -8,9 +8,9 @@ from fixed_inputs import corners_and_random
 
 import strapgen
 import strapgen.ir.exceptions
+from strapgen import pipeline
 from strapgen.catalogue import TWO_SPEED, choose
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run.generated_sources import sources
 from strapgen.targets.names import external
 
 NAMES = [
@@ -69,10 +69,10 @@ def test_every_kernel_lowers_for_every_target():
     assert len(FEW_ORDERS) == len(TWO_SPEED) - 3 * 15
     for name in FEW_ORDERS:
         choice, function = choose(name), name.replace("-", "_")
-        assert sources(choice, "numpy").function.name == function
-        assert sources(choice, "c").function.name == external(function)
+        assert pipeline.compile(choice, "numpy").function.name == function
+        assert pipeline.compile(choice, "c").function.name == external(function)
         for word in (16, 32):
-            in_integers = sources(choice, "c-fixed", Settings(word=word))
+            in_integers = pipeline.compile(choice, "c-fixed", Settings(word=word))
             assert in_integers.fixed.settings.word == word
             # Errors are below what 8 bits hold, but for a sign that rounding may turn over at half a turn.
             if name != "euler-from-dcm-continuous":

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.exceptions import CompilerError
-from strapgen.run import compiler, generated_sources
+from strapgen.run import compiler
 
 FAILING = "#!/bin/sh\necho 'no licence for this host' >&2\nexit 3\n"
 SILENT = "#!/bin/sh\nexit 3\n"
@@ -48,7 +49,7 @@ def check(variable, target, text, said, tmp_path, monkeypatch) -> None:
     path.chmod(0o755)
     monkeypatch.setenv(variable, str(path))
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
-    sources = generated_sources.sources(choose("euler", "rk1", 1), target)
+    sources = pipeline.compile(choose("euler", "rk1", 1), target)
     for _ in range(2):  # the cache keeps nothing of it
         with pytest.raises(CompilerError) as caught:
             compiler.load(sources)

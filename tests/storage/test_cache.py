@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
+import pickle
 import pwd
 import shutil
 import subprocess
@@ -14,10 +16,11 @@ from pathlib import Path
 
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.exceptions import CompilerError, InputError
-from strapgen.run import compiler, generated_sources
-from strapgen.storage import cache, drafts, ownership
+from strapgen.run import compiler
+from strapgen.storage import cache, drafts, ownership, stage_cache
 
 
 @pytest.fixture(autouse=True)
@@ -207,15 +210,15 @@ def test_folder_that_cannot_be_written(place, tmp_path, monkeypatch):
 def test_sources_are_derived_once(monkeypatch):
     from strapgen import pipeline
 
-    first = generated_sources.sources(choose("euler", "rk1", 1), "c")
+    first = pipeline.compile(choose("euler", "rk1", 1), "c")
     monkeypatch.setattr(pipeline, "derive", never)
-    assert generated_sources.sources(choose("euler", "rk1", 1), "c") == first
+    assert pipeline.compile(choose("euler", "rk1", 1), "c") == first
 
 
 def test_sources_change_with_the_generator(monkeypatch, root):
-    generated_sources.sources(choose("euler-product"), "c")
+    pipeline.compile(choose("euler-product"), "c")
     monkeypatch.setattr(cache, "generator_digest", lambda: "another version")
-    generated_sources.sources(choose("euler-product"), "c")
+    pipeline.compile(choose("euler-product"), "c")
     assert len(names(root / "sources")) == 2
 
 
@@ -376,8 +379,7 @@ def test_an_entry_that_another_process_removes_at_once_is_made_again(root, times
 def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypatch):
     for name in ("_loaded", "_modules"):
         monkeypatch.setattr(compiler, name, {})
-    for name in ("_programs", "_entries"):
-        monkeypatch.setattr(generated_sources, name, {})
+    monkeypatch.setattr(stage_cache, "_results", {})
     looked_up, removed = cache.lookup, []
 
     def lookup(of_kind: str, key: str) -> Path | None:
@@ -387,14 +389,13 @@ def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypat
             removed.append(place)
         return place
 
-    compiler.load(generated_sources.sources(choose("euler-product"), "c"))
-    for name in ("_programs", "_entries"):
-        monkeypatch.setattr(generated_sources, name, {})
+    compiler.load(pipeline.compile(choose("euler-product"), "c"))
+    monkeypatch.setattr(stage_cache, "_results", {})
     for name in ("_loaded", "_modules"):
         monkeypatch.setattr(compiler, name, {})
     monkeypatch.setattr(cache, "lookup", lookup)
-    generated_sources.program(choose("euler-product"))
-    assert compiler.load(generated_sources.sources(choose("euler-product"), "c")).lib.euler_product
+    pipeline.program(choose("euler-product"))
+    assert compiler.load(pipeline.compile(choose("euler-product"), "c")).lib.euler_product
     assert len(removed) == 1
 
 
@@ -530,15 +531,16 @@ def test_what_is_made_is_the_user_s_alone_whatever_the_umask(root, umask, monkey
 
 def test_planted_python_does_not_run(root, tmp_path, warnings, monkeypatch):
     """Generated text is executed as it is: a manifest that is right proves nothing."""
-    sources = generated_sources.sources(choose("euler-product"), "numpy")
+    sources = pipeline.compile(choose("euler-product"), "numpy")
     (entry,) = (root / "sources").iterdir()
     (name,) = sources.files
     marker = tmp_path / "ran"
-    (entry / name).write_text(f"open({str(marker)!r}, 'w')\n{sources.files[name]}")
+    planted = dataclasses.replace(sources, files={name: f"open({str(marker)!r}, 'w')\n{sources.files[name]}"})
+    (entry / "result.pickle").write_bytes(pickle.dumps(planted))
     (entry / "manifest.json").write_text(json.dumps(cache._hashes(entry)))
     to_stranger(*entry.iterdir(), entry)
-    monkeypatch.setattr(generated_sources, "_entries", {})  # as another process
-    again = generated_sources.sources(choose("euler-product"), "numpy")
+    monkeypatch.setattr(stage_cache, "_results", {})  # as another process
+    again = pipeline.compile(choose("euler-product"), "numpy")
     compiler._import_text(again)
     assert not marker.exists() and again == sources
     assert len(warnings.messages) == 1
@@ -551,7 +553,7 @@ PLANTED = (
 
 @pytest.mark.parametrize("when", ["before", "after the check"])
 def test_a_planted_library_is_not_loaded(root, tmp_path, when, monkeypatch, warnings):
-    sources = generated_sources.sources(choose("euler-product"), "c")
+    sources = pipeline.compile(choose("euler-product"), "c")
     monkeypatch.setattr(compiler, "_loaded", {})
     monkeypatch.setattr(compiler, "_modules", {})
     compiler.load(sources)

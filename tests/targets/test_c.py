@@ -23,10 +23,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from pycparser import c_ast, c_parser
 
+from strapgen import pipeline
 from strapgen.catalogue import choose, standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.run.compiler import C_FLAGS
 from strapgen.targets.c.emit import DOUBLE, FLOAT, CPrinter
 
@@ -52,7 +52,7 @@ KERNELS = [kernel for kernel, choice in CHOICES.items() if tells_more(choice) or
 @cache
 def generated(kernel: str, target: str) -> Sources:
     """Return the sources of a kernel of the catalogue, which one process of the session emits for all."""
-    return generated_sources.sources(CHOICES[kernel], target)
+    return pipeline.compile(CHOICES[kernel], target)
 
 
 def text_of(sources: Sources, ending: str) -> str:
@@ -356,9 +356,7 @@ def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
 @each("step", [*STEPS, RODRIGUES])
 def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(step, target):
     of_catalogue = step != RODRIGUES
-    sources = (
-        generated(step, target) if of_catalogue else generated_sources.sources(choose(step, "rk1", 1), target)
-    )
+    sources = generated(step, target) if of_catalogue else pipeline.compile(choose(step, "rk1", 1), target)
     header, source = (
         next(text for name, text in sources.files.items() if name.endswith(f"_runs{end}"))
         for end in (".h", ".c")

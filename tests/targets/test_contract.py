@@ -6,10 +6,10 @@ from fractions import Fraction
 
 from gathering import each
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum, Value
-from strapgen.run import generated_sources
 from strapgen.targets.contract import argument_text, value_text
 
 
@@ -32,7 +32,7 @@ from strapgen.targets.contract import argument_text, value_text
     ],
 )
 def test_an_output_tells_its_error_and_whether_it_saturates_and_an_input_neither(settings, limits, error):
-    interface = generated_sources.sources(choose("euler-product"), "c-fixed", settings).fixed
+    interface = pipeline.compile(choose("euler-product"), "c-fixed", settings).fixed
     assert [argument_text(argument) for argument in interface.inputs] == [limits, limits]
     assert [argument_text(argument) for argument in interface.outputs] == [f"{limits}; {error}"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,9 @@ import pytest
 from languages import DOUBLE, check_bits_of_c, check_lines
 
 import strapgen
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
-from strapgen.run import generated_sources
 from strapgen.run.backends import of_sources
 from strapgen.run.compiler import COMPILERS
 from strapgen.targets.contract_lines import Contract
@@ -64,7 +64,7 @@ def test_every_kernel_has_the_bits_of_c(cxx, other, c, rng):
 
 @pytest.mark.parametrize("right", [True, False])
 def test_a_step_is_a_constant_expression(cxx, tmp_path, right):
-    sources = generated_sources.sources(catalogue.choose("euler"), "cpp")
+    sources = pipeline.compile(catalogue.choose("euler"), "cpp")
     (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
     state = strapgen.backend("euler").step([0.0, 0.0, 0.0, 1.0], [[0.25, 0.0, 0.0], [0.125, 0.0, 0.0]])
     expected = float(state[0]) if right else float(np.nextafter(state[0], 1))
@@ -98,7 +98,7 @@ def test_inputs_that_a_kernel_does_not_read_are_named_for_the_compiler():
     for kernel, unused in (("constant-increments", ["middle"]), ("euler-product", [])):
         (text,) = (
             text
-            for name, text in generated_sources.sources(catalogue.choose(kernel), "cpp").files.items()
+            for name, text in pipeline.compile(catalogue.choose(kernel), "cpp").files.items()
             if name.endswith(".hpp")
         )
         assert re.findall(r"\(void\)(\w+);", text) == unused
@@ -111,9 +111,7 @@ def test_words_of_64_bits_have_the_same_wide_numbers_in_every_header():
 
 
 def test_what_calls_the_library_is_no_constant_expression():
-    header = generated_sources.sources(catalogue.choose("euler-normalize"), "cpp").files[
-        "euler_normalize.hpp"
-    ]
+    header = pipeline.compile(catalogue.choose("euler-normalize"), "cpp").files["euler_normalize.hpp"]
     assert "constexpr std::array<double, 4> euler_normalize" not in header
     assert "inline std::array<double, 4> euler_normalize" in header
 
@@ -122,7 +120,7 @@ def test_all_headers_stand_in_one_program_of_strict_compilers(cxx, tmp_path):
     names = []
     for choice in catalogue.standard()[::3]:
         for target in ("cpp", "cpp-float"):
-            sources = generated_sources.sources(choice, target)
+            sources = pipeline.compile(choice, target)
             check_lines(sources)
             names += sources.step_files
             for name, text in sources.step_files.items():
@@ -133,14 +131,14 @@ def test_all_headers_stand_in_one_program_of_strict_compilers(cxx, tmp_path):
 
 def test_the_contract_of_a_header_is_that_of_the_c_but_for_the_command():
     choice = catalogue.choose("euler")
-    header = generated_sources.sources(choice, "cpp").files["euler_rk4_2.hpp"]
-    other = generated_sources.sources(choice, "c").files["euler_rk4_2.h"]
+    header = pipeline.compile(choice, "cpp").files["euler_rk4_2.hpp"]
+    other = pipeline.compile(choice, "c").files["euler_rk4_2.h"]
     assert Contract.read(header).items == Contract.read(other).items
     assert Contract.read(header).digest != Contract.read(other).digest
 
 
 def test_fused_operations_and_fast_mathematics_are_refused(cxx, tmp_path):
-    sources = generated_sources.sources(catalogue.choose("euler"), "cpp")
+    sources = pipeline.compile(catalogue.choose("euler"), "cpp")
     (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
     said = checked(cxx, tmp_path, '#include "euler_rk4_2.hpp"\n', "-ffast-math")
     assert "operations must round to double" in said.stderr
@@ -158,8 +156,8 @@ def test_without_a_compiler_one_line_says_which_is_missing(monkeypatch, capsys):
 
 
 def test_what_does_not_compile_is_told_in_one_line(cxx):
-    sources = generated_sources.sources(catalogue.choose("euler-normalize"), "cpp")
+    sources = pipeline.compile(catalogue.choose("euler-normalize"), "cpp")
     broken = {name: text.replace("std::sqrt(", "std::sqroot(") for name, text in sources.files.items()}
     with pytest.raises(CompilerError, match=r"failed on euler-normalize: .*sqroot") as caught:
-        of_sources(type(sources).restore(sources.interface(), broken))
+        of_sources(replace(sources, files=broken))
     assert "\n" not in str(caught.value)

@@ -13,9 +13,9 @@ from cffi import FFI
 from hypothesis import given
 from hypothesis import strategies as st
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 
 #: The product has a second form for processors that multiply words to words alone.
 PROCESSORS = {"any": [], "armv6-m": ["-D__ARM_ARCH_6M__"]}
@@ -43,7 +43,7 @@ def exported(text: str, name: str) -> str:
 def arithmetic(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Any:
     word, processor = request.param
     folder: Path = tmp_path_factory.mktemp("arithmetic")
-    sources = generated_sources.sources(choose("euler", "rk4"), "c-fixed", Settings(word))
+    sources = pipeline.compile(choose("euler", "rk4"), "c-fixed", Settings(word))
     name = sources.function.name
     for file, text in sources.step_files.items():
         (folder / file).write_text(exported(text, name) if file.endswith(".c") else text)

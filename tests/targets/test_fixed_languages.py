@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from languages import check_integers_of_c, check_lines
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 from strapgen.run.backends import of_sources
 from strapgen.run.compiler import COMPILERS
 from strapgen.targets.contract_lines import Contract
@@ -46,7 +45,7 @@ def _compiler(target: str) -> str:
 
 def can_lower(choice: Choice, settings: Settings) -> bool:
     try:
-        generated_sources.fixed_program(choice, settings)
+        pipeline.fixed_program(choice, settings)
     except InputError:
         return False
     return True
@@ -70,7 +69,7 @@ def written(folder: Path, target: str, settings: Settings) -> list[str]:
     """Write the files of some kernels without their loops; return their names."""
     names = []
     for choice in (choice for choice in catalogue.standard()[::4] if can_lower(choice, settings)):
-        sources = generated_sources.sources(choice, target, settings)
+        sources = pipeline.compile(choice, target, settings)
         check_lines(sources)
         for name, text in sources.step_files.items():
             (folder / name).write_text(text)
@@ -107,10 +106,10 @@ SMALL = "-D__ARM_ARCH_6M__"
 def test_a_step_of_c_plus_plus_is_a_constant_expression(tmp_path, right, flags):
     compiler = _compiler("cpp-fixed")
     choice, settings = catalogue.choose("euler"), Settings(word=32)
-    sources = generated_sources.sources(choice, "cpp-fixed", settings)
+    sources = pipeline.compile(choice, "cpp-fixed", settings)
     (name,) = sources.step_files
     (tmp_path / name).write_text(sources.files[name])
-    reference = of_sources(generated_sources.sources(choice, "c-fixed", settings))
+    reference = of_sources(pipeline.compile(choice, "c-fixed", settings))
     state, increments = [0, 0, 0, 1 << 30], [1 << 20, 0, 0, 1 << 21, 0, 0]
     (outputs, _) = reference.run([_row(state), _row(increments)], reference.fresh(1))
     expected = int(outputs[0][0, 0]) + (not right)
@@ -133,7 +132,7 @@ def _row(numbers: list[int]) -> np.ndarray:
 
 def test_the_contract_is_that_of_the_c_but_for_the_command(target):
     choice, settings = catalogue.choose("euler"), Settings(word=32)
-    (text,) = generated_sources.sources(choice, target, settings).step_files.values()
-    other = generated_sources.sources(choice, "c-fixed", settings).files["euler_rk4_2_w32.h"]
+    (text,) = pipeline.compile(choice, target, settings).step_files.values()
+    other = pipeline.compile(choice, "c-fixed", settings).files["euler_rk4_2_w32.h"]
     assert Contract.read(text).items == Contract.read(other).items
     assert Contract.read(text).digest != Contract.read(other).digest

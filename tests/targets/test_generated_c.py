@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sensor import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.run import generated_sources
 from strapgen.storage import resources
 
 ROOT = Path(__file__).parents[2]
@@ -69,9 +69,7 @@ def texts() -> dict[str, str]:
     for choice in standard():
         if choice.kernel in ("euler-rk4-2", "dcm-rk1-2"):
             for target in ("c", "c-float", "c-fixed"):
-                found |= generated_sources.sources(
-                    choice, target, settings if target == "c-fixed" else None
-                ).files
+                found |= pipeline.compile(choice, target, settings if target == "c-fixed" else None).files
     return found
 
 
@@ -254,7 +252,7 @@ def test_rules_of_misra_that_are_broken_in_fixed_point_are_those_of_the_page(tmp
     others, seen, known = {}, set(), explained("all", "fixed point")
     for kernel, settings in WITH_FEEDBACK:
         (choice,) = (choice for choice in standard() if choice.kernel == kernel)
-        others |= generated_sources.sources(choice, "c-fixed", settings).step_files
+        others |= pipeline.compile(choice, "c-fixed", settings).step_files
     assert broken_rules(tmp_path / "others", others, seen) == known
     assert broken_rules(tmp_path / "catalogue", generated_files("c_fixed"), seen) == known
     settings = Settings(carry="full")

@@ -14,11 +14,10 @@ import pytest
 from derived import program, tells_more
 
 import strapgen
-from strapgen import catalogue, targets
+from strapgen import catalogue, pipeline, targets
 from strapgen.catalogue import Choice
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
-from strapgen.run import generated_sources
 from strapgen.targets import registry
 
 TOY = Path(__file__).resolve().parents[2] / "examples" / "toy_target"
@@ -105,7 +104,7 @@ def test_the_example_is_short():
 def test_sources_are_cached_until_a_file_of_the_package_changes(toy, monkeypatch):
     def generated() -> str:
         registry._loaded.cache_clear()  # as in a new process
-        (text,) = generated_sources.sources(EULER, "plain-python").files.values()
+        (text,) = pipeline.compile(EULER, "plain-python").files.values()
         return text
 
     before = generated()

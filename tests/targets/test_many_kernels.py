@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.catalogue.names import KERNELS
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import generated_sources
 from strapgen.storage import resources
 from strapgen.targets.names import external
 
@@ -63,7 +62,7 @@ def test_no_static_name_recurs_in_two_files():
     texts = [path.read_text() for folder in FOLDERS for path in files(folder)]
     for word in (16, 64):  # words of 64 bits bring types of their own
         for kernel in ("euler-product", "euler-normalize", "euler-from-dcm"):
-            sources = generated_sources.sources(Choice(kernel), "c-fixed", Settings(word=word))
+            sources = pipeline.compile(Choice(kernel), "c-fixed", Settings(word=word))
             texts += [text for name, text in sources.files.items() if name.endswith(".c")]
     assert recurring(texts) == []
     fixed = files("c_fixed")[0].read_text()

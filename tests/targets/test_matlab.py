@@ -13,12 +13,12 @@ import pytest
 from languages import DOUBLE, SAMPLES, check_lines
 
 import strapgen
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
-from strapgen.run import compiler, generated_files, generated_sources, octave_process
+from strapgen.run import compiler, generated_files, octave_process
 from strapgen.run.backends import of_sources
 from strapgen.targets.matlab.emit import _MatlabPrinter
 from strapgen.targets.matlab.names import MATLAB
@@ -67,7 +67,7 @@ def has_octave() -> None:
 
 
 def sources_of(choice: Choice) -> Sources:
-    return generated_sources.sources(choice, "matlab")
+    return pipeline.compile(choice, "matlab")
 
 
 def bits(array: np.ndarray) -> bytes:
@@ -78,7 +78,7 @@ def bits(array: np.ndarray) -> bytes:
 def differing(choices: Iterable[Choice], rng: np.random.Generator) -> list[str]:
     """Return the kernels that return other bits in Octave than in C, on many samples or on one."""
     several = list(choices)
-    compiled = [generated_sources.sources(choice, "c") for choice in several]
+    compiled = [pipeline.compile(choice, "c") for choice in several]
     compiler.compile_together(compiled)
     names = []
     for one, reference in zip(map(sources_of, several), compiled, strict=True):
@@ -121,10 +121,10 @@ def test_other_bits_are_seen(has_octave, rng, monkeypatch):
     monkeypatch.setattr(
         _MatlabPrinter, "constant", lambda self, value: f"({printed(self, value)} * (1 + eps))"
     )
-    program = generated_sources.program(catalogue.choose("euler"))
+    program = pipeline.program(catalogue.choose("euler"))
     other = strapgen.generate(program, "matlab")
     monkeypatch.undo()
-    reference = generated_sources.sources(catalogue.choose("euler"), "c")
+    reference = pipeline.compile(catalogue.choose("euler"), "c")
     assert not same_run(other, reference, rng)
     assert same_run(strapgen.generate(program, "matlab"), reference, rng)
 
@@ -195,7 +195,7 @@ def test_words_of_matlab_name_no_quantity():
 
 
 def test_a_kernel_of_one_word_hides_no_function_of_matlab():
-    program = generated_sources.program(catalogue.choose("euler-normalize"))
+    program = pipeline.program(catalogue.choose("euler-normalize"))
     for name, function in (("norm", "norm_Kernel"), ("euler_norm", "euler_norm"), ("end", "end_Kernel")):
         sources = strapgen.generate(replace(program, name=name), "matlab")
         assert (sources.function.name, list(sources.files)) == (function, [f"{function}.m"])

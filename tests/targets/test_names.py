@@ -428,8 +428,10 @@ def test_the_interface_keeps_the_names_of_the_kernel():
     for target in targets.TARGETS:
         settings_ = FIXED if targets.TARGETS[target].fixed else None
         sources = strapgen.generate(strapgen.lower(step(called)), target, settings_)
-        inputs = sources.interface()["function"]["inputs"]
-        assert [signal["elements"] for signal in inputs] == [("i", "count", "out"), ("batch", "x", "status")]
+        assert [signal.elements for signal in sources.function.inputs] == [
+            ("i", "count", "out"),
+            ("batch", "x", "status"),
+        ]
 
 
 def test_the_model_speaks_of_the_names_of_the_kernel():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,9 @@ from gathering import each
 from languages import DOUBLE, check_bits_of_c, check_lines
 
 import strapgen
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
-from strapgen.run import generated_sources
 from strapgen.run.backends import of_sources
 from strapgen.run.compiler import COMPILERS
 from strapgen.targets.contract_lines import Contract
@@ -58,7 +58,7 @@ def crate(folder: Path, choices: list, *targets: str) -> list[str]:
     names = []
     for choice in choices:
         for target in targets:
-            sources = generated_sources.sources(choice, target)
+            sources = pipeline.compile(choice, target)
             check_lines(sources)
             for name, text in sources.step_files.items():
                 (folder / name).write_text(text)
@@ -98,8 +98,8 @@ def test_the_oldest_edition_takes_the_text_too(rustc, tmp_path):
 
 def test_the_contract_of_a_module_is_that_of_the_c_but_for_the_command():
     choice = catalogue.choose("euler")
-    module = generated_sources.sources(choice, "rust").files["euler_rk4_2.rs"]
-    other = generated_sources.sources(choice, "c").files["euler_rk4_2.h"]
+    module = pipeline.compile(choice, "rust").files["euler_rk4_2.rs"]
+    other = pipeline.compile(choice, "c").files["euler_rk4_2.h"]
     assert Contract.read(module).items == Contract.read(other).items
     assert Contract.read(module).digest != Contract.read(other).digest
     assert "-ffp-contract" not in module
@@ -123,10 +123,10 @@ def test_without_a_compiler_one_line_says_which_is_missing(monkeypatch, capsys):
 
 
 def test_what_does_not_compile_is_told_in_one_line(rustc):
-    sources = generated_sources.sources(catalogue.choose("euler-normalize"), "rust")
+    sources = pipeline.compile(catalogue.choose("euler-normalize"), "rust")
     broken = {
         name: text.replace("unsafe { sqrt(", "unsafe { sqroot(") for name, text in sources.files.items()
     }
     with pytest.raises(CompilerError, match=r"failed on euler-normalize: .*error") as caught:
-        of_sources(type(sources).restore(sources.interface(), broken))
+        of_sources(replace(sources, files=broken))
     assert "\n" not in str(caught.value)

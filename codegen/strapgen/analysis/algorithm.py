@@ -19,7 +19,6 @@ from strapgen.lab.compare.comparison import Array, Comparisons, compare
 from strapgen.lab.motions import motions
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.simulate.runs import Run, simulate
-from strapgen.run import generated_sources
 from strapgen.run.backends import DEFAULT_BACKENDS, Backend
 from strapgen.run.backends import backend as attitude_backend
 
@@ -68,7 +67,7 @@ class AttitudeAlgorithm:
 
     def program(self) -> Program:
         """Return the straight-line code with its counts, see `strapgen.lower`; the cache holds it."""
-        return generated_sources.program(self.choice)
+        return pipeline.program(self.choice)
 
     def series(self, motion: str = "general", terms: int = 2) -> ErrorAnalysis:
         """Return the truncation error of a step, and of a run, as exact power series of the step length in s.
@@ -178,7 +177,7 @@ class AttitudeAlgorithm:
         >>> list(algorithm("euler", "rk4", 2).c().step_files)
         ['euler_rk4_2.h', 'euler_rk4_2.c']
         """
-        return generated_sources.sources(self.choice, target, settings)
+        return pipeline.compile(self.choice, target, settings)
 
     def compare(
         self,

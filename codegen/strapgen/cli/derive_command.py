@@ -43,10 +43,9 @@ def derive(
     choice = method.choose(algorithm, step=False)
     from strapgen import pipeline
     from strapgen.results.display.formulas import formulas_report, unknown_formulas_report
-    from strapgen.run import generated_sources
 
     kernel = pipeline.derive(choice)
     if kernel.unknowns and show in ("text", "latex"):
         output.report(unknown_formulas_report(kernel, show))
         return
-    output.report(formulas_report(kernel, generated_sources.program(choice), show))
+    output.report(formulas_report(kernel, pipeline.program(choice), show))

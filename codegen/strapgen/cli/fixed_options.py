@@ -236,15 +236,15 @@ class FixedOptions:
 
     def check_increments(self, choice: Choice) -> None:
         """Refuse a largest rate or angle for a kernel that takes neither."""
+        from strapgen import pipeline
         from strapgen.fixedpoint.sensor_scale import counted
         from strapgen.ir.fixed_settings import TURNING
-        from strapgen.run import generated_sources
 
         of_gyro = {*self.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
         of_angle = {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}
         if not of_gyro and not of_angle:
             return
-        program = generated_sources.program(choice)
+        program = pipeline.program(choice)
         if of_gyro and not counted(program):
             raise InputError(
                 f"kernel {choice.kernel} takes no increments; {min(of_gyro)} does not go with it"

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.evidence.balls import ball, column_of, multiplied, outcome, outcomes
 from strapgen.evidence.subjects import Subject
@@ -24,7 +25,6 @@ from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
 from strapgen.ir.angle_accumulation import AngleAccumulation
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Program
-from strapgen.run import generated_sources
 from strapgen.run.fixed import ModelEvaluator
 
 #: Calls, and steps of a run; steps from one look at the state to the next.
@@ -235,8 +235,7 @@ def _models(subject: Subject) -> tuple[Any, _Normalization]:
     name = _OF_MATRICES if matrix else str(kernels.orthonormalize)
     beside = Subject(choose(name), subject.fixed.interface.companion_settings)
     step, normalize = (
-        ModelEvaluator(generated_sources.sources(part.choice, MODEL, part.settings)).step
-        for part in (subject, beside)
+        ModelEvaluator(pipeline.compile(part.choice, MODEL, part.settings)).step for part in (subject, beside)
     )
     return step, _Normalization(normalize, beside.program, max(beside.fixed.interface.outputs[0].errors))
 
@@ -250,7 +249,7 @@ def _exact_states(
     samples = subject.fixed.interface.inputs[1]
     kernels, transition = subject.program.companions, subject.program.transition_program()
     assert kernels is not None
-    product = generated_sources.program(choose(str(kernels.product)))
+    product = pipeline.program(choose(str(kernels.product)))
     exact = [ball(one) for one in kernels.identity]
     for begin in range(0, len(increments) - between + 1, between):
         rows = increments[begin : begin + between]

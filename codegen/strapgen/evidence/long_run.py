@@ -15,6 +15,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.evidence.balls import ball, column_of, multiplied, outcome
 from strapgen.evidence.motion_rows import motion_rows
@@ -25,7 +26,6 @@ from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.cost.runner_c import LongRun, long_run_files
 from strapgen.lab.cost.runners import RUNNERS
-from strapgen.run import generated_sources
 from strapgen.storage.files import write_files
 from strapgen.targets.contract import options
 
@@ -145,7 +145,7 @@ def exact_states(subject: Subject, run: LongRun) -> list[list[Any]]:
     sources = subject.sources
     assert sources.fixed is not None
     assert sources.companions is not None
-    product = generated_sources.program(choose(str(sources.companions.product)))
+    product = pipeline.program(choose(str(sources.companions.product)))
     transition = subject.program.transition_program()
     units = [argument.unit for argument in sources.fixed.inputs]
     integers = noisy_integers(run)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+from strapgen import pipeline
 from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
@@ -17,7 +18,6 @@ from strapgen.firmware.vectors.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError
 from strapgen.lab.cost.runner_c import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
 from strapgen.lab.cost.runners import RUNNERS, Runner
-from strapgen.run import generated_sources
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.storage.files import write_files
 
@@ -189,7 +189,7 @@ def of_model(subject: Subject, run: CallRun) -> Iterator[Part]:
     Part
         "coning", then "random".
     """
-    model = ModelEvaluator(generated_sources.sources(subject.choice, MODEL, subject.settings))
+    model = ModelEvaluator(pipeline.compile(subject.choice, MODEL, subject.settings))
     yield _coning(_ModelRun(subject, run, model))
     yield _random(_ModelRun(subject, run, model))
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
 
+from strapgen import pipeline
 from strapgen.evidence.fuzzing import fuzz_files
 from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.same_bits import LONGEST_WORD, ROWS
@@ -16,7 +17,6 @@ from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.lab.cost.runner_c import CallRun, run_files
-from strapgen.run import generated_sources
 from strapgen.storage.files import write_files
 
 #: Checks of clang-tidy. That parameters of one type can be swapped is left out: an input, an output and a state are
@@ -69,7 +69,7 @@ _Files = Callable[[], Mapping[str, str]]
 
 def _cases(subject: Subject) -> dict[str, _Files]:
     def floating() -> dict[str, str]:
-        double, single = (generated_sources.sources(subject.choice, name).files for name in ("c", "c-float"))
+        double, single = (pipeline.compile(subject.choice, name).files for name in ("c", "c-float"))
         return {
             f"{name}/{file}": text
             for name, files in (("double", double), ("float", single))

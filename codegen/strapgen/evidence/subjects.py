@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from strapgen import catalogue, fixedpoint
+from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
@@ -16,7 +16,6 @@ from strapgen.ir.sources import Sources
 from strapgen.ir.version import VERSION
 from strapgen.navigation.systems.fitting import fitted
 from strapgen.navigation.systems.wiring import Description
-from strapgen.run import generated_sources
 from strapgen.targets.names import UNNAMED, Naming
 
 
@@ -40,17 +39,17 @@ class Subject:
     @cached_property
     def program(self) -> Program:
         """The kernel as straight-line code in exact numbers."""
-        return generated_sources.program(self.choice)
+        return pipeline.program(self.choice)
 
     @cached_property
     def fixed(self) -> FixedProgram:
         """The program in integers, from which the C is printed."""
-        return generated_sources.fixed_program(self.choice, self.settings)
+        return pipeline.fixed_program(self.choice, self.settings or Settings())
 
     @cached_property
     def sources(self) -> Sources:
         """The C."""
-        return generated_sources.sources(self.choice, "c-fixed", self.settings, self.naming)
+        return pipeline.compile(self.choice, "c-fixed", self.settings, self.naming)
 
     @property
     def name(self) -> str:
@@ -72,7 +71,7 @@ class Subject:
 def standard() -> Iterator[Subject]:
     """Yield the kernels of the standard catalogue as they stand in ``generated/c_fixed``."""
     for choice in catalogue.standard():
-        if fixedpoint.can_lower(generated_sources.program(choice)):
+        if fixedpoint.can_lower(pipeline.program(choice)):
             yield Subject(choice)
 
 

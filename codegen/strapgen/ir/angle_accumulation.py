@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 #: Largest error of an element of an orthonormalization's result for which anything is proved.
 LARGEST_ERROR = Fraction(1, 1 << 12)
@@ -91,17 +89,3 @@ class AngleAccumulation:
         if not self.dual_rows_apart or exponent > 100:
             return math.inf
         return float(total) * math.exp(exponent) * (1 + 1e-12)  # which covers the rounding of this line
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the record as plain JSON data; fractions are text."""
-        return {
-            name: str(value) if isinstance(value, Fraction) else value for name, value in asdict(self).items()
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> AngleAccumulation:
-        """Rebuild the record from `as_dict`."""
-        fractions: dict[str, Any] = {
-            name: Fraction(value) if isinstance(value, str) else value for name, value in data.items()
-        }
-        return cls(**fractions)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from strapgen.ir.notebook_display import short_repr
 
@@ -39,11 +37,6 @@ class Truncation:
         # The terms that follow shrink at least as fast as a geometric series.
         first = x ** (self.order + 1) / math.factorial(self.order + 1)
         return first / (1 - x / (self.order + 2))
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Truncation:
-        """Rebuild the record from plain JSON data."""
-        return cls(data["order"], Fraction(data["scale"]), data["square"])
 
 
 @dataclass(frozen=True)
@@ -90,24 +83,6 @@ class Companions:
     def beside(self) -> int:
         """Number of increments that the step takes in addition to its own."""
         return self.previous + self.ahead
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the record as plain JSON data."""
-        cut = self.truncation
-        data = asdict(self) | {
-            "identity": [str(element) for element in self.identity],
-            "truncation": cut and {**asdict(cut), "scale": str(cut.scale)},
-            "nodes": [str(node) for node in self.nodes],
-        }
-        return data if self.nodes else {name: value for name, value in data.items() if name != "nodes"}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Companions:
-        """Rebuild the record from `as_dict`."""
-        cut = data["truncation"]
-        identity, nodes = (tuple(map(Fraction, data.get(name, ()))) for name in ("identity", "nodes"))
-        truncation = cut and Truncation.from_dict(cut)
-        return cls(**{**data, "identity": identity, "truncation": truncation, "nodes": nodes})
 
 
 @dataclass(frozen=True)

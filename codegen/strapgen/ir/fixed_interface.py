@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from strapgen.ir.angle_accumulation import AngleAccumulation
 from strapgen.ir.fixed_settings import Settings
@@ -52,32 +50,6 @@ class Argument:
     def saturates(self) -> bool:
         """Whether it is an attitude in -1 to 1 less a unit: a number beyond is stored as the nearer end."""
         return bool(self.signal.constraint) and self.format.fraction == self.format.word - 1
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the argument as plain JSON data."""
-        return {
-            "signal": self.signal.as_dict(),
-            "word": self.format.word,
-            "fraction": self.format.fraction,
-            "values": list(self.values),
-            "low": self.low,
-            "high": self.high,
-            "errors": [str(error) for error in self.errors],
-            "sensor": self.sensor and self.sensor.as_dict(),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Argument:
-        """Rebuild an argument from `as_dict`."""
-        return cls(
-            Signal.from_dict(data["signal"]),
-            Format(data["word"], data["fraction"]),
-            tuple(data["values"]),
-            data["low"],
-            data["high"],
-            tuple(map(Fraction, data["errors"])),
-            data["sensor"] and Sensor.from_dict(data["sensor"]),
-        )
 
 
 @dataclass(frozen=True)
@@ -151,28 +123,3 @@ class Interface:
         """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
         formats = {} if self.settings.state else {"state": str(self.inputs[0].format)}
         return replace(self.settings, ranges={}, formats=formats).without_counts()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the interface as plain JSON data."""
-        adds_up = self.accumulation
-        return {
-            "settings": self.settings.as_dict(),
-            "inputs": [argument.as_dict() for argument in self.inputs],
-            "outputs": [argument.as_dict() for argument in self.outputs],
-            "residuals": [asdict(feedback) for feedback in self.residuals],
-            "accumulation": adds_up and {name: str(value) for name, value in asdict(adds_up).items()},
-            "angle_accumulation": self.angle_accumulation and self.angle_accumulation.as_dict(),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Interface:
-        """Rebuild an interface from `as_dict`."""
-        adds_up, as_angle = data["accumulation"], data["angle_accumulation"]
-        return cls(
-            Settings.from_dict(data["settings"]),
-            tuple(map(Argument.from_dict, data["inputs"])),
-            tuple(map(Argument.from_dict, data["outputs"])),
-            tuple(ErrorFeedback(**feedback) for feedback in data["residuals"]),
-            adds_up and RoundingAccumulation(**{name: Fraction(value) for name, value in adds_up.items()}),
-            as_angle and AngleAccumulation.from_dict(as_angle),
-        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -275,6 +276,11 @@ class Settings:
             "multiply": self.multiply,
             "digits": self.digits,
         }
+
+    @property
+    def identity(self) -> str:
+        """Text that differs between different settings."""
+        return json.dumps(self.as_dict(), sort_keys=True)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from strapgen.ir.notebook_display import short_repr
 
@@ -30,15 +28,6 @@ class Recursion:
     kept: tuple[str, ...] = ()
 
     __repr__ = short_repr
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the recursion as plain JSON data."""
-        return {"states": [list(pair) for pair in self.states], "kept": list(self.kept)}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Recursion:
-        """Rebuild a recursion from `as_dict`."""
-        return cls(tuple((name, output) for name, output in data["states"]), tuple(data["kept"]))
 
     @property
     def begun_anew(self) -> tuple[str, ...]:

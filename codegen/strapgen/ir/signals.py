@@ -142,19 +142,6 @@ class Signal:
         """Return the signal as plain JSON data."""
         return asdict(self) | {"bound": None if self.bound is None else str(self.bound)}
 
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Signal:
-        """Rebuild a signal from `as_dict`."""
-        bound = data["bound"]
-        return cls(
-            **data
-            | {
-                "shape": tuple(data["shape"]),
-                "elements": tuple(data["elements"]),
-                "bound": None if bound is None else Fraction(bound),
-            }
-        )
-
 
 def after(signal: Signal) -> Signal:
     """Return the signal of a state after a call, whose names begin with ``next_``.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_interface import Interface
@@ -49,8 +49,7 @@ class Sources:
     recursion : Recursion or None
         The outputs that are inputs of the next call.
     own : tuple of Program
-        Programs of the kernels that a user's step brings. Sources from the cache have none: there the step's choice
-        has the kernels.
+        Programs of the kernels that a user's step brings.
     runs : tuple of str
         Names of the files that hold loops over samples and runs, which a host calls and firmware does not need.
     rounding : RoundingBounds or None
@@ -93,45 +92,3 @@ class Sources:
     def step_files(self) -> dict[str, str]:
         """The files without those of `runs`."""
         return {name: text for name, text in self.files.items() if name not in self.runs}
-
-    def interface(self) -> dict[str, Any]:
-        """Return everything but the text and the programs of `own` as plain JSON data."""
-        return {
-            "kernel": self.kernel,
-            "target": self.target,
-            "files": list(self.files),
-            "runs": list(self.runs),
-            "function": {
-                "name": self.function.name,
-                "inputs": [signal.as_dict() for signal in self.function.inputs],
-                "outputs": [signal.as_dict() for signal in self.function.outputs],
-            },
-            "operations": self.operations,
-            "temporaries": self.temporaries,
-            "companions": self.companions and self.companions.as_dict(),
-            "fixed": self.fixed and self.fixed.as_dict(),
-            "recursion": self.recursion and self.recursion.as_dict(),
-            "rounding": self.rounding and self.rounding.as_dict(),
-        }
-
-    @classmethod
-    def restore(cls, interface: dict[str, Any], files: dict[str, str]) -> Sources:
-        """Rebuild sources from `interface` and the text of the files."""
-        function = interface["function"]
-        return cls(
-            interface["kernel"],
-            interface["target"],
-            files,
-            Function(
-                function["name"],
-                tuple(map(Signal.from_dict, function["inputs"])),
-                tuple(map(Signal.from_dict, function["outputs"])),
-            ),
-            interface["operations"],
-            interface["temporaries"],
-            interface["companions"] and Companions.from_dict(interface["companions"]),
-            interface["fixed"] and Interface.from_dict(interface["fixed"]),
-            interface["recursion"] and Recursion.from_dict(interface["recursion"]),
-            runs=tuple(interface["runs"]),
-            rounding=interface["rounding"] and RoundingBounds.from_dict(interface["rounding"]),
-        )

@@ -22,7 +22,6 @@ from strapgen.lab.converge.convergence import Convergence, LadderCase, measured
 from strapgen.lab.motions.motions import GENERAL, Motion
 from strapgen.lab.simulate.runs import Run, simulate
 from strapgen.report.conditions import Conditions, Schedule
-from strapgen.run import generated_sources
 from strapgen.run.backends import DEFAULT_BACKENDS, Backend, backend
 from strapgen.targets.registry import TARGETS
 
@@ -136,16 +135,16 @@ def dossier(
     """
     kernel = pipeline.derive(choice)
     kernel.require_known()
-    program = generated_sources.program(choice)
+    program = pipeline.program(choice)
     fixed, reason = None, ""
     try:
-        fixed = generated_sources.fixed_program(choice, settings)
+        fixed = pipeline.fixed_program(choice, settings or Settings())
     except InputError as error:
         if can_lower(program):
             raise  # the settings do not go with the kernel
         reason = str(error)
     sources = {
-        name: generated_sources.sources(choice, name, settings if TARGETS[name].fixed else None)
+        name: pipeline.compile(choice, name, settings if TARGETS[name].fixed else None)
         for name in SHOWN
         if fixed is not None or not TARGETS[name].fixed
     }

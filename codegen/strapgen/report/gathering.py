@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from strapgen import pipeline
 from strapgen.catalogue import ALGORITHMS, Choice
 from strapgen.design.frontier import frontier
 from strapgen.design.frontier.frontier import Candidate, Standing
@@ -12,7 +13,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.study.resumable import side_by_side
 from strapgen.report.conditions import Conditions
 from strapgen.report.dossier import AlgorithmDossier, dossier
-from strapgen.run import generated_sources
 from strapgen.thesis import thesis_tables
 from strapgen.thesis.thesis_tables import TableEntry
 
@@ -67,7 +67,7 @@ def candidate(choice: Choice) -> Candidate | None:
         return None
     method = choice.method
     if choice.user_kernel is not None:
-        method = generated_sources.program(choice).arguments
+        method = pipeline.program(choice).arguments
         if not method.endswith(".py") or any(space in method for space in " \t"):
             return None  # built in Python, or with options of its own
     elif choice.name not in ALGORITHMS:

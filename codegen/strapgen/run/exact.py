@@ -17,12 +17,12 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import checks, stage_arguments
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import OPERATIONS, Program
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.run.evaluators import Array, Evaluator
 from strapgen.run.kernel_sources import program_of, sources_of_choice, sources_of_program
 from strapgen.run.protocol import Backend
@@ -158,7 +158,7 @@ def interpreter(name: str, step: Program | None = None) -> Interpreter:
 
 @cache
 def _program(name: str) -> Program:
-    return generated_sources.program(Choice(name))
+    return pipeline.program(Choice(name))
 
 
 def in_digits(values: Any) -> Array:

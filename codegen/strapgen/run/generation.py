@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.targets.names import UNNAMED, Naming
 
 if TYPE_CHECKING:
@@ -38,11 +38,11 @@ class Request:
 
     def sources(self) -> Sources:
         """Return the generated sources."""
-        return generated_sources.sources(self.choice, self.target, self.settings, self.naming)
+        return pipeline.compile(self.choice, self.target, self.settings, self.naming)
 
     def program(self) -> Program:
         """Return the program with its name."""
-        return self.naming.of(generated_sources.program(self.choice))
+        return self.naming.of(pipeline.program(self.choice))
 
 
 def generated_data(choice: Choice, sources: Sources, target: str, files: Sequence[str]) -> dict[str, Any]:
@@ -69,4 +69,4 @@ def generated_data(choice: Choice, sources: Sources, target: str, files: Sequenc
         data["error_bounds"] = sources.rounding.as_data()
     if sources.fixed is None:
         return data
-    return data | generated_sources.fixed_program(choice, sources.fixed.settings).as_data()
+    return data | pipeline.fixed_program(choice, sources.fixed.settings).as_data()

@@ -10,7 +10,6 @@ from strapgen.ir.exceptions import InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
-from strapgen.run import generated_sources
 from strapgen.targets import BUILT_IN
 
 
@@ -61,8 +60,8 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
     """Return what a back end runs of a chosen kernel, from the cache; parameters are those of `sources_of_program`."""
     if target in BUILT_IN:
-        return generated_sources.sources(choice, target, settings)
-    return sources_of_program(generated_sources.program(choice), target)
+        return pipeline.compile(choice, target, settings)
+    return sources_of_program(pipeline.program(choice), target)
 
 
 def program_of(sources: Sources) -> Program:

@@ -30,7 +30,7 @@ _DRAFT = re.compile(r"\.(.+)-[0-9a-f]{8}")
 def programs() -> Iterator[Program]:
     """Derive and lower every kernel of the standard catalogue."""
     for choice in catalogue.standard():
-        yield pipeline.lowered(choice)
+        yield pipeline.lower(pipeline.derive(choice))
 
 
 def folder_of(target: str) -> str:

@@ -86,11 +86,12 @@ class StepSources:
     def _generated(self, kernel: str, target: str) -> Sources:
         fixed = self.step.fixed if target == self.step.target else None
         settings = fixed.companion_settings if fixed else None
+        if self.choice is not None:
+            return sources_of_choice(self.choice.companion(kernel), target, settings)
         for program in self.step.own:
             if program.kernel == kernel:
                 return sources_of_program(program, target, settings)
-        choice = Choice(kernel) if self.choice is None else self.choice.companion(kernel)
-        return sources_of_choice(choice, target, settings)
+        return sources_of_choice(Choice(kernel), target, settings)
 
     def complete(self, needed: Iterable[tuple[str | None, str]]) -> StepSources:
         """Return the same with the sources of the kernels and targets that are needed.

@@ -206,10 +206,12 @@ class Naming:
     def _text(self) -> str:
         return self.name or self.prefix or ""
 
-    def of(self, program: Program) -> Program:
+    def of(self, program: _P) -> _P:
         """Return a program with the name."""
         if not self.option:
             return program
+        if isinstance(program, FixedProgram):
+            return replace(program, program=self.of(program.program))
         chosen = replace(
             program,
             function=self._text if self.prefix is None else f"{self._text}{{}}",

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 #: Entry points of installed packages.
 GROUP = "strapgen.targets"
-#: Files that the cache keeps beside generated ones.
-RESERVED = ("interface.json", "manifest.json")
 
 
 @dataclass(frozen=True)
@@ -222,7 +220,7 @@ def run(name: str, program: Program | FixedProgram) -> Sources:
     if not isinstance(sources, Sources):
         raise InputError(f"{label}: emit returned {type(sources).__name__}; strapgen.Sources are needed")
     for file, text in sources.files.items():
-        if Path(file).name != file or not isinstance(text, str) or file in RESERVED:
+        if Path(file).name != file or not isinstance(text, str):
             raise InputError(
                 f"{label}: emit returned a file {file!r}; names without a folder, and texts, are needed"
             )

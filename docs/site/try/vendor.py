@@ -22,12 +22,12 @@ from pathlib import Path
 import npm
 
 import strapgen
+from strapgen import pipeline
 from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.names import MOST_INCREMENTS
 from strapgen.fixedpoint.floating import proved, rounding_bounds
 from strapgen.ir.exceptions import InputError
-from strapgen.run import generated_sources
 from strapgen.storage import cache, resources
 
 HERE = Path(__file__).resolve().parent
@@ -197,5 +197,5 @@ def _proved_bounds() -> Iterator[tuple[str, dict[str, object]]]:
                     choice = strapgen.choose_step(algorithm, method, increments)
                 except InputError:  # a method that does not go with so many increments
                     continue
-                program = generated_sources.program(choice)
+                program = pipeline.program(choice)
                 yield proved.key(program, "double"), rounding_bounds(program).as_dict()

@@ -18,7 +18,6 @@ from strapgen.analysis.series.notation import covariant_text, intervals_text
 from strapgen.analysis.series.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.run import generated_sources
 
 #: Highest order of a series in the overview; with higher orders the error is far below that of any gyro.
 _HIGHEST_SERIES = 8
@@ -177,7 +176,7 @@ def _row(choice: Choice) -> OverviewRow:
     coning_power, coning = next(iter(run.secular.items()), (None, None))
     a = parameters("coning")[0]
     drift = min(general.drift, default=None)
-    counts = generated_sources.program(choice).operations
+    counts = pipeline.program(choice).operations
     return OverviewRow(
         kernel.name,
         choice.increments_per_step,

@@ -19,7 +19,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.kernel import rotations
 from strapgen.lab.motions.motions import Motion
-from strapgen.run import exact, generated_sources
+from strapgen.run import exact
 from strapgen.run.exact import interpreter
 
 #: A 3 x 3 matrix of mpmath, and the function that returns its growth factor from one time to another.
@@ -281,5 +281,5 @@ def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     if step_kernels.attitude is not None:
         # If the length of the parameters is not 1, their matrix is a rotation times a factor.
         return lambda computed: computed / mpmath.cbrt(mpmath.det(computed))
-    scheme = interpreter(step_kernels.orthonormalize, generated_sources.program(choice))
+    scheme = interpreter(step_kernels.orthonormalize, pipeline.program(choice))
     return lambda computed: _matrix(scheme(list(computed)))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.design.commit_late import commit_late_bounds
 from strapgen.design.commit_late.fixed_filters import FixedFilters, Integers
@@ -20,7 +21,6 @@ from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import finest
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 
 #: Bits of a word, and of a sum of products.
 WORD, WIDE = 32, 64
@@ -68,15 +68,15 @@ def functions(
     if settings.sensor is not None:
         filters = replace(filters, scale=settings.sensor.scale)
         settings = replace(settings, input_bits=WORD)
-    step = generated_sources.sources(choices[0], target, settings)
+    step = pipeline.compile(choices[0], target, settings)
     interface = interface_of(step)
     samples = interface.inputs[1]
     sums = filters.sums
     fractions = {
         m: _fraction([row[m] for row in (*filters.sets, *filters.short)], samples.high) for m in sums
     }
-    rotation = generated_sources.sources(choices[1], target, _of_rotation(filters, interface))
-    normalization = generated_sources.sources(choices[2], target, interface.companion_settings)
+    rotation = pipeline.compile(choices[1], target, _of_rotation(filters, interface))
+    normalization = pipeline.compile(choices[2], target, interface.companion_settings)
     inputs = {argument.signal.name: argument for argument in interface_of(rotation).inputs}
     moments = 2 if filters.window.gyro is None else 1
 
@@ -99,7 +99,7 @@ def functions(
     errors = commit_late_bounds.now_errors(
         filters,
         fixed,
-        (generated_sources.program(choices[0]), generated_sources.program(choices[1])),
+        (pipeline.program(choices[0]), pipeline.program(choices[1])),
         (interface, interface_of(rotation)),
         _truncation(choices[0]),
     )
@@ -125,7 +125,7 @@ def _of_rotation(filters: LateFilters, interface: Interface) -> Settings:
 
 def _truncation(step: Choice) -> Truncation:
     """Return what the series of the rotation of a step leaves out."""
-    kernels = generated_sources.program(step).companions
+    kernels = pipeline.program(step).companions
     assert kernels is not None
     assert kernels.truncation is not None, "the rotation is a series"
     return kernels.truncation

@@ -7,7 +7,7 @@ import shlex
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from strapgen import targets
+from strapgen import pipeline, targets
 from strapgen.catalogue import Choice, choose_step
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
@@ -20,7 +20,6 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.targets import BUILT_IN, contract
 from strapgen.targets.c.emit import real_of
 
@@ -146,7 +145,7 @@ def parts(filters: LateFilters, algorithm: str, target: str, settings: Settings 
             filters, choices, target, settings or Settings()
         )
         return LateSources(rounded, *functions, fixed)
-    step, rotation, normalization = (generated_sources.sources(choice, target) for choice in choices)
+    step, rotation, normalization = (pipeline.compile(choice, target) for choice in choices)
     return LateSources(filters, step, rotation, normalization)
 
 

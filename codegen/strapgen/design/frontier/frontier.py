@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -26,7 +26,6 @@ from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.simulate.drift import measured_drift
 from strapgen.lab.study.clusters import Bundle, Cluster, moved
 from strapgen.lab.study.resumable import resume, side_by_side
-from strapgen.run import generated_sources
 from strapgen.storage import cache as disk_cache
 
 #: Motions by their labels: a name, or a user's file, and its settings.
@@ -335,7 +334,7 @@ def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> lis
 def run_trial(trial: Trial) -> dict[str, Any]:
     """Run a candidate on the motions of its trial; return its standing as plain JSON data."""
     choice = trial.candidate.choice
-    program = generated_sources.program(choice)
+    program = pipeline.program(choice)
     operations = program.operations
     return asdict(
         Standing(

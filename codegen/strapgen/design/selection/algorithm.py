@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.analysis.vibration import assessment
 from strapgen.analysis.vibration.rectification import Rectification, rectified
 from strapgen.catalogue import Choice
@@ -17,7 +18,6 @@ from strapgen.ir.sources import Sources
 from strapgen.lab.cost import cost as costs
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.simulate.runs import Run, drift_between, simulate
-from strapgen.run import generated_sources
 from strapgen.run.backends import backend
 
 #: Operations that cost next to nothing.
@@ -124,7 +124,7 @@ class AttitudeStep:
 
     def operations_per_s(self) -> float:
         """Return the operations of the program in a second."""
-        counts = generated_sources.program(self.choice).operations
+        counts = pipeline.program(self.choice).operations
         return sum(number for kind, number in counts.items() if kind not in FREE) / float(self.step)
 
     def truncation(self) -> float:
@@ -158,9 +158,7 @@ class AttitudeStep:
     def cost(self, carry: str) -> ProcessorCost:
         """Return bytes and instructions of the C in fixed point."""
         settings = causes.settings(self.choice, self._brief, carry)
-        one = costs.cost(
-            generated_sources.sources(self.choice, "c-fixed", settings), self._brief.processor.cpu
-        )
+        one = costs.cost(pipeline.compile(self.choice, "c-fixed", settings), self._brief.processor.cpu)
         executed = None if one.executed is None else one.executed / float(self.step)
         return ProcessorCost(float(one.code_bytes + one.constant_bytes), executed)
 

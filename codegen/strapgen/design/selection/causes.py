@@ -15,6 +15,7 @@ from typing import Any
 
 import mpmath
 
+from strapgen import pipeline
 from strapgen.analysis.vibration import assessment
 from strapgen.analysis.vibration.gyro import through_gyro
 from strapgen.analysis.vibration.mean_rates import Assessment
@@ -25,7 +26,7 @@ from strapgen.design.environment import LineEnvironment
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.step_series.quantization_noise import QuantizationNoise, quantization_noise
-from strapgen.run import exact, generated_sources
+from strapgen.run import exact
 
 #: Deg/h in a rad/s, and rad in an arc second.
 DEG_H = math.degrees(1) * 3600
@@ -237,7 +238,7 @@ def _least_without_feedback(choice: Choice, brief: DesignBrief) -> float:
 
 def _certified(choice: Choice, brief: DesignBrief, carry: str) -> Rounding:
     """Return the certified drift with some error feedback."""
-    fixed = generated_sources.fixed_program(choice, settings(choice, brief, carry))
+    fixed = pipeline.fixed_program(choice, settings(choice, brief, carry))
     angles = fixed.interface.angle_accumulation
     if angles is None:
         return Rounding(None, carry, "no bound of a run is known")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from strapgen import applications
+from strapgen import applications, pipeline
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design.brief import DesignBrief
 from strapgen.design.coning import coning_file
@@ -13,7 +13,6 @@ from strapgen.design.selection import causes
 from strapgen.design.selection.algorithm import Algorithm, AttitudeStep, DescribedAlgorithm
 from strapgen.design.selection.candidates import TUNED
 from strapgen.design.selection.judgement import Judgement
-from strapgen.run import generated_sources
 
 #: The report, the coefficients that a design has computed, and the description of two speeds.
 REPORT, COEFFICIENTS, SYSTEM = "design.txt", "coefficients.toml", "system.toml"
@@ -51,7 +50,7 @@ def firmware_files(
     settings = causes.settings(choice, brief, judgement.carry)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         choice = replace(choice, method=replace(choice.method, file=COEFFICIENTS))
-    files = dict(generated_sources.sources(choice, "c-fixed", settings).step_files)
+    files = dict(pipeline.compile(choice, "c-fixed", settings).step_files)
     files |= applications.extension("generate.project", "--out").project_files(choice, "c-fixed", settings)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         files[COEFFICIENTS] = coning_file.written(choice.method, command)

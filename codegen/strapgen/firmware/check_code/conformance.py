@@ -12,7 +12,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import fixedpoint
+from strapgen import fixedpoint, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.exceptions import CompilerError, InputError
@@ -25,7 +25,7 @@ from strapgen.lab.converge.convergence import converge
 from strapgen.lab.motions.exact_attitudes import step_of_increments
 from strapgen.lab.motions.motions import GENERAL, motion
 from strapgen.lab.simulate.runs import attitude, drift_between, simulate
-from strapgen.run import exact, generated_sources
+from strapgen.run import exact
 from strapgen.run.backends import Backend, sources_to_build
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.compiler import compile_together
@@ -100,7 +100,7 @@ def check(choice: Choice) -> Iterator[Finding]:
     (True, True)
     """
     step_of_increments(choice)  # refuses what is no such step
-    step = _Precise(generated_sources.program(choice))
+    step = _Precise(pipeline.program(choice))
     checks: dict[str, Callable[[], Iterable[Finding]]] = {
         "no rotation": lambda: [_no_rotation(step)],
         "at rest": lambda: [_at_rest(step)],

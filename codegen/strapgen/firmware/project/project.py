@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.firmware.changed_files import refuse_changed as refuse_changed
 from strapgen.firmware.project.project_c import MOTION, MotionRun, call_main, cmake, step_main
@@ -14,7 +15,6 @@ from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.run.step_sources import StepSources
 from strapgen.targets.contract import options
 from strapgen.targets.names import UNNAMED, Naming
@@ -49,7 +49,7 @@ def project_files(
     """
     table = vectors_of_choice(choice, target, settings, naming=naming)
     sources = table.sources
-    command = f"strapgen generate {naming.of(generated_sources.program(choice)).arguments} --target {target}"
+    command = f"strapgen generate {naming.of(pipeline.program(choice)).arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings, sources.function.inputs)}"
     command += " --project"
@@ -91,7 +91,7 @@ def assembled(
 
 def motion_files(kernels: Iterable[str], others: Iterable[Sources]) -> dict[str, str]:
     """Return the C in double of kernels of the catalogue, and of others, in a folder of their own."""
-    parts = [*(generated_sources.sources(Choice(kernel), "c") for kernel in kernels), *others]
+    parts = [*(pipeline.compile(Choice(kernel), "c") for kernel in kernels), *others]
     return {f"{MOTION}/{file}": text for part in parts for file, text in part.step_files.items()}
 
 

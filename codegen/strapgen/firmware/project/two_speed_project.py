@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.firmware.changed_files import refuse_changed as refuse_changed
 from strapgen.firmware.project import project
@@ -23,7 +24,6 @@ from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.loops import Cycles, LoopsFromPython, LoopSources
 from strapgen.navigation.two_speed.two_speed_c import wiring
-from strapgen.run import generated_sources
 from strapgen.run.evaluators import Array
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
@@ -61,9 +61,7 @@ def project_files(
     for loop in loops:
         stated = None if loop.fixed is None else loop.fixed.settings
         tests |= table_files(vectors_of_choice(Choice(loop.kernel), target, stated))
-    conversions = (
-        [] if algorithm == "dcm" else [generated_sources.sources(Choice(f"dcm-from-{algorithm}"), "c")]
-    )
+    conversions = [] if algorithm == "dcm" else [pipeline.compile(Choice(f"dcm-from-{algorithm}"), "c")]
     motion = project.motion_files(["coning-increments", "coning-truth"], conversions)
     step = _FAST_CYCLE * FAST
     largest = project.LARGEST
@@ -121,14 +119,12 @@ def _runner(whole: Sources, parts: LoopSources) -> LoopsFromPython:
     loops = parts.loops
     if loops[0].fixed is not None:
         models = tuple(
-            generated_sources.sources(Choice(loop.kernel), MODEL, loop.fixed.settings)
+            pipeline.compile(Choice(loop.kernel), MODEL, loop.fixed.settings)
             for loop in loops
             if loop.fixed is not None
         )
         return LoopsFromPython(LoopSources(models, parts.system), ModelEvaluator)
-    programs = tuple(
-        sources_of_program(generated_sources.program(Choice(loop.kernel)), "exact") for loop in loops
-    )
+    programs = tuple(sources_of_program(pipeline.program(Choice(loop.kernel)), "exact") for loop in loops)
     return LoopsFromPython(
         LoopSources(programs, parts.system), lambda sources: ProgramEvaluator(sources, whole.target)
     )

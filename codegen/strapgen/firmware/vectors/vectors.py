@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.firmware.vectors.vectors_c import CallVector, VectorTable
 from strapgen.ir import checks
@@ -22,7 +23,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Operation, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.run.exact import ExactEvaluator
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
@@ -100,12 +100,12 @@ def vectors_of_choice(
     (0, ((0, 0, 0, 1073741824),))
     """
     checks.choice("target", target, [name for name, entry in BUILT_IN.items() if entry.compiled])
-    sources = generated_sources.sources(choice, target, settings, naming)
-    program = generated_sources.program(choice)
+    sources = pipeline.compile(choice, target, settings, naming)
+    program = pipeline.program(choice)
     command = f"strapgen vectors {naming.of(program).arguments} --target {target}"
     if sources.fixed is not None:
         command += f" {options(sources.fixed.settings, program.inputs)}"
-        reference = generated_sources.sources(choice, MODEL, settings)
+        reference = pipeline.compile(choice, MODEL, settings)
     else:
         reference = sources_of_program(program, "exact")
     return call_vectors(sources, reference, f"{command} --count {count} --seed {seed}", count, seed)

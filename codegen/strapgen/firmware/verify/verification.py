@@ -14,6 +14,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen import pipeline
 from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import CallVector
 from strapgen.ir.decimals import float_above
@@ -21,7 +22,6 @@ from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.sources import Sources
-from strapgen.run import generated_sources
 from strapgen.run.c import CEvaluator
 from strapgen.run.exact import DIGITS, Interpreter, number
 from strapgen.run.fixed import CFixedEvaluator, ModelEvaluator
@@ -252,7 +252,7 @@ def _fixed(
     """Run a function on integers; return wrong calls, calls, the largest error and its bound in last places."""
     assert sources.fixed is not None
     of = CFixedEvaluator(sources)
-    model = ModelEvaluator(generated_sources.sources(request.choice, MODEL, request.settings))
+    model = ModelEvaluator(pipeline.compile(request.choice, MODEL, request.settings))
     exact, wrong, worst = _Exact(request, sources.fixed), 0, 0.0
     for row in rows:
         inputs, outputs = _called(of, row)
@@ -294,7 +294,7 @@ class _Exact:
     """Measures the error of a call in units in the last place, in arithmetic of 40 digits."""
 
     def __init__(self, request: Request, interface: Interface) -> None:
-        self.interpreter = Interpreter(generated_sources.program(request.choice))
+        self.interpreter = Interpreter(pipeline.program(request.choice))
         self.interface = interface
 
     def error(self, inputs: Sequence[Sequence[int]], outputs: Sequence[Sequence[int]]) -> float:
@@ -322,7 +322,7 @@ def _floating(
 ) -> tuple[int, int, float, float | None]:
     """Run a function on floating-point numbers; return wrong calls, calls and the largest error in last places of 1."""
     of = CEvaluator(sources)
-    exact = Interpreter(generated_sources.program(request.choice))
+    exact = Interpreter(pipeline.program(request.choice))
     wrong, worst, unit = 0, 0.0, float(np.finfo(of.dtype).eps)
     bound = _bound(sources)
     for row in rows:

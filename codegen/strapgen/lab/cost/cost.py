@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from strapgen import catalogue, fixedpoint
+from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.ir import checks
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.lab.cost import emulation
 from strapgen.lab.cost.processors import PROCESSORS
-from strapgen.run import generated_sources
 from strapgen.storage import drafts
 from strapgen.targets import TARGETS
 
@@ -158,8 +157,8 @@ def catalogue_costs(cpus: Sequence[str]) -> Iterator[Cost]:
         for choice in catalogue.standard():
             if cpu != REFERENCE and choice.kernel not in EVERYWHERE:
                 continue
-            if fixedpoint.can_lower(generated_sources.program(choice)):
-                yield cost(generated_sources.sources(choice, "c-fixed"), cpu)
+            if fixedpoint.can_lower(pipeline.program(choice)):
+                yield cost(pipeline.compile(choice, "c-fixed"), cpu)
 
 
 @cache

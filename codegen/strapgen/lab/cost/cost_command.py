@@ -75,10 +75,10 @@ def cost(
     """
     output.check(*(kernels or ()))
     _check_alone(kernels, all_, [*method.stated, *(["--target"] if target else []), *fixed.stated])
+    from strapgen import pipeline
     from strapgen.ir import checks
     from strapgen.lab.cost import cost as costs
     from strapgen.lab.cost.cost_report import catalogue_report, cost_report
-    from strapgen.run import generated_sources
     from strapgen.targets import TARGETS
 
     processors = costs.processors(cross, [] if cpu is None else [name.strip() for name in cpu.split(",")])
@@ -95,7 +95,7 @@ def cost(
         settings = fixed.settings(choice.increments_per_step)
         if settings is not None and not TARGETS[target].fixed:
             raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
-        sources = generated_sources.sources(choice, target, settings)
+        sources = pipeline.compile(choice, target, settings)
         rows += [costs.cost(sources, name) for name in processors]
     output.report(cost_report(rows))
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.cost.cost import cost
 from strapgen.navigation.two_speed import transformation_error
-from strapgen.run import generated_sources
 
 #: What a navigator does with its attitude, in the words of a table.
 PARTS = {
@@ -226,8 +226,8 @@ def part_costs(
             yield PartCost(form, part, "", rates.of(part), {}, 0 if cpu else None)
             continue
         choice = Choice(kernel)
-        counts = {kind: n for kind, n in generated_sources.program(choice).operations.items() if n}
-        executed = cost(generated_sources.sources(choice, "c-fixed", settings), cpu).executed if cpu else None
+        counts = {kind: n for kind, n in pipeline.program(choice).operations.items() if n}
+        executed = cost(pipeline.compile(choice, "c-fixed", settings), cpu).executed if cpu else None
         yield PartCost(form, part, kernel, rates.of(part), counts, executed)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from strapgen import targets
+from strapgen import pipeline, targets
 from strapgen.fixedpoint.limits import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
@@ -19,7 +19,6 @@ from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.sums import copies
 from strapgen.navigation.systems.system import Push, SystemStage
 from strapgen.navigation.systems.wiring import Description
-from strapgen.run import generated_sources
 from strapgen.targets import TARGETS
 from strapgen.targets.c.emit import real_of
 from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
@@ -121,12 +120,12 @@ def _generated(
     description: Description, stage: SystemStage, target: str, settings: Settings | None
 ) -> Sources:
     if not TARGETS[target].compiled:
-        return generated_sources.sources(description.choices[stage.name], target, settings, UNNAMED)
+        return pipeline.compile(description.choices[stage.name], target, settings, UNNAMED)
     name = f"{description.system.name}_{stage.name}{_suffix(target, settings)}"
     if len(name) > MOST_CHOSEN:
         raise InputError(f"its function would be called {name}; at most {MOST_CHOSEN} characters are allowed")
     naming = Naming(name=name)
-    return generated_sources.sources(description.choices[stage.name], target, settings, naming)
+    return pipeline.compile(description.choices[stage.name], target, settings, naming)
 
 
 @dataclass

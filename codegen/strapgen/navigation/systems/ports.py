@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, Signal
 from strapgen.navigation.systems.system_file import StageText
-from strapgen.run import generated_sources
 
 
 @dataclass
@@ -110,7 +109,7 @@ def ports(text: StageText, place: int) -> Ports:
     """
     try:
         choice = catalogue.choose(text.kernel, constants=text.constants or None, **text.options)
-        program = generated_sources.program(choice)
+        program = pipeline.program(choice)
     except (InputError, InputTypeError) as error:
         raise InputError(f"stage {text.name}: {error}") from None
     stage = Ports(text, choice, program, place)

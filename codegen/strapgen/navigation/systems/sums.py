@@ -10,9 +10,9 @@ def copies(program: Program) -> dict[str, str]:
 
     Examples
     --------
+    >>> from strapgen import pipeline
     >>> from strapgen.catalogue import Choice
-    >>> from strapgen.run import generated_sources
-    >>> copies(generated_sources.program(Choice("two-speed-fast-2")))
+    >>> copies(pipeline.program(Choice("two-speed-fast-2")))
     {'previous_increment': 'increment'}
     """
     inputs = {signal.elements: signal.name for signal in program.inputs}
@@ -28,9 +28,9 @@ def summed(program: Program) -> dict[str, str]:
 
     Examples
     --------
+    >>> from strapgen import pipeline
     >>> from strapgen.catalogue import Choice
-    >>> from strapgen.run import generated_sources
-    >>> summed(generated_sources.program(Choice("two-speed-fast-2")))
+    >>> summed(pipeline.program(Choice("two-speed-fast-2")))
     {'angle_sum': 'increment', 'velocity_sum': 'velocity_increment'}
     """
     signals = {signal.name: signal for signal in program.inputs}

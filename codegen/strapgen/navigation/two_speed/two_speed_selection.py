@@ -43,7 +43,7 @@ from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.systems.system_cost import measured_budget
 from strapgen.navigation.systems.system_runs import simulate_system
 from strapgen.navigation.systems.wiring import Description, wired
-from strapgen.run import exact, generated_sources
+from strapgen.run import exact
 from strapgen.run.backends import evaluator
 
 #: Kernels of the fast loop and of the slow one before the attitude is turned.
@@ -124,7 +124,7 @@ class TwoSpeedLoops:
     @property
     def _programs(self) -> Mapping[str, Program]:
         names = {"fast": _FAST, "vector": _VECTOR, "update": f"{self.state}-update"}
-        return {name: generated_sources.program(Choice(kernel)) for name, kernel in names.items()}
+        return {name: pipeline.program(Choice(kernel)) for name, kernel in names.items()}
 
     def truncation(self) -> float:
         """Return the drift of a steady turn at the largest rate, from one slow cycle in 40 digits."""
@@ -140,7 +140,7 @@ class TwoSpeedLoops:
             start = identity if self.state == "dcm" else [mpmath.mpf(x) for x in (0, 0, 0, 1)]
             ends = exact.Interpreter(programs["update"])(start, vector)
             if self.state != "dcm":
-                ends = exact.Interpreter(generated_sources.program(Choice("dcm-from-euler")))(ends)
+                ends = exact.Interpreter(pipeline.program(Choice("dcm-from-euler")))(ends)
             lost = angle - mpmath.atan2(ends[3] - ends[1], ends[0] + ends[4])
             turns = 2 * mpmath.pi
             lost -= turns * mpmath.nint(lost / turns)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
-from strapgen import targets
+from strapgen import pipeline, targets
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.limits import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
@@ -24,7 +24,6 @@ from strapgen.navigation.systems import built_in, system_file
 from strapgen.navigation.systems.sums import copies, summed
 from strapgen.navigation.systems.wiring import Description, wired
 from strapgen.navigation.two_speed.two_speed_c import whole
-from strapgen.run import generated_sources
 from strapgen.targets import BUILT_IN, TARGETS
 from strapgen.targets.contract import options
 
@@ -152,9 +151,9 @@ def loops(
     names = kernels(algorithm, sculling)
     targets.require(target, settings)
     if not TARGETS[target].fixed:
-        fast, slow, navigation = (generated_sources.sources(Choice(name), target) for name in names)
+        fast, slow, navigation = (pipeline.compile(Choice(name), target) for name in names)
         return fast, slow, navigation
-    programs = {name: generated_sources.program(Choice(name)) for name in names}
+    programs = {name: pipeline.program(Choice(name)) for name in names}
     settings = _in_ranges(settings or Settings(), programs[names[0]])
     inputs = {name: {signal.name for signal in program.inputs} for name, program in programs.items()}
     _require_inputs(settings, set().union(*inputs.values()))
@@ -202,11 +201,11 @@ def _of_inputs(settings: Settings, inputs: set[str]) -> Settings:
 
 def _fixed_loop(kernel: str, target: str, settings: Settings) -> Sources:
     """Return a loop in fixed point; without error feedback where it rounds nothing that goes on to the next call."""
-    loop = generated_sources.sources(Choice(kernel), target, settings)
+    loop = pipeline.compile(Choice(kernel), target, settings)
     if settings.carry == "none" or loop.fixed is None or loop.fixed.residuals:
         return loop
     # The same sources as from `strapgen generate` without the option.
-    return generated_sources.sources(Choice(kernel), target, replace(settings, carry="none"))
+    return pipeline.compile(Choice(kernel), target, replace(settings, carry="none"))
 
 
 def _formats(sources: Sources) -> dict[str, str]:

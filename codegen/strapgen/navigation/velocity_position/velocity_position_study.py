@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.design.frontier import frontier
 from strapgen.design.frontier.frontier import STATE, Candidate
@@ -24,7 +24,6 @@ from strapgen.lab.motions.specific_forces import SpecificForce
 from strapgen.lab.recordings.recording import InertialRecording
 from strapgen.navigation.courses.courses import course
 from strapgen.navigation.velocity_position.translations import GRAVITY, Translation, translate
-from strapgen.run import generated_sources
 from strapgen.run.backends import BACKENDS, backend, evaluator
 
 Array = NDArray[np.float64]
@@ -161,7 +160,7 @@ def _operations(one: Candidate) -> dict[str, float]:
     else:
         parts = [(one.choice, count), (_change(one), count)]
     return {
-        kind: sum(generated_sources.program(choice).operations[kind] / each for choice, each in parts)
+        kind: sum(pipeline.program(choice).operations[kind] / each for choice, each in parts)
         for kind in ("multiply", "add")
     }
 

@@ -10,8 +10,8 @@ import numpy as np
 import strapgen
 from strapgen import catalogue, pipeline
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import compiler, generated_sources
-from strapgen.storage import cache
+from strapgen.run import compiler
+from strapgen.storage import cache, stage_cache
 
 #: Runs with flags of the compiler.
 RUN = """
@@ -37,78 +37,79 @@ def test_sources_are_those_of_the_pipeline():
     choice = catalogue.choose("euler", "rk1", 3)
     program = strapgen.lower(catalogue.derive(choice))
     for target in strapgen.targets.TARGETS:
-        assert generated_sources.sources(choice, target) == strapgen.generate(program, target)
+        assert pipeline.compile(choice, target) == strapgen.generate(program, target)
 
 
 def test_what_a_user_does_to_the_files_changes_no_sources_of_others():
-    sources = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
+    sources = pipeline.compile(catalogue.choose("euler-product"), "numpy")
     files, operations = {**sources.files}, {**sources.operations}
     sources.files.clear()
     sources.operations.clear()
-    again = generated_sources.sources(catalogue.choose("euler-product"), "numpy")
+    again = pipeline.compile(catalogue.choose("euler-product"), "numpy")
     assert (again.files, again.operations) == (files, operations) and files and operations
 
 
 def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):
     choice = catalogue.choose("euler-product")
-    first = generated_sources.sources(choice, "numpy"), generated_sources.fixed_program(choice)
+    first = pipeline.compile(choice, "numpy"), pipeline.fixed_program(choice)
     monkeypatch.setattr(cache, "entry", None)
-    assert (generated_sources.sources(choice, "numpy"), generated_sources.fixed_program(choice)) == first
+    assert (pipeline.compile(choice, "numpy"), pipeline.fixed_program(choice)) == first
 
 
-def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch):
-    monkeypatch.setattr(generated_sources, "_entries", {})
-    monkeypatch.setattr(generated_sources, "_MOST_ENTRIES", 2)
-    read = []
+def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, tmp_path):
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(stage_cache, "_results", {})
+    monkeypatch.setattr(stage_cache, "_MOST_RESULTS", 2)
+    read, read_entry = [], cache.read
+
+    def noted(place, name):
+        read.append(place.name)
+        return read_entry(place, name)
+
+    monkeypatch.setattr(cache, "read", noted)
     for key in ("a", "b", "a", "c", "a", "b"):
-        assert generated_sources._remembered(key, "", lambda key=key: read.append(key) or key) == key
+        assert stage_cache._remembered("kind", key, "", lambda key=key: key, False) == key
     assert read == ["a", "b", "c", "b"]
 
 
 def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     choice = catalogue.choose("euler-normalize")
-    generated_sources.sources(choice, "numpy")
-    generated_sources.sources(choice, "numpy")
+    pipeline.compile(choice, "numpy")
+    pipeline.compile(choice, "numpy")
     assert len(list((tmp_path / "sources").iterdir())) == 1
     monkeypatch.setattr(cache, "generator_digest", lambda: "another generator")
-    generated_sources.sources(choice, "numpy")
+    pipeline.compile(choice, "numpy")
     assert len(list((tmp_path / "sources").iterdir())) == 2
 
 
 def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(generated_sources, "_programs", {})
     choice = catalogue.choose("euler-product")
     wanted = strapgen.lower(catalogue.derive(choice))
-    generated_sources.sources(choice, "numpy")
-    for name in ("_programs", "_entries"):  # as another process
-        monkeypatch.setattr(generated_sources, name, {})
+    pipeline.compile(choice, "numpy")
+    monkeypatch.setattr(stage_cache, "_results", {})  # as another process
 
     def never(_choice):
         raise AssertionError("derived again")
 
     monkeypatch.setattr(pipeline, "derive", never)
     settings = strapgen.Settings(16)
-    assert generated_sources.sources(choice, "c-fixed", settings) == strapgen.generate(
-        wanted, "c-fixed", settings
-    )
-    assert generated_sources.program(choice) == wanted
+    assert pipeline.compile(choice, "c-fixed", settings) == strapgen.generate(wanted, "c-fixed", settings)
+    assert pipeline.program(choice) == wanted
 
 
 def test_the_integer_model_takes_the_integers_of_the_c(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     choice = catalogue.choose("euler-normalize")
-    compiled = generated_sources.sources(choice, "c-fixed", Settings())
+    compiled = pipeline.compile(choice, "c-fixed", Settings())
 
     def never(*_):
         raise AssertionError("quantized again")
 
     with monkeypatch.context() as patch:
         patch.setattr(pipeline, "quantize", never)
-        model = generated_sources.sources(choice, "fixed-model", Settings())
+        model = pipeline.compile(choice, "fixed-model", Settings())
     assert model.fixed == compiled.fixed
     others = Settings(word=16)
-    assert generated_sources.fixed_program(choice, others) == pipeline.quantize(
-        generated_sources.program(choice), others
-    )
+    assert pipeline.fixed_program(choice, others) == pipeline.quantize(pipeline.program(choice), others)
