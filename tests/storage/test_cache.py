@@ -399,6 +399,80 @@ def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypat
     assert len(removed) == 1
 
 
+# Results of functions
+
+
+@pytest.fixture
+def doubled():
+    """A function whose results are kept, and the arguments that it was called with."""
+    calls = []
+
+    @cache.cached(
+        "results", lambda number, extra=(): [str(number), *extra], lambda number, extra=(): f"2 x {number}"
+    )
+    def double(number: int, extra: tuple[str, ...] = ()) -> tuple[int, None]:
+        calls.append(number)
+        if number < 0:
+            raise OSError(2, "no such number")
+        return 2 * number, None
+
+    return double, calls
+
+
+def test_a_result_is_worked_out_once_for_each_key(doubled, root, caplog):
+    double, calls = doubled
+    caplog.set_level("INFO", "strapgen")
+    assert [double(3), double(3), double(4), double(3, extra=("x",))] == [
+        (6, None),
+        (6, None),
+        (8, None),
+        (6, None),
+    ]
+    assert calls == [3, 4, 3]
+    assert caplog.messages == ["2 x 3: from the cache"]
+    assert len(names(root / "results")) == 3
+    assert double.__name__ == "double"
+
+
+def test_a_result_is_worked_out_again_with_another_generator(doubled, monkeypatch):
+    double, calls = doubled
+    double(3)
+    monkeypatch.setattr(cache, "generator_digest", lambda: "another version")
+    double(3)
+    assert calls == [3, 3]
+
+
+def test_a_damaged_result_is_worked_out_again(doubled, root):
+    double, calls = doubled
+    double(3)
+    (place,) = (root / "results").iterdir()
+    (place / "result.pickle").write_bytes(pickle.dumps((7, None)))
+    assert double(3) == (6, None) and calls == [3, 3]
+
+
+def test_a_result_that_is_removed_while_it_is_read_is_worked_out_again(doubled, monkeypatch):
+    double, calls = doubled
+    double(3)
+    looked_up = cache.lookup
+
+    def lookup(kind: str, key: str) -> Path | None:
+        place = looked_up(kind, key)
+        if place is not None and len(calls) == 1:
+            shutil.rmtree(place)
+        return place
+
+    monkeypatch.setattr(cache, "lookup", lookup)
+    assert double(3) == (6, None) and calls == [3, 3]
+
+
+def test_an_error_of_the_function_is_its_own_and_leaves_nothing(doubled, root):
+    double, calls = doubled
+    for _ in range(2):
+        with pytest.raises(FileNotFoundError, match="no such number"):
+            double(-1)
+    assert calls == [-1, -1] and not root.exists()
+
+
 # Who may write there
 
 

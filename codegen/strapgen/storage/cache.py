@@ -84,27 +84,32 @@ def generator_digest() -> str:
 
 
 def cached(
-    kind: str,
-    key: Callable[Arguments, Iterable[str | bytes]],
-    what: Callable[Arguments, str] = lambda *_, **__: "",
+    kind: str, key: Callable[Arguments, Iterable[str | bytes]], what: Callable[Arguments, str] | None = None
 ) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Decorate a function whose result, which can be pickled, depends on this package and the parts of a key alone.
+    """Decorate a function whose result depends on this package and the parts of a key alone, and can be pickled.
 
     `key` and `what` take the arguments of the function; `what` returns the name of the result in the log.
     """
 
     def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         @wraps(function)
-        def stored(*args: Arguments.args, **options: Arguments.kwargs) -> Result:
-            def fill(draft: Path) -> None:
-                (draft / _RESULT).write_bytes(pickle.dumps(function(*args, **options)))
+        def answer(*args: Arguments.args, **options: Arguments.kwargs) -> Result:
+            parts = digest([generator_digest(), *key(*args, **options)])
+            with suppress(FileNotFoundError):  # another process has removed it meanwhile
+                if (place := lookup(kind, parts)) is not None:
+                    known: Result = pickle.loads(read(place, _RESULT))
+                    if what is not None:
+                        from_cache(what(*args, **options))
+                    return known
+            result = function(*args, **options)
 
-            parts, name = digest([generator_digest(), *key(*args, **options)]), what(*args, **options)
-            content = persistently(lambda: read(entry(kind, parts, fill, name), _RESULT))
-            result: Result = pickle.loads(content)
+            def fill(draft: Path) -> None:
+                (draft / _RESULT).write_bytes(pickle.dumps(result))
+
+            entry(kind, parts, fill)
             return result
 
-        return stored
+        return answer
 
     return decorate
 

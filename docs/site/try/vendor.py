@@ -173,20 +173,12 @@ def _members(downloads: Path) -> Iterator[tuple[str, bytes]]:
     yield "bounds.json", bounds()
 
 
+@cache.cached(
+    "site-bounds", lambda: [*PROVED, str(PROVED_INCREMENTS)], lambda: "bounds of rounding for the site"
+)
 def bounds() -> bytes:
     """Return the bounds of `PROVED` on `PROVED_INCREMENTS` for every state, as `proved.load` takes them."""
-
-    def fill(draft: Path) -> None:
-        (draft / "bounds.json").write_text(json.dumps(dict(_proved_bounds())))
-
-    key = cache.digest([cache.generator_digest(), *PROVED, str(PROVED_INCREMENTS)])
-
-    def read() -> bytes:
-        return cache.read(
-            cache.entry("site-bounds", key, fill, "bounds of rounding for the site"), "bounds.json"
-        )
-
-    return cache.persistently(read)
+    return json.dumps(dict(_proved_bounds())).encode()
 
 
 def _proved_bounds() -> Iterator[tuple[str, dict[str, object]]]:

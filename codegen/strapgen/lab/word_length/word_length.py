@@ -251,34 +251,15 @@ def _several(values: Any) -> tuple[Any, ...]:
     return (values,) if single else tuple(values)
 
 
+def _contents(case: Case) -> list[str | bytes]:
+    """Return all that the outcome of a case depends on, the content of a motion's file included."""
+    motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
+    return [json.dumps(asdict(case), sort_keys=True), motion]
+
+
+@cache.cached("studies", _contents)
 def run_case(case: Case) -> Outcome:
-    """Run one case, or read its outcome from the cache, so that a study that was stopped continues where it was.
-
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    Outcome
-    """
-
-    def fill(draft: Path) -> None:
-        outcome = _run(case)
-        (draft / "outcome.json").write_text(
-            json.dumps({f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "case"})
-        )
-
-    source = Path(case.motion).read_bytes() if is_file(case.motion) else b""
-    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True), source])
-
-    def read() -> bytes:
-        return cache.read(cache.entry("studies", key, fill), "outcome.json")
-
-    return Outcome(case, **json.loads(cache.persistently(read)))
-
-
-def _run(case: Case) -> Outcome:
+    """Run one case, or take its outcome from the cache, so that a study that was stopped continues where it was."""
     h = checks.number("step", case.step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
     choice = catalogue.choose_step(case.algorithm, case.method, case.increments)
