@@ -368,6 +368,27 @@ def test_a_convention_reads_an_attitude(scalar, sense):
     np.testing.assert_array_equal(convention.matrices(matrix.reshape(1, 9))[0], expected)
 
 
+#: One sample a call and two from before it, which it is handed, the oldest first.
+HANDED = (
+    PARTS
+    + """
+void step(const double previous[2][3], const double d[3], double rotation[3])
+{
+    double older[3], newer[3];
+    cross(previous[OLDER], d, older); cross(previous[1 - OLDER], d, newer);
+    for (int i = 0; i < 3; i++) rotation[i] = d[i] + (7 * newer[i] - older[i]) / 60;
+}
+"""
+)
+
+
+@pytest.mark.parametrize(("older", "cause"), [(0, None), (1, causes.EARLIER_REVERSED)])
+def test_order_of_samples_that_are_handed_over_is_seen(outcome, older, cause):
+    text = HANDED.replace("OLDER", str(older))
+    checked = outcome(text, "previous[2][3], increments[3] -> rotation[3]")
+    assert (checked.holds, checked.cause) == (cause is None, cause)
+
+
 #: The recursion of an integrator between a gyro at a high rate and an attitude at a low one; it corrects a delta angle.
 RECURSION = (
     PARTS

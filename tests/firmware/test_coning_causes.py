@@ -137,6 +137,23 @@ def test_samples_in_reverse_order_are_known(samples):
     assert causes.cause(Products(samples, table, table)) == causes.REVERSED
 
 
+@each("form", FORMS)
+@each(("samples", "used", "kept"), [(1, 2, 2), (1, 3, 3), (1, 2, 3), (1, 1, 3), (2, 2, 2), (2, 3, 3)])
+def test_earlier_samples_in_reverse_order_are_known(samples, used, kept, form):
+    """With those of 4 before: what stands at -1 belongs to the oldest one that is kept, and the reverse."""
+    right = tables(samples, used, form)
+    at_once = dict(right.at_once)
+    for place in range(1, kept + 1):
+        for newer in range(samples):
+            at_once[-place, newer] = right.at_once[place - kept - 1, newer]
+    seen = Products(samples, at_once, at_once)
+    assert causes.cause(right) is None
+    assert causes.cause(tables(4, 1, form, 0.993)) != causes.EARLIER_REVERSED, (
+        "its earlier samples hardly count"
+    )
+    assert causes.cause(seen) == (None if at_once == right.at_once else causes.EARLIER_REVERSED)
+
+
 def test_another_size_is_told_in_numbers():
     table = {(0, 1): 0.6} | {pair: 0.0 for pair in pairs(2) if pair != (0, 1)}
     assert causes.cause(Products(2, table, table)) == "correction 0.9 times as large as needed"

@@ -15,6 +15,7 @@ LATE = "correction one sample late"
 FACTOR_TWO = "correction off by a factor of 2"
 SUM_LATE = "the sum of the samples before lacks the last one (one sample late)"
 REVERSED = "the samples of a call are taken in reverse order"
+EARLIER_REVERSED = "the samples from before a call are taken in reverse order, the newest first"
 STATE_KEPT = "state kept between runs"
 
 #: Smallest coefficient that counts as one.
@@ -205,6 +206,8 @@ def cause(products: Products) -> str | None:
                 return said
         if any(_alike(correction, shifted, noise) for shifted in _delayed(ideal, samples)):
             return LATE
+    if not right and _is_earlier_reversed(now, samples, noise):
+        return EARLIER_REVERSED
     ideal, turned = _one_by_one(samples)
     late_sum = {(older, newer): c for (older, newer), c in turned.items() if newer - older > 1}
     if samples > 1 and _alike(_less(now, late_sum), ideal, noise):
@@ -294,6 +297,24 @@ def _reversed(table: Table, samples: int, visible: Table) -> Table:
         if place in visible:
             seen[place] = value
     return seen
+
+
+def _is_earlier_reversed(now: Table, samples: int, noise: float) -> bool:
+    """Return whether coefficients are right if the samples from before a call stand from the newest to the oldest."""
+    known = [(ideal, _less(now, base)) for ideal, base in _ideals(samples)]
+    if any(_alike(correction, ideal, noise) for ideal, correction in known):
+        return False  # those from before a call are too small to tell
+    return any(
+        _alike(correction, turned, noise)
+        for ideal, correction in known
+        for turned in _earlier_reversed(ideal)
+    )
+
+
+def _earlier_reversed(ideal: Table) -> Iterator[Table]:
+    """Yield a correction with two samples from before a call or more, from the newest to the oldest."""
+    for count in range(max(2, -min(older for older, _ in ideal)), MOST_PREVIOUS + 1):
+        yield {(-1 - count - older if older < 0 else older, newer): c for (older, newer), c in ideal.items()}
 
 
 def _any(table: Table) -> bool:
