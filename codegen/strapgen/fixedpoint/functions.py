@@ -33,7 +33,7 @@ def _sine(chain: Chain, argument: str) -> None:
 
 
 def _cosine(chain: Chain, argument: str) -> None:
-    """Make the cosine; of a root, from what is under it, because the root is inexact near 0."""
+    """Make the cosine; of a root, from its radicand, because the root is inexact near 0."""
     under_root = _under_root(chain, argument)
     if under_root is not None and chain.range(argument).magnitude <= _UNREDUCED:
         value = _wave_series(chain, 0, argument, chain.computed(under_root))

@@ -177,7 +177,7 @@ def _product(context: DerivationContext, left: Terms, right: Terms, name: str) -
 
 
 def _factor(context: DerivationContext, terms: Terms, name: str) -> Terms:
-    """Return a factor as a constant, one stored quantity times a power of two, and what stands beside it."""
+    """Return a factor as a constant, one stored quantity times a power of two, and exact terms beside it."""
     linear = [monomial for monomial in terms if monomial]
     if is_dyadic(terms.get((), Fraction(0))) and all(
         len(m) == 1 and is_power_of_two(terms[m]) for m in linear

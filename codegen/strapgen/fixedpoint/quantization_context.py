@@ -126,7 +126,7 @@ def _reset(context: Quantization, quantity: Quantity) -> None:
 
 
 def _is_polynomial(quantities: Quantities, name: str) -> bool:
-    """Tell whether a quantity is a polynomial of the inputs: ranges of what comes after it may rest on that."""
+    """Tell whether a quantity is a polynomial of the inputs, on which ranges of later ones may rest."""
     pending, seen = [name], set[str]()
     while pending:
         definition = quantities.items[pending.pop()].definition

@@ -311,7 +311,7 @@ def _descend(program: Program, groups: list[tuple[str, ...]], weights: dict[str,
 
 
 def _note(program: Program, weights: Mapping[str, int], sensor: Sensor) -> str:
-    """Return what a reader of the code must know of the values in counts."""
+    """Return a note on the values in counts for a reader of the code."""
     known = f"s = {float(sensor.scale):.17g}{', from pi to 50 decimals' * sensor.is_rounded}"
     start = f"The increments are counts; with {known}, an angle in rad is s times its number in the code"
     groups: dict[int, list[str]] = {}

@@ -1,4 +1,4 @@
-"""What a back end needs of an attitude step beside the step: its other kernels, its identity and its orders."""
+"""Properties of an attitude step for back ends: its other kernels, its identity and its orders."""
 
 from __future__ import annotations
 

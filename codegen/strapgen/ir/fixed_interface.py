@@ -100,7 +100,7 @@ class RoundingAccumulation:
 
 @dataclass(frozen=True)
 class Interface:
-    """What a caller of fixed-point code must know."""
+    """The facts that a caller of fixed-point code must know."""
 
     settings: Settings
     inputs: tuple[Argument, ...]

@@ -28,23 +28,12 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Term:
-    """``factor * product of values * 2**shift``, an integer; a shift below zero rounds down.
+    """``factor * product of values * 2**shift``, an integer; a shift below zero rounds down."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Up to two values; two are words.
-    factor : int
-        Not zero; 1 or -1 with two values.
-    shift : int
-    coefficient : Coefficient or None
-        What the factor stands for, if it is a rounded number.
-    """
-
-    names: tuple[str, ...]
-    factor: int
+    names: tuple[str, ...]  # up to two values; two are words
+    factor: int  # not zero; 1 or -1 with two values
     shift: int = 0
-    coefficient: Coefficient | None = None
+    coefficient: Coefficient | None = None  # that of a factor that is a rounded number
 
 
 @dataclass(frozen=True)
@@ -54,31 +43,16 @@ class IntegerInput:
 
 @dataclass(frozen=True)
 class IntegerSum:
-    """A sum of fine terms that is divided by 2**shift and rounded, plus coarse terms that are exact after that.
+    """A sum of fine terms that is divided by 2**shift and rounded, plus coarse terms that are exact after that."""
 
-    Parameters
-    ----------
-    fine : tuple of Term
-        The terms that are rounded; all terms if nothing is rounded.
-    shift : int
-        Places that the rounding drops, 0 for none.
-    coarse : tuple of Term
-        The terms that are integers at the fraction of the result.
-    residual : ErrorFeedback or None
-        The rounding error of the last call; it is added in place of half a unit.
-    drop : int
-        Places below the last one of the error feedback; they are dropped before it is added.
-    in_words : bool
-        Whether what is left of the fine terms after rounding, and every partial sum with the coarse terms, fits into a
-        word.
-    """
-
-    fine: tuple[Term, ...]
-    shift: int = 0
-    coarse: tuple[Term, ...] = ()
-    residual: ErrorFeedback | None = None
-    drop: int = 0
-    in_words: bool = False
+    fine: tuple[Term, ...]  # those that are rounded; all if nothing is rounded
+    shift: int = 0  # bits that the rounding drops
+    coarse: tuple[Term, ...] = ()  # those that are integers at the fraction of the result
+    residual: ErrorFeedback | None = None  # the rounding error of the last call, in place of half a unit
+    drop: int = 0  # bits below the last one of the error feedback, dropped before it is added
+    in_words: bool = (
+        False  # whether the rounded sum, and every partial sum with coarse terms, fits into a word
+    )
 
 
 @dataclass(frozen=True)
@@ -129,43 +103,23 @@ IntegerDefinition = (
 
 @dataclass(frozen=True)
 class Value:
-    """An integer of a fixed-point program: it stands for ``offset + integer * 2**-fraction``.
-
-    Parameters
-    ----------
-    name : str
-    definition : IntegerDefinition
-    fraction : int
-    wide : bool
-        Whether the integer may exceed a word, so that a wide number holds it.
-    low, high : int
-        Proved range of the integer.
-    offset : Fraction
-        Constant that is not stored.
-    error : Fraction
-        Bound of its distance from the exact value, in units of the value.
-    peak : int
-        Bound of the magnitude of every partial sum on the way to it.
-    guarded : bool
-        Whether the range is checked when the code runs: the call returns an error for integers outside.
-    meaning : str
-        The comment where a named stage of the algorithm begins; "" elsewhere.
-    saturated : bool
-        Whether integers outside the range are replaced by its nearer end; the error is that before.
-    """
+    """An integer of a fixed-point program: it stands for ``offset + integer * 2**-fraction``."""
 
     name: str
     definition: IntegerDefinition
     fraction: int
-    wide: bool
+    wide: bool  # whether the integer may exceed a word, so that a wide number holds it
+    #: The proved range of the integer.
     low: int
     high: int
-    offset: Fraction
-    error: Fraction
-    peak: int
-    guarded: bool = False
-    meaning: str = ""
-    saturated: bool = False
+    offset: Fraction  # the constant that is not stored
+    error: Fraction  # bound of the distance from the exact value, in units of the value
+    peak: int  # bound of the magnitude of every partial sum
+    guarded: bool = False  # whether the range is checked when the code runs: a call outside returns an error
+    meaning: str = ""  # the comment where a named stage of the algorithm begins
+    saturated: bool = (
+        False  # whether the nearer end of the range replaces integers outside; `error` is that before
+    )
 
     @property
     def magnitude(self) -> int:
@@ -195,18 +149,7 @@ def _names(operands: Iterable[Scaled]) -> list[str]:
 
 
 def operation_counts(body: Iterable[Value], rounding: str) -> dict[str, int]:
-    """Return the number of integer operations of each kind.
-
-    Parameters
-    ----------
-    body : iterable of Value
-    rounding : str
-        "nearest" or "truncation".
-
-    Returns
-    -------
-    dict of str to int
-    """
+    """Return the number of integer operations of each kind."""
     counts = dict.fromkeys(("add", "multiply", "shift", "divide", "sqrt", "compare"), 0)
     for value in body:
         match value.definition:

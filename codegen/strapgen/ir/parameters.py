@@ -1,4 +1,4 @@
-"""Reads the settings of what is chosen by name, with a key for each parameter and unit."""
+"""Reads the parameters of things chosen by name, with a key for each parameter and unit."""
 
 from __future__ import annotations
 

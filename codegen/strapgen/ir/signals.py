@@ -118,7 +118,7 @@ class Signal:
 
     @property
     def is_angle_increment(self) -> bool:
-        """Whether it is what a gyro measures: an angle increment of the cycle in body axes."""
+        """Whether it is the measurement of a gyro: an angle increment of the cycle in body axes."""
         return (self.unit, self.frame, self.over) == ("rad", "b", CYCLE)
 
     @property

@@ -1,4 +1,4 @@
-"""Says in one line that a name is not known: what was perhaps meant, and what is allowed."""
+"""Messages that a name is not known: the names perhaps meant, and those allowed, in one line."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def needed(number: int) -> str:
 
 
 def some(names: Iterable[str]) -> str:
-    """Return names in a list; of many the first ones, and how many more there are."""
+    """Return names in a list; of many the first ones, and the number of the others."""
     every = list(names)
     more = len(every) - MOST_NAMES
     return ", ".join(every) if more < 2 else f"{', '.join(every[:MOST_NAMES])} and {more} more"

@@ -105,7 +105,7 @@ def accumulation_text(accumulation: RoundingAccumulation, program: Program, stat
 
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
-    """Return how to normalize the state of a step, and what to do after an error code; "" for another kernel."""
+    """Return advice on normalizing the state of a step, before and after an error code; "" for another kernel."""
     if program.companions is None or program.companions.orthonormalize is None:
         return ""
     kernel = program.companions.orthonormalize

@@ -1,4 +1,4 @@
-"""The contract of a generated function in lines that programs read: what a call requires, and what it then ensures.
+"""The contract of a generated function in lines that programs read: requirements of a call, and its results.
 
 All arithmetic in them is exact. An argument stands for the numbers in memory, which are integers in fixed point.
 """

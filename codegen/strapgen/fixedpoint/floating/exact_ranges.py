@@ -147,7 +147,7 @@ class ExactRanges:
         return _cosine(ranges[0].magnitude, Fraction(1, 6))  # sinc(x) >= 1 - x^2/6
 
     def _kept_from_zero(self, place: int, label: str) -> Interval:
-        """Return the range of a divisor or a radicand, by a condition near what it is on proper inputs if need be."""
+        """Return the range of a divisor or a radicand, if need be by a condition near its range on proper inputs."""
         known = self.ranges[place]
         proper = _near(np.atleast_1d(self._proper[place]))
         if proper is not None and (known.low <= 0 <= known.high or proper.low > 2 * known.low > 0):

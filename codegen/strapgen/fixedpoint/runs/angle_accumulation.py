@@ -49,7 +49,7 @@ class _Sizes:
 
     @property
     def added(self) -> Fraction:
-        """A bound of what a step adds to the state and to what will be fed back."""
+        """A bound of the errors that a step adds to the state, and to the errors to be fed back."""
         unsteady = 2 * self.away + self.transition + 2 * self.transition_feedback
         error = self.local + self.longest * self.transition + self.state_feedback * self.away
         return error + self.transition_feedback * (
@@ -58,7 +58,7 @@ class _Sizes:
 
     @property
     def fed_back(self) -> Fraction:
-        """A bound of what will be fed back."""
+        """A bound of the errors to be fed back."""
         return self.state_feedback + self.longest * self.transition_feedback
 
 

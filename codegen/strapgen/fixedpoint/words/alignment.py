@@ -36,7 +36,7 @@ def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Containe
 
 
 def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int, int]]:
-    """Yield the values that another is computed from: by how many bits each should be coarser, and may be."""
+    """Yield the operands of a value, each with the bits by which it should be coarser, and by which it may be."""
     definition = value.definition
     if not isinstance(definition, IntegerSum) or value.wide or not definition.shift:
         # Every bit counts of what is compared, or added at full precision.
@@ -62,7 +62,7 @@ def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int,
 
 
 def _room(term: Term, place: int, value: Value, factor: Value, others: list[Value]) -> int:
-    """Return by how many bits a factor of a term may be coarser, so that the error of the sum hardly grows."""
+    """Return the bits by which a factor of a term may be coarser, so that the error of the sum hardly grows."""
     # What an error of the factor is multiplied with, as an integer with fraction bits.
     size, bits = abs(term.factor), place - factor.fraction
     for other in others:

@@ -143,7 +143,7 @@ class _Filter:
     def _changes(
         self, integers: Sequence[int], bits: Sequence[int], pair: tuple[int, int]
     ) -> tuple[int, int]:
-        """Return by how many units two coefficients change so that the moments are right."""
+        """Return the changes of two coefficients, in units, that make the moments right."""
         unit = Fraction(2) ** bits[pair[0]]
         rows: list[tuple[int, int]] = []
         missing: list[int] = []

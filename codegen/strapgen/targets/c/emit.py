@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
@@ -133,40 +133,44 @@ def sources_of(
 
 def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
     """Return the header and the source of a program with its printed names."""
-    real = real_of(target)
-    printer = CPrinter(real, name)
-    command = f"{contract.generating(program)} --target {target}"
-    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
-    values = {
-        "program": program,
+    printer = CPrinter(real_of(target), name)
+    runs_printer = CPrinter(printer.real, f"{name}_runs")
+    values = values_of(program, name, target, printer, rounding) | {
         "guard": f"{name}_h".upper(),
-        "command": command,
-        "contract": contract_lines.of_program(program, name, command, rounding),
         "definitions": definitions.of_program(program, name, printer),
-        "normalizing": contract.upkeep_text(program, target=target),
-        "real": real,
-        "rounding": rounding_text(rounding, program),
-        "state": program.inputs[0],
-        "samples": program.inputs[-1],
         "result": program.outputs[0].signal,
-        "parameters": ", ".join(parameters_of(program, real)),
-        "own": own_call(parameters_of(program, real), name),
-        "propagate_parameters": propagate_parameters(program, real, name),
-        "arrays": arrays_of(program, real),
-        "calls": calls_of(program),
-        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
         "code": code_of(program, printer),
-        "propagation": _loop(program, CPrinter(real, f"{name}_runs"), name) if program.companions else None,
-        "uses_math": uses_math(nodes),
-        "functions": {node.kind for node in nodes},
-        "turn": tuple(map(printer.constant, HALF_TURNS)) if any(n.kind == "wrap" for n in nodes) else None,
+        "propagation": _loop(program, runs_printer, name) if program.companions else None,
     }
     return render_c("c", name, **values)
 
 
-def uses_math(nodes: Iterable[Operation]) -> bool:
-    """Tell whether one of some operations is a function of math.h."""
-    return any(node.kind in FUNCTIONS and node.kind not in ("at_least", "select", "wrap") for node in nodes)
+def values_of(
+    program: Program, name: str, target: str, printer: CPrinter, rounding: RoundingBounds
+) -> dict[str, Any]:
+    """Return the values for the templates of C, C++ and Rust, those of the C interface among them."""
+    real, command = printer.real, f"{contract.generating(program)} --target {target}"
+    parameters = _parameters(program, real)
+    kinds = {node.kind for a in program.body for node in walk(a.value) if isinstance(node, Operation)}
+    return {
+        "program": program,
+        "command": command,
+        "contract": contract_lines.of_program(program, name, command, rounding),
+        "normalizing": contract.upkeep_text(program, target=target),
+        "rounding": rounding_text(rounding, program),
+        "real": real,
+        "state": program.inputs[0],
+        "samples": program.inputs[-1],
+        "parameters": ", ".join(parameters),
+        "own": own_call(parameters, name),
+        "propagate_parameters": _propagate_parameters(program, real, name),
+        "arrays": _arrays(program, real),
+        "calls": _calls(program),
+        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
+        "uses_math": bool(kinds & FUNCTIONS.keys() - {"at_least", "select", "wrap"}),
+        "functions": kinds,
+        "turn": tuple(map(printer.constant, HALF_TURNS)) if "wrap" in kinds else (),
+    }
 
 
 def code_of(
@@ -271,7 +275,7 @@ def _in_vectors(program: Program) -> bool:
     )
 
 
-def parameters_of(program: Program, real: Real) -> list[str]:
+def _parameters(program: Program, real: Real) -> list[str]:
     """Return the parameters of a function on one sample."""
     inputs = [
         f"const {real.name} {s.name}[{s.size}]" if s.shape else f"{real.name} {s.name}"
@@ -281,7 +285,7 @@ def parameters_of(program: Program, real: Real) -> list[str]:
     return inputs + outputs
 
 
-def propagate_parameters(program: Program, real: Real, name: str) -> str:
+def _propagate_parameters(program: Program, real: Real, name: str) -> str:
     """Return the parameters of the loop over runs and steps."""
     pieces = [
         *PROPAGATE,
@@ -293,13 +297,13 @@ def propagate_parameters(program: Program, real: Real, name: str) -> str:
     return ", ".join(pieces)
 
 
-def arrays_of(program: Program, real: Real) -> str:
+def _arrays(program: Program, real: Real) -> str:
     """Return the parameters of a function on arrays of samples."""
     inputs = [f"const {real.name} *{s.name}" for s in program.inputs]
     return ", ".join(inputs + [f"{real.name} *{r.signal.name}" for r in program.outputs])
 
 
-def calls_of(program: Program) -> str:
+def _calls(program: Program) -> str:
     """Return the arguments of sample `k` for a function on one sample."""
     inputs = [f"{s.name} + {s.size} * k" if s.shape else f"{s.name}[k]" for s in program.inputs]
     return ", ".join(inputs + [f"{r.signal.name} + {r.signal.size} * k" for r in program.outputs])

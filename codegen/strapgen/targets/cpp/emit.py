@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from strapgen.ir.float_interface import RoundingBounds
-from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.targets import contract, contract_lines, definitions
+from strapgen.targets import definitions
 from strapgen.targets.c import emit as c
-from strapgen.targets.c.rounding_text import rounding_text
 from strapgen.targets.cpp.text import CHECK, CPP, constants, result_of, runs_of
 from strapgen.targets.names import function_name
-from strapgen.targets.rendering import own_call, render
+from strapgen.targets.rendering import render
 
 _FUNCTIONS = {kind: f"std::{kind}({{}})" for kind in ("sqrt", "sin", "cos")} | {
     "sinc": "{n}_sc_({})",
@@ -40,19 +39,14 @@ def emit(program: Program, target: str) -> Sources:
 def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:
     """Return the header and the C interface of a program with its printed names."""
     printer = _CppPrinter(c.real_of(target), name)
-    command = f"{contract.generating(program)} --target {target}"
-    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     outputs = [(f"std::array<{printer.real.name}, {r.signal.size}>", r.signal.name) for r in program.outputs]
     header, runs = runs_of(name)
-    values = interface_values(program, printer, name, header) | {
+    values = c.values_of(program, name, target, printer, rounding) | interface_values(program, name, header)
+    values |= {
         "file": f"{name}.hpp",
         "guard": f"{name}_hpp".upper(),
-        "command": command,
         "check": CHECK,
-        "contract": contract_lines.of_program(program, name, command, rounding),
         "constants": constants(definitions.of_program(program, name, printer), printer.real.name),
-        "normalizing": contract.upkeep_text(program, target=target),
-        "rounding": rounding_text(rounding, program),
         "digits": 53 if printer.real.bytes == 8 else 24,
         "result": result_of(name, outputs),
         "outputs": outputs,
@@ -65,33 +59,19 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "returned": ", ".join(
             f"{{{{{', '.join(map(printer.text, result.nodes))}}}}}" for result in program.outputs
         ),
-        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
         "code": c.code_of(program, printer) | {"stores": []},
-        "specifier": "inline" if c.uses_math(nodes) else "constexpr",
-        "uses_math": c.uses_math(nodes),
-        "functions": {node.kind for node in nodes},
-        "turn": tuple(map(printer.constant, c.HALF_TURNS)),
+        "specifier": "inline" if values["uses_math"] else "constexpr",
     }
     templates = {f"{name}.hpp": "function.hpp", header: "interface.h", runs: "runs.cpp"}
     return {file: render(f"cpp/{template}.j2", **values) for file, template in templates.items()}
 
 
-def interface_values(program: Program, printer: c.CPrinter, name: str, header: str) -> dict[str, object]:
-    """Return the values for the templates of the C interface, whatever the language behind it is."""
-    real = printer.real
+def interface_values(program: Program, name: str, header: str) -> dict[str, str]:
+    """Return the values for the templates of a C interface to another language, beside those of the C itself."""
     return {
-        "program": program,
         "name": name,
         "header": header,
         "guard_of_runs": header.replace(".", "_").upper(),
-        "real": real,
-        "state": program.inputs[0],
-        "samples": program.inputs[-1],
-        "parameters": ", ".join(c.parameters_of(program, real)),
-        "own": own_call(c.parameters_of(program, real), name),
-        "propagate_parameters": c.propagate_parameters(program, real, name),
-        "arrays": c.arrays_of(program, real),
-        "calls": c.calls_of(program),
         "unpacked": ", ".join(
             f"{name}_in_<{s.size}>(a{k}_)" if s.shape else f"a{k}_" for k, s in enumerate(program.inputs)
         ),

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from strapgen.ir.float_interface import RoundingBounds
-from strapgen.ir.program import Operation, Program, walk
+from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.targets import contract, contract_lines, definitions
+from strapgen.targets import definitions
 from strapgen.targets.c import emit as c
 from strapgen.targets.c.rounding_text import rounding_text
 from strapgen.targets.cpp.emit import interface_values
@@ -68,20 +68,16 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
     """Return the module and the C interface of a program with its printed names."""
     printer = _RustPrinter(c.real_of(target), name)
     kind = TYPES[printer.real.name]
-    command = f"{contract.generating(program)} --target {target}"
-    nodes = [node for a in program.body for node in walk(a.value) if isinstance(node, Operation)]
     outputs = [(array(kind, r.signal.size), r.signal.name) for r in program.outputs]
     header, runs = runs_of(name, "rust", "rs")
     several = len(outputs) > 1
     returned = [f"[{', '.join(map(printer.text, result.nodes))}]" for result in program.outputs]
-    values = interface_values(program, printer, name, header) | {
+    values = c.values_of(program, name, target, printer, rounding) | interface_values(program, name, header)
+    values |= {
         "file": f"{name}.rs",
         "kind": kind,
-        "command": command,
         "check": CHECK,
-        "contract": contract_lines.of_program(program, name, command, rounding),
         "constants": constants(definitions.of_program(program, name, printer), printer.real.name),
-        "normalizing": contract.upkeep_text(program, target=target),
         "rounding": rounding_text(rounding, program, flag=""),
         "structure": structure_name(name),
         "result": structure_name(name) if several else outputs[0][0],
@@ -90,18 +86,15 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
             f"{s.name}: &{array(kind, s.size)}" if s.shape else f"{s.name}: {kind}" for s in program.inputs
         ),
         "returned": list(zip((o for _, o in outputs), returned, strict=True)),
-        "unused": [s.name for s in program.inputs if not program.used() & set(s.elements)],
         "code": c.code_of(program, printer) | {"stores": []},
-        "library": _library(nodes),
-        "functions": {node.kind for node in nodes},
-        "turn": tuple(map(printer.constant, c.HALF_TURNS)),
+        "library": _library(values["functions"]),
         "several": several,
     }
     templates = {f"{name}.rs": "rust/module.rs.j2", header: "cpp/interface.h.j2", runs: "rust/runs.rs.j2"}
     return {file: render(template, **values) for file, template in templates.items()}
 
 
-def _library(nodes: Iterable[Operation]) -> dict[str, tuple[str, ...]]:
+def _library(kinds: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return the functions of the C library that some operations call, with the names of their parameters."""
-    names = sorted({name for node in nodes for name in _LIBRARY.get(node.kind, ())})
+    names = sorted({name for kind in kinds for name in _LIBRARY.get(kind, ())})
     return {name: _PARAMETERS.get(name, ("x",)) for name in names}
