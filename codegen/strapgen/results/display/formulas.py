@@ -81,7 +81,7 @@ def _counts(program: Program) -> list[tuple[str, int]]:
 
 
 def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
-    """Return what is to be shown of a kernel as a report.
+    """Return the formulas, the program or the operations of a kernel as a report.
 
     Parameters
     ----------
@@ -156,7 +156,8 @@ def short_latex(kernel: Kernel) -> str | None:
 def _in_vectors(kernel: Kernel) -> str | None:
     """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
     form = None if kernel.unknowns else vector_form(kernel)
-    return stages_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
+    state = kernel.inputs[0].elements[0].partition("_")[0]  # the letter of its elements
+    return stages_latex(kernel) if form is None else vectors_latex(form, state)
 
 
 def elements_latex(kernel: Kernel) -> str:
@@ -177,11 +178,6 @@ def elements_latex(kernel: Kernel) -> str:
         ),
         names,
     )
-
-
-def _state(kernel: Kernel) -> str:
-    """Return the letter of the state: that of its elements."""
-    return kernel.inputs[0].elements[0].partition("_")[0]
 
 
 def _latex_name(element: str) -> str:
