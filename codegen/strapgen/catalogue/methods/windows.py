@@ -102,8 +102,6 @@ class _BuiltInWindows(Mapping[str, Window]):
 def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
     """Return the samples before and ahead of the one-sided filters of a family, in the order of `Window.one_sided`.
 
-    Examples
-    --------
     >>> one_sided_sizes(2, 2)
     [(3, 1), (4, 0), (0, 4), (1, 3)]
     """
@@ -115,8 +113,6 @@ def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
 def start_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
     """Return the samples before and ahead of the filters of the start, in the order of `Window.start`.
 
-    Examples
-    --------
     >>> start_sizes(2, 2)
     [(0, 4), (1, 3)]
     """
@@ -124,10 +120,8 @@ def start_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
 
 
 def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]]:
-    """Return those sizes whose filters a file has to hold: with an ideal gyro and p = L the others are mirrored.
+    """Return the sizes whose filters a file has to hold: with an ideal gyro and p = L the others are mirrored.
 
-    Examples
-    --------
     >>> stored_sizes(2, 2, True), stored_sizes(2, 1, True)
     ([(3, 1), (4, 0)], [(3, 0), (0, 3), (1, 2)])
     """
@@ -150,8 +144,6 @@ EXACT, EXACT_TERMS = "-exact", 16
 def named_window(method: str | Window) -> Window | None:
     """Return the window that a method is or names; None for the name of any other method.
 
-    Examples
-    --------
     >>> named_window("window-7-7-exact").rotation, named_window("rk4")
     ('exact', None)
     """

@@ -28,14 +28,7 @@ _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
 
 def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
-    """Return a kernel's formulas as text, stage by stage.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    notes : sequence of str, optional
-        Remarks, by default the kernel's own.
-    """
+    """Return a kernel's formulas as text, stage by stage, with notes, by default the kernel's own."""
     lines = [kernel.title, f"source: {kernel.source}", ""]
     for signal in kernel.inputs:
         shape = " x ".join(map(str, signal.shape)) or "scalar"
@@ -81,15 +74,7 @@ def _counts(program: Program) -> list[tuple[str, int]]:
 
 
 def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
-    """Return the formulas, the program or the operations of a kernel as a report.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    program : Program
-    show : str
-        "text" or "latex" for the formulas, "program" or "operations"; the last two are tables.
-    """
+    """Return as a report the formulas, "text" or "latex", or a table of the "program" or its "operations"."""
     texts: dict[str, Callable[[], str]] = {
         "text": lambda: as_text(kernel, program.notes),
         "latex": lambda: as_latex(kernel),
@@ -136,10 +121,6 @@ def as_latex(kernel: Kernel) -> str:
     A step is in vectors, their scalar and cross products, as its program computes it. Where that would be longer than
     the stages, these are written, as sums and products of vectors, quaternions (a vector has the scalar part 0) and
     matrices; what is no such sum is written element by element.
-
-    Parameters
-    ----------
-    kernel : Kernel
     """
     return _in_vectors(kernel) or elements_latex(kernel)
 
