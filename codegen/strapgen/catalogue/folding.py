@@ -14,7 +14,7 @@ from strapgen.ir.suggestions import counted, needed, unknown
 from strapgen.kernel.evaluation import exact
 from strapgen.kernel.kernel import Kernel, Stage
 
-#: What an expression holds that has no real value.
+#: Parts of an expression without a real value.
 _UNDEFINED = (sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I)
 
 

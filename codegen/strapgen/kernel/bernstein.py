@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 #: Bits of the largest coefficient, and of a bound, so few that no rounding in the samples shows in it.
 _BITS, _BOUND_BITS = 50, 10
-#: How far above the largest value of the samples a bound may be: a part of that, and a part of the largest coefficient.
+#: Margins of a bound above the largest value of the samples: a part of that, and a part of the largest coefficient.
 _ROOMS = (
     (Fraction(1, 32), Fraction(1, 1 << 36)),
     (Fraction(1, 8), Fraction(1, 1 << 24)),

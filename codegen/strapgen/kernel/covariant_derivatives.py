@@ -139,14 +139,12 @@ class CovariantFunction:
             name = f"{self._label}gradient_{k}_{j}"
             symbols = []
             for place, expression in enumerate(total):
-                plain = expression.is_number or expression.is_Symbol
-                symbols.append(expression if plain else self._element(name, place, expression))
+                if not (expression.is_number or expression.is_Symbol):
+                    meaning = f"element {place} of the derivative by a scalar product"
+                    expression = self._build.value(f"{name}_{place}", expression, meaning)
+                symbols.append(expression)
             self._gradients[k, j] = symbols
         return self._gradients[k, j]
-
-    def _element(self, name: str, place: int, expression: sp.Expr) -> sp.Symbol:
-        meaning = f"element {place} of the derivative by a scalar product"
-        return self._build.value(f"{name}_{place}", expression, meaning)
 
     def _value(self, name: str, polynomial: Polynomial) -> sp.Expr:
         """Name the value of a polynomial; a constant or a scalar product has no name of its own."""

@@ -13,15 +13,7 @@ import sympy as sp
 
 
 def skew(v: sp.Matrix) -> sp.Matrix:
-    """Return the matrix of the cross product: ``skew(v) * u == v x u``.
-
-    Parameters
-    ----------
-    v : Matrix, 3 x 1
-
-    Returns
-    -------
-    Matrix, 3 x 3
+    """Return the 3 x 3 matrix of the cross product with a vector, 3 x 1: ``skew(v) * u == v x u``.
 
     Examples
     --------
@@ -56,17 +48,7 @@ def dot(u: Sequence[Any], v: Sequence[Any]) -> Any:
 
 
 def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
-    """Return the quaternion product p q: the rotation q followed by the rotation p, both in reference axes.
-
-    Parameters
-    ----------
-    p, q : Matrix, 4 x 1
-        Quaternions, scalar last.
-
-    Returns
-    -------
-    Matrix, 4 x 1
-        Scalar last.
+    """Return the product p q of quaternions, 4 x 1, scalar last: q followed by p, both in reference axes.
 
     Examples
     --------
@@ -79,31 +61,12 @@ def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
 
 
 def quaternion_conjugate(q: sp.Matrix) -> sp.Matrix:
-    """Return the conjugate of a quaternion, scalar last.
-
-    Parameters
-    ----------
-    q : Matrix, 4 x 1
-
-    Returns
-    -------
-    Matrix, 4 x 1
-    """
+    """Return the conjugate of a quaternion, 4 x 1, scalar last."""
     return sp.Matrix([-q[0], -q[1], -q[2], q[3]])
 
 
 def quaternion_matrix(q: sp.Matrix) -> sp.Matrix:
-    """Return the matrix of ``v -> q v q*``: ``|q|^2`` times the direction cosine matrix of q.
-
-    Parameters
-    ----------
-    q : Matrix, 4 x 1
-        Quaternion, scalar last.
-
-    Returns
-    -------
-    Matrix, 3 x 3
-    """
+    """Return the matrix of ``v -> q v q*``, 3 x 3: ``|q|^2`` times the direction cosine matrix of q, scalar last."""
     columns = []
     for axis in range(3):
         unit = sp.Matrix([int(k == axis) for k in range(4)])
@@ -121,28 +84,12 @@ PAULI = (
 
 
 def cayley_klein_matrix(a: sp.Matrix) -> sp.Matrix:
-    """Return U = a1 I + i (a2 s1 + a3 s2 + a4 s3), the complex 2 x 2 form of Cayley-Klein parameters.
-
-    Parameters
-    ----------
-    a : Matrix, 4 x 1
-        Cayley-Klein parameters, scalar **first**.
-    """
+    """Return U = a1 I + i (a2 s1 + a3 s2 + a4 s3), the complex 2 x 2 form of Cayley-Klein parameters, a1 the scalar."""
     return a[0] * sp.eye(2) + sp.I * sum((a[k + 1] * PAULI[k] for k in range(3)), sp.zeros(2, 2))
 
 
 def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
-    """Return the real parameters of U, the inverse of `cayley_klein_matrix`.
-
-    Parameters
-    ----------
-    U : Matrix, 2 x 2
-
-    Returns
-    -------
-    Matrix, 4 x 1
-        Scalar **first**.
-    """
+    """Return the real parameters, 4 x 1, scalar **first**, of a 2 x 2 matrix: the inverse of `cayley_klein_matrix`."""
     parts = [U.trace() / 2, *((U * s).trace() / (2 * sp.I) for s in PAULI)]
     return sp.Matrix([sp.expand(part) for part in parts])
 
@@ -222,15 +169,6 @@ def quaternion(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = 
 
 
 def adjugate(A: sp.Matrix) -> sp.Matrix:
-    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns.
-
-    Parameters
-    ----------
-    A : Matrix, 3 x 3
-
-    Returns
-    -------
-    Matrix, 3 x 3
-    """
+    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns."""
     a, b, c = A[:, 0], A[:, 1], A[:, 2]
     return sp.Matrix([cross_elements(b, c), cross_elements(c, a), cross_elements(a, b)])

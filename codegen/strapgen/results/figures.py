@@ -18,7 +18,7 @@ RESOLUTION_DPI = 150
 #: Colours that the colour-blind tell apart too; the first three are those of M. Okabe and K. Ito, 2008.
 COLOURS = ("#0072b2", "#d55e00", "#009e73")
 _SEVERAL = (*COLOURS, "#332288", "#cc79a7", "#8c5a00", "#88001b", "#6b6b6b")
-#: How far colours from dark to light go, so that the last one still shows on white.
+#: End of the colours from dark to light, the last of which still shows on white.
 LIGHTEST = 0.62
 
 

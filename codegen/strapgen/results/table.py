@@ -14,7 +14,7 @@ from typing import Any
 
 from strapgen.ir.units import STANDARD_GRAVITY
 
-#: How numbers of a kind are written: angles in deg or rad, errors, times and steps in s.
+#: Formats of angles in deg or rad, of errors, and of times and steps in s.
 ANGLE, ERROR, SECONDS = ".3g", ".3e", ".6g"
 #: For each unit of a mean rate the unit that a person reads, and the factor to it.
 READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1e6 / STANDARD_GRAVITY)}
@@ -22,7 +22,7 @@ READABLE_UNITS = {"rad/s": ("deg/h", math.degrees(3600)), "m/s^2": ("micro-g", 1
 _PAGE, _BETWEEN = 64, 2
 #: Lines of a table in LaTeX that a page holds.
 _HEIGHT = 36
-#: What stands in LaTeX for characters that it reads otherwise, or has not.
+#: LaTeX for characters that it reads otherwise, or has not.
 _LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
     **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},

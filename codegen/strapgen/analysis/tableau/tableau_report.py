@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from strapgen.catalogue.methods import order_conditions
-from strapgen.catalogue.methods.coefficients import text
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.results.display.methods import method_latex
 from strapgen.results.report import Report
@@ -32,10 +31,10 @@ def tableau_data(tableau: Tableau) -> dict[str, Any]:
         "embedded_order": None if embedded is None else order_conditions.embedded_order(tableau),
         "tolerance": float(tableau.tolerance),
         "largest_residual": float(order_conditions.largest_residual(tableau)),
-        "nodes": [text(value) for value in tableau.nodes],
-        "matrix": [[text(value) for value in row] for row in tableau.matrix],
-        "weights": [text(value) for value in tableau.weights],
-        "embedded_weights": None if embedded is None else [text(value) for value in embedded],
+        "nodes": [str(value) for value in tableau.nodes],
+        "matrix": [[str(value) for value in row] for row in tableau.matrix],
+        "weights": [str(value) for value in tableau.weights],
+        "embedded_weights": None if embedded is None else [str(value) for value in embedded],
     }
 
 

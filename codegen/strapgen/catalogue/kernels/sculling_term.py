@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import sympy as sp
 
 from strapgen.catalogue.kernels.attitude_step import chosen
@@ -42,7 +40,8 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
                 unit=(angles, velocities)[levered].unit,
                 meaning=f"sum of older {what} increments that is crossed with {names[crossed][newer]}",
             )
-            lever = build.stage(signal, _combined(weights, rows[levered]))
+            terms = (exact(c) * rows[levered][older] for older, c in weights.items())
+            lever = build.stage(signal, sum(terms, sp.zeros(3, 1)))
             total += cross(lever, rows[crossed][newer])
     build.output(
         Signal.vector(
@@ -63,10 +62,3 @@ def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
         f"{method.source.partition('; ')[0]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
         arguments=f"sculling {option}",
     )
-
-
-def _combined(weights: dict[int, Fraction], vectors: list[sp.Matrix]) -> sp.Matrix:
-    total = sp.zeros(3, 1)
-    for k, c in weights.items():
-        total += exact(c) * vectors[k]
-    return total

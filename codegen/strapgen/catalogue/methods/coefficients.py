@@ -65,9 +65,14 @@ def number(what: str, value: Any) -> Number:
         raise InputError(f"{what} is {_shown(value)}: it is nested too deeply") from None
 
 
-def text(value: Number) -> str:
-    """Return a number as text that `number` reads."""
-    return str(value)
+def short_text(value: Number) -> str:
+    """Return a number as text, exact if that is short, otherwise rounded."""
+    if not isinstance(value, Fraction):
+        import sympy as sp
+
+        value = sp.expand(value)
+    exact = str(value)
+    return exact if len(exact) <= 40 else f"about {float(value):.9g}"
 
 
 def _shown(value: str) -> str:

@@ -1,8 +1,8 @@
 """Combined coning coefficients with everything else of the polynomial through the samples, integrated exactly.
 
 Terms to fourth order are what combined coefficients lose on large slow cones. Here the step turns by h, by the exact
-rotation of the polynomial, and by h again: h is the rotation by half of what combined coefficients differ from the
-uncompressed ones, which are those of the polynomial.
+rotation of the polynomial, and by h again: h is the rotation by half the difference of
+combined and uncompressed coefficients, of which the latter are those of the polynomial.
 
 The difference is exact for the products of powers of time in which the two forms agree. In the Legendre coefficients of
 the rate it consists of products of high degree alone.

@@ -167,7 +167,7 @@ class Stages:
         rational: Callable[[Fraction], Any] = Fraction,
         number: Callable[[Any], Any] = Fraction,
     ) -> None:
-        self.rational, self.number = rational, number
+        self.rational, self.number = rational, number  # a fraction to an element, and an element to a number
         self.nodes, self.weights, *self.matrix = rows
         self.zero, one = self.rational(Fraction(0)), self.rational(Fraction(1))
         self.ones = [one] * len(self.nodes)

@@ -17,12 +17,7 @@ from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
 def method(tableau: Tableau) -> Method:
-    """Return the method of a tableau.
-
-    Parameters
-    ----------
-    tableau : Tableau
-    """
+    """Return the method of a tableau."""
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         turns = {node: samples.turn(node, kinematics.scale) for node in nodes(tableau)}
@@ -51,14 +46,8 @@ def method(tableau: Tableau) -> Method:
 def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None) -> Kernel:
     """Return one integration step in the textbook form, with slopes of the state instead of a transition.
 
-    The step from `method` is the same polynomial of its inputs; this form is for comparison.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-    tableau : Tableau
-    increments : int or None
-        Angle increments per step; None for a step that takes the rate at every node.
+    The step from `method` is the same polynomial of its inputs; this form is for comparison. It takes so many angle
+    increments in rad, or the rate at every node if they are None.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)

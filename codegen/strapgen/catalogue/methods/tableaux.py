@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
 from strapgen.catalogue.methods.coefficient_files import entries
+from strapgen.catalogue.methods.coefficients import short_text
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -220,7 +221,7 @@ def verify(tableau: Tableau) -> None:
         if defect != 0 and not (tableau.tolerance and abs(defect) <= tableau.tolerance):
             node = tableau.nodes[number - 1]
             raise InputError(
-                f"matrix row {number} sums to {_shown(node + defect)}; its node is {_shown(node)}"
+                f"matrix row {number} sums to {short_text(node + defect)}; its node is {short_text(node)}"
             )
     for order in range(1, tableau.order + 1):
         failure = order_conditions.first_failure(tableau, order)
@@ -228,19 +229,9 @@ def verify(tableau: Tableau) -> None:
             tree, defect = failure
             needed = Fraction(1, order_conditions.density(tree))
             raise InputError(
-                f"order {order}: {order_conditions.weight_text(tree)} = {_shown(needed + defect)}, "
-                f"{needed} is needed (off by {_shown(defect)})"
+                f"order {order}: {order_conditions.weight_text(tree)} = {short_text(needed + defect)}, "
+                f"{needed} is needed (off by {short_text(defect)})"
             )
     if tableau.embedded_weights is not None and order_conditions.embedded_order(tableau) < 1:
         total = sum(tableau.embedded_weights)
-        raise InputError(f"embedded_weights sum to {_shown(total)}; 1 is needed, that they have an order")
-
-
-def _shown(value: Number) -> str:
-    """Return a number as text, exact if that is short, otherwise rounded."""
-    if not isinstance(value, Fraction):
-        import sympy as sp
-
-        value = sp.expand(value)
-    exact = coefficients.text(value)
-    return exact if len(exact) <= 40 else f"about {float(value):.9g}"
+        raise InputError(f"embedded_weights sum to {short_text(total)}; 1 is needed, that they have an order")

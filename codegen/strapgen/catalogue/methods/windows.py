@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue import toml_files
-from strapgen.catalogue.methods import coefficient_files, coefficients, window_conditions
+from strapgen.catalogue.methods import coefficient_files, window_conditions
 from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
+from strapgen.catalogue.methods.coefficients import short_text
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -101,8 +102,6 @@ class _BuiltInWindows(Mapping[str, Window]):
 def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
     """Return the samples before and ahead of the one-sided filters of a family, in the order of `Window.one_sided`.
 
-    Examples
-    --------
     >>> one_sided_sizes(2, 2)
     [(3, 1), (4, 0), (0, 4), (1, 3)]
     """
@@ -114,8 +113,6 @@ def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
 def start_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
     """Return the samples before and ahead of the filters of the start, in the order of `Window.start`.
 
-    Examples
-    --------
     >>> start_sizes(2, 2)
     [(0, 4), (1, 3)]
     """
@@ -123,10 +120,8 @@ def start_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
 
 
 def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]]:
-    """Return those sizes whose filters a file has to hold: with an ideal gyro and p = L the others are mirrored.
+    """Return the sizes whose filters a file has to hold: with an ideal gyro and p = L the others are mirrored.
 
-    Examples
-    --------
     >>> stored_sizes(2, 2, True), stored_sizes(2, 1, True)
     ([(3, 1), (4, 0)], [(3, 0), (0, 3), (1, 2)])
     """
@@ -149,8 +144,6 @@ EXACT, EXACT_TERMS = "-exact", 16
 def named_window(method: str | Window) -> Window | None:
     """Return the window that a method is or names; None for the name of any other method.
 
-    Examples
-    --------
     >>> named_window("window-7-7-exact").rotation, named_window("rk4")
     ('exact', None)
     """
@@ -227,8 +220,8 @@ def verify(window: Window) -> None:
         if failure:
             m, power, total, right = failure
             raise InputError(
-                f"{place}the filter of c_{m} gives {_shown(total)} on the rate u^{power}, "
-                f"{right} is needed (off by {_shown(total - right)})"
+                f"{place}the filter of c_{m} gives {short_text(total)} on the rate u^{power}, "
+                f"{right} is needed (off by {short_text(total - right)})"
             )
 
 
@@ -266,11 +259,12 @@ def _family(data: Mapping[str, Any], name: str) -> Window:
         checks.choice("rotation", data.get("rotation", "fourth"), ROTATIONS),
         _count("terms", data.get("terms", 16), 1, MOST_TERMS),
     )
-    return replace(
-        window,
-        one_sided=_all_one_sided(window, entries("one_sided", data["one_sided"])),
-        start=_start(window, entries("start", data["start"])) if "start" in data else (),
-    )
+    one_sided = _all_one_sided(window, entries("one_sided", data["one_sided"]))
+    start: tuple[Window, ...] = ()
+    if "start" in data:
+        sizes = start_sizes(previous, ahead)
+        start = _in_order("start", _stored("start", window, entries("start", data["start"]), sizes), sizes)
+    return replace(window, one_sided=one_sided, start=start)
 
 
 def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
@@ -281,11 +275,6 @@ def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
         if (previous, ahead) not in stored and window.gyro is None and (ahead, previous) in stored:
             stored[previous, ahead] = stored[ahead, previous].mirrored()
     return _in_order("one_sided", stored, sizes)
-
-
-def _start(window: Window, tables: list[Any]) -> tuple[Window, ...]:
-    sizes = start_sizes(window.previous, window.ahead)
-    return _in_order("start", _stored("start", window, tables, sizes), sizes)
 
 
 def _in_order(
@@ -358,9 +347,3 @@ def _filters(what: str, rows: list[Any], count: int, samples: int) -> tuple[Taps
 
 def _count(what: str, value: Any, smallest: int, largest: int) -> int:
     return checks.count(what, value, smallest=smallest, largest=largest)
-
-
-def _shown(value: Fraction) -> str:
-    """Return a number as text, exact if that is short, otherwise rounded."""
-    exact = coefficients.text(value)
-    return exact if len(exact) <= 40 else f"about {float(value):.9g}"

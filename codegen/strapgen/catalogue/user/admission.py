@@ -207,7 +207,7 @@ def _require_beside(kernel: Kernel, previous: int, ahead: int, samples: int) -> 
         _refuse(kernel, f"{previous} of its {samples} increments are previous ones and {ahead} are ahead")
 
 
-#: What `increments_signal` says of samples from beside the step.
+#: The words of `increments_signal` on samples from beside the step.
 _BESIDE = re.compile(r"; the (?:first|last) \d+ are those (?:before|after) the step")
 
 

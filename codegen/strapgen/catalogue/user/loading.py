@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 GROUP = "strapgen.algorithms"
 #: Name of the function in a file.
 FUNCTION = "algorithm"
-#: What a user's code must do.
+#: The duty of a user's code, in messages.
 DUTY = "return a Kernel"
 #: Parameters that the function may have: a `Tableau`, and numbers of increments.
 OPTIONS = ("method", "increments", "previous", "ahead")
@@ -111,7 +111,8 @@ def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
     for option in options:
         if option not in takes:
             raise InputError(
-                f"{name}: its {FUNCTION}({', '.join(takes)}) takes no {option}; {_allowed(takes)}"
+                f"{name}: its {FUNCTION}({', '.join(takes)}) takes no {option}; "
+                f"it takes {', '.join(takes) or 'no options'}"
             )
     kernel = function(**options)
     _require(name, kernel)
@@ -139,7 +140,3 @@ def _require(name: str, kernel: Any) -> None:
         admission.require(kernel)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
-
-
-def _allowed(takes: list[str]) -> str:
-    return f"it takes {', '.join(takes)}" if takes else "it takes no options"

@@ -165,7 +165,7 @@ def _unbalance(what: str, value: Any) -> Unbalance:
 
 def _total(products: Any) -> Number:
     """Return the sum of products of two numbers, exactly."""
-    terms = [f"({coefficients.text(one)})*({coefficients.text(other)})" for one, other in products]
+    terms = [f"({one})*({other})" for one, other in products]
     return coefficients.number("product", "+".join(terms))
 
 

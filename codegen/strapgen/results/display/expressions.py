@@ -29,10 +29,8 @@ def expression_latex(expression: sp.Expr) -> str:
         number, factor = term.as_coeff_Mul()
         if not number.is_Rational:
             return " + ".join(str(sp.latex(one)) for one in terms).replace("+ -", "- ")
-        numbers.append((sp.Rational(number), factor))
-    return sum_text(
-        [(_fraction(number), "" if factor == 1 else str(sp.latex(factor))) for number, factor in numbers]
-    )
+        numbers.append((Fraction(int(number.p), int(number.q)), "" if factor == 1 else str(sp.latex(factor))))
+    return sum_text(numbers)
 
 
 def named_equations(sides: Iterable[tuple[str, sp.Expr]], names: Mapping[sp.Symbol, str]) -> str:
@@ -80,7 +78,3 @@ class _Naming:
 
     def _latex(self, expression: sp.Expr) -> str:
         return str(sp.latex(expression, symbol_names=self._names))
-
-
-def _fraction(number: sp.Rational) -> Fraction:
-    return Fraction(int(number.p), int(number.q))

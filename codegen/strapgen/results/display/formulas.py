@@ -28,14 +28,7 @@ _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
 
 def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
-    """Return a kernel's formulas as text, stage by stage.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    notes : sequence of str, optional
-        Remarks, by default the kernel's own.
-    """
+    """Return a kernel's formulas as text, stage by stage, with notes, by default the kernel's own."""
     lines = [kernel.title, f"source: {kernel.source}", ""]
     for signal in kernel.inputs:
         shape = " x ".join(map(str, signal.shape)) or "scalar"
@@ -81,15 +74,7 @@ def _counts(program: Program) -> list[tuple[str, int]]:
 
 
 def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
-    """Return what is to be shown of a kernel as a report.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    program : Program
-    show : str
-        "text" or "latex" for the formulas, "program" or "operations"; the last two are tables.
-    """
+    """Return as a report the formulas, "text" or "latex", or a table of the "program" or its "operations"."""
     texts: dict[str, Callable[[], str]] = {
         "text": lambda: as_text(kernel, program.notes),
         "latex": lambda: as_latex(kernel),
@@ -136,10 +121,6 @@ def as_latex(kernel: Kernel) -> str:
     A step is in vectors, their scalar and cross products, as its program computes it. Where that would be longer than
     the stages, these are written, as sums and products of vectors, quaternions (a vector has the scalar part 0) and
     matrices; what is no such sum is written element by element.
-
-    Parameters
-    ----------
-    kernel : Kernel
     """
     return _in_vectors(kernel) or elements_latex(kernel)
 
@@ -156,7 +137,8 @@ def short_latex(kernel: Kernel) -> str | None:
 def _in_vectors(kernel: Kernel) -> str | None:
     """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
     form = None if kernel.unknowns else vector_form(kernel)
-    return stages_latex(kernel) if form is None else vectors_latex(form, _state(kernel))
+    state = kernel.inputs[0].elements[0].partition("_")[0]  # the letter of its elements
+    return stages_latex(kernel) if form is None else vectors_latex(form, state)
 
 
 def elements_latex(kernel: Kernel) -> str:
@@ -177,11 +159,6 @@ def elements_latex(kernel: Kernel) -> str:
         ),
         names,
     )
-
-
-def _state(kernel: Kernel) -> str:
-    """Return the letter of the state: that of its elements."""
-    return kernel.inputs[0].elements[0].partition("_")[0]
 
 
 def _latex_name(element: str) -> str:

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 #: The width of a line of text in widths of a digit: 345 pt, that of the class article at 10 pt, less the number.
 PAGE = 60.0
-#: Width of what continues a line at its beginning.
+#: Width of the space before a continued line.
 _INDENT = 2.0
 #: Commands that take the width of nothing, and of several digits.
 _WIDTHS = {"left": 0.0, "right": 0.0, "quad": 2.0, "qquad": 4.0, "!": -0.3, ",": 0.35, ";": 0.6, " ": 0.6}
