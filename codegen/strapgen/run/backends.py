@@ -467,18 +467,7 @@ class Backend:
 
 
 def fitted(backend: str, settings: Settings | None) -> Settings | None:
-    """Return the settings that a back end runs with, in its own word; where none are stated, the defaults.
-
-    Parameters
-    ----------
-    backend : str
-        A key of `BACKENDS`.
-    settings : Settings or None
-
-    Returns
-    -------
-    Settings or None
-        None in floating point.
+    """Return the settings that a back end runs with, in its own word; None in floating point.
 
     Raises
     ------
@@ -604,13 +593,6 @@ def sources_to_build(choice: Choice, backend: str, settings: Settings | None = N
     """Return what a back end of an attitude step builds: the step, and the kernel that orthonormalizes its state.
 
     `strapgen.compile_together` compiles those of many steps in one call of the compiler.
-
-    Parameters
-    ----------
-    choice : Choice
-        What `strapgen.choose_step` returned.
-    backend, settings
-        As for `backend`.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     step = StepSources(sources_of_choice(choice, entry.target, fitted(backend, settings)), choice)
@@ -625,13 +607,7 @@ def chosen_step(
     previous: int | None = None,
     ahead: int | None = None,
 ) -> Choice:
-    """Return the choice of an attitude step from its name and options; a choice is returned as it is.
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed, or options go with a choice, which has its own.
-    """
+    """Return the choice of a step from its name and options; a choice, which has its own, as it is."""
     if not isinstance(algorithm, Choice):
         return catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
     options = {"method": method, "increments": increments, "previous": previous, "ahead": ahead}

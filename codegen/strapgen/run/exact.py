@@ -107,11 +107,7 @@ def states(program: Program, increments: Iterable[Sequence[Any]], initial: Seque
     initial : sequence of mpf
         The first state, row-major.
     """
-    step = Interpreter(program)
-    history = [list(initial)]
-    for row in increments:
-        history.append(step(history[-1], row))
-    return history
+    return list(itertools.accumulate(increments, Interpreter(program), initial=list(initial)))
 
 
 def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray[np.float64]:
@@ -180,19 +176,13 @@ class ExactEvaluator(Evaluator):
 
 
 def attitudes(backend: Backend, increments: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
-    """Yield the matrices of a run from zero rotation on, row by row with all digits that mpmath is set to.
+    """Yield the matrices of a run of the back end "exact", row by row with all digits, from zero rotation on.
 
-    Parameters
-    ----------
-    backend : Backend
-        The back end "exact" of an attitude step.
-    increments : iterable of sequence of mpf
-        Angle increments of each step in rad, row-major.
+    Increments are those of each step in rad, row-major, as numbers of mpmath.
     """
     step, convert = backend.evaluator, backend.attitude and backend.beside(backend.attitude)
     assert isinstance(step, ExactEvaluator), "doubles hold no further digits"
     assert backend.sources.companions is not None, "a back end runs an attitude step"
     state = [number(value) for value in backend.sources.companions.identity]
-    for row in itertools.chain([None], increments):
-        state = state if row is None else step.digits(state, row)
-        yield convert.digits(state) if isinstance(convert, ExactEvaluator) else list(state)
+    for after in itertools.accumulate(increments, step.digits, initial=state):
+        yield convert.digits(after) if isinstance(convert, ExactEvaluator) else after

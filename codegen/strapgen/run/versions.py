@@ -16,11 +16,6 @@ _SHAPES_OUTPUT = ("sympy", "numpy", "jinja2", "cffi", "typer", "rich")
 def versions() -> dict[str, str]:
     """Return the versions of strapgen, Python, the packages that shape the output, and the C compiler.
 
-    Returns
-    -------
-    dict of str to str
-        By their names; "is not installed" for what is missing.
-
     Examples
     --------
     >>> [*versions()][:3]
