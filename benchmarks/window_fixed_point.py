@@ -14,8 +14,8 @@ import numpy as np
 import strapgen
 from strapgen.lab.simulate.drift import angles
 from strapgen.lab.simulate.runs import attitude, drift_between
+from strapgen.run.backends import Backend
 from strapgen.run.increments import pulses
-from strapgen.run.protocol import Backend
 
 INTERVAL = Fraction(1, 100)
 WINDOW = "window-7-7"

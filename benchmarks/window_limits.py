@@ -23,8 +23,8 @@ from strapgen.design.windows.family import FamilyBrief, design
 from strapgen.lab.motions.motions import PROFILES, Motion
 from strapgen.lab.simulate.drift import angles, drift, steady_drift
 from strapgen.lab.simulate.runs import Run, attitude, drift_between
+from strapgen.run.backends import Backend
 from strapgen.run.increments import pulses
-from strapgen.run.protocol import Backend
 
 INTERVAL = Fraction(1, 100)
 BAND = Fraction(13, 10)

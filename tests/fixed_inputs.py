@@ -10,11 +10,11 @@ import numpy as np
 
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import OPERATIONS, RESOLUTION, Constant, Program, Reference
+from strapgen.run.evaluators import Evaluator
 from strapgen.run.exact import FUNCTIONS
-from strapgen.run.fixed import FixedEvaluator
 
 
-def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Generator) -> list[np.ndarray]:
+def corners_and_random(evaluator: Evaluator, count: int, rng: np.random.Generator) -> list[np.ndarray]:
     """Return integers for every input: corners of the range, edges, the neighbourhood of zero, and any others."""
     inputs = []
     for argument in evaluator.interface.inputs:
@@ -38,7 +38,7 @@ def corners_and_random(evaluator: FixedEvaluator, count: int, rng: np.random.Gen
             matrices *= np.sign(np.linalg.det(matrices))[:, None, None]
             words = np.rint(matrices.reshape(-1, 9) / float(argument.format.unit))
             made[part:] = np.minimum(words, argument.high)
-        inputs.append(made.astype(evaluator.integer_type))
+        inputs.append(made.astype(evaluator.number))
     return inputs
 
 

@@ -13,7 +13,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
 from strapgen.run.backends import of_sources
-from strapgen.run.fixed import FixedEvaluator
+from strapgen.run.evaluators import Evaluator
 
 #: Kernels with every kind of operation that code in floating point has, with scalar inputs and with several outputs.
 DOUBLE = [
@@ -76,7 +76,7 @@ def check_integers_of_c(
     assert accepted > SAMPLES * len(pairs) / 4
 
 
-def _answer(evaluator: FixedEvaluator, sample: list[np.ndarray]) -> bytes | str:
+def _answer(evaluator: Evaluator, sample: list[np.ndarray]) -> bytes | str:
     """Return what a function makes of a sample: its outputs and residuals, or why it refuses."""
     try:
         outputs, residuals = evaluator.run(sample, evaluator.fresh(1))

@@ -13,7 +13,7 @@ from strapgen import pipeline
 from strapgen.design.commit_late import commit_late_sources
 from strapgen.design.commit_late.commit_late_sources import LateSources
 from strapgen.design.commit_late.late_filters import polynomial
-from strapgen.design.commit_late.late_unit_fixed import LateUnitOnIntegers, state_argument
+from strapgen.design.commit_late.late_unit import LateUnitOnIntegers, state_argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.run.exact import DIGITS, Interpreter, number
 

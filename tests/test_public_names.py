@@ -150,7 +150,7 @@ SCRIPT = """
     backend = strapgen.build(strapgen.generate(strapgen.lower(kernel), "c"))
     run = strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), "0.1", 1)
     reveal_type(kernel)  # strapgen.kernel.kernel.Kernel
-    reveal_type(backend)  # strapgen.run.protocol.Backend
+    reveal_type(backend)  # strapgen.run.backends.Backend
     reveal_type(run)  # strapgen.lab.simulate.runs.Run
     reveal_type(strapgen.compare)  # def (
     reveal_type(gyro.pulses)  # def (

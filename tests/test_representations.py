@@ -127,7 +127,6 @@ MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
     "unknowns.SolvedStep": unknown_steps,
     "unknowns.UnknownTableau": heun,
     "exact.Interpreter": lambda: strapgen.exact.Interpreter(program()),
-    "exact.ExactBackend": lambda: stepper("exact"),
     "exact.ExactEvaluator": lambda: strapgen.evaluator("euler-from-dcm", "exact"),
     "gyro.StepWindows": lambda: strapgen.gyro.StepWindows(lambda first, stop: TURN, 2),
     "study.Case": lambda: strapgen.study.Study().cases()[0],

@@ -16,7 +16,7 @@ from strapgen.design.commit_late.commit_late_bounds import Advance
 from strapgen.design.commit_late.commit_late_fixed import interface_of, rounded
 from strapgen.design.commit_late.fixed_filters import FixedFilters
 from strapgen.design.commit_late.late_filters import LateFilters
-from strapgen.design.commit_late.late_unit_fixed import LateUnitInFixedC
+from strapgen.design.commit_late.late_unit_in_c import LateUnitInC
 from strapgen.design.commit_late.lost_samples import REACH
 from strapgen.fixedpoint import quantize
 from strapgen.ir.attitude_step import Truncation
@@ -51,7 +51,7 @@ def test_attitude_of_now_at_the_start_is_near_its_bound_and_below():
 def test_generated_c_has_the_attitude_of_the_model_at_the_start():
     late = parts("window-3-3", rounding="truncation")
     settings = late.step.fixed.settings
-    unit = LateUnitInFixedC(commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings))
+    unit = LateUnitInC(commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings))
     unit.reset(np.array(ATTITUDE))
     for sample in START:
         unit.push(np.array(sample), 0)
@@ -218,9 +218,7 @@ def test_reset_begins_error_feedback_anew(rounding):
         commit_late_sources.family("window-3-3"), "euler", "fixed-model", settings
     )
     model = unit_after(late, [])
-    compiled = LateUnitInFixedC(
-        commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings)
-    )
+    compiled = LateUnitInC(commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings))
     drawn = np.random.default_rng(3).integers(-late.fixed.limit, late.fixed.limit, (30, 3))
     state = np.array([0, 0, 644245094, 858993459])
     for place, sample in enumerate(drawn):

@@ -27,7 +27,9 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run import compiler
-from strapgen.run.fixed import CFixedEvaluator, FixedEvaluator, ModelEvaluator
+from strapgen.run.c import CEvaluator
+from strapgen.run.evaluators import Evaluator
+from strapgen.run.fixed import ModelEvaluator
 from strapgen.targets import emit
 
 PRECISE = mpmath.mp.clone()
@@ -98,7 +100,7 @@ def model(case: str, word: int, rounding: str = "nearest") -> ModelEvaluator:
     return ModelEvaluator(emit(fixed(case, word, rounding), "fixed-model"))
 
 
-def corners_and_others(evaluator: FixedEvaluator, count: int, seed: int = 0) -> list[np.ndarray]:
+def corners_and_others(evaluator: Evaluator, count: int, seed: int = 0) -> list[np.ndarray]:
     """Return integers for every input: all combinations of corners, small ones, and random ones."""
     rng = np.random.default_rng(seed)
     highs = [argument.high for argument in evaluator.interface.inputs for _ in argument.values]
@@ -116,12 +118,12 @@ def corners_and_others(evaluator: FixedEvaluator, count: int, seed: int = 0) -> 
     for argument in evaluator.interface.inputs:
         size = argument.signal.size
         block = np.stack(made[place : place + size], axis=-1)
-        arrays.append(block.astype(evaluator.integer_type))
+        arrays.append(block.astype(evaluator.number))
         place += size
     return arrays
 
 
-def outputs(evaluator: FixedEvaluator, inputs: list[np.ndarray]) -> list[np.ndarray]:
+def outputs(evaluator: Evaluator, inputs: list[np.ndarray]) -> list[np.ndarray]:
     made, _ = evaluator.run(inputs, evaluator.fresh(len(inputs[0])))
     return [array.astype(object) for array in made]
 
@@ -233,7 +235,7 @@ def test_c_computes_what_the_model_does(rounding, cases):
 
     @each(("case", "word"), cases)
     def agree(case, word):
-        evaluator, generated = model(case, word, rounding), CFixedEvaluator(several[case, word])
+        evaluator, generated = model(case, word, rounding), CEvaluator(several[case, word])
         inputs = corners_and_others(evaluator, 3000)
         (expected,), (computed,) = outputs(evaluator, inputs), outputs(generated, inputs)
         assert (expected == computed).all()
@@ -426,9 +428,7 @@ def test_motions_on_stated_ranges(kernel, word):
     inputs = corners_and_others(evaluator, 120)
     made = outputs(evaluator, inputs)
     assert_certified(lowered, inputs, made)
-    for expected, computed in zip(
-        made, outputs(CFixedEvaluator(emit(lowered, "c-fixed")), inputs), strict=True
-    ):
+    for expected, computed in zip(made, outputs(CEvaluator(emit(lowered, "c-fixed")), inputs), strict=True):
         assert (expected == computed).all()
 
 
@@ -439,7 +439,7 @@ def test_motion_without_ranges_says_which_is_missing():
         quantize(made, Settings())
 
 
-def near_rotations(evaluator: FixedEvaluator, count: int, size: float) -> np.ndarray:
+def near_rotations(evaluator: Evaluator, count: int, size: float) -> np.ndarray:
     """Return integers of rotations with an error of about `size` in every element."""
     rng = np.random.default_rng(3)
     rotations = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
@@ -456,7 +456,7 @@ def test_nearest_rotation(size):
     lowered = quantize(made, Settings(word=32))
     evaluator, generated = (
         ModelEvaluator(emit(lowered, "fixed-model")),
-        CFixedEvaluator(emit(lowered, "c-fixed")),
+        CEvaluator(emit(lowered, "c-fixed")),
     )
     inputs = [near_rotations(evaluator, 60, size)]
     (integers,) = outputs(evaluator, inputs)
@@ -476,7 +476,7 @@ def test_nearest_rotation(size):
 @pytest.mark.long
 def test_nearest_rotation_refuses_the_same_input_in_c_and_model():
     lowered = quantize(programs()["dcm-orthonormalize-optimal"], Settings(word=32))
-    both = ModelEvaluator(emit(lowered, "fixed-model")), CFixedEvaluator(emit(lowered, "c-fixed"))
+    both = ModelEvaluator(emit(lowered, "fixed-model")), CEvaluator(emit(lowered, "c-fixed"))
     inputs = corners_and_others(both[0], 60)[0]
     accepted = 0
     for sample in (*inputs, *near_rotations(both[0], 50, 0.05)):

@@ -20,7 +20,8 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Assignment, Reference
 from strapgen.ir.sensor import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.run.fixed import CFixedEvaluator, ModelEvaluator
+from strapgen.run.c import CEvaluator
+from strapgen.run.fixed import ModelEvaluator
 
 EULER, DCM, HEUN = Choice("euler", "rk4", 2), Choice("dcm", "rk4", 2), Choice("euler", "rk2", 1)
 #: A gyro of 16 bits at 100 Hz whose whole range is used, and the same up to 400 deg/s.
@@ -50,7 +51,7 @@ def exact_outputs(choice: Choice, fixed, words) -> list[Fraction]:
 @each(("choice", "stated"), CASES, ids=lambda case: getattr(case, "kernel", ""))
 def test_c_is_the_model_and_inside_its_bound_on_counts(choice, stated, rng):
     fixed = quantized(choice, Settings.of(increments=choice.increments_per_step, **stated))
-    model, in_c = ModelEvaluator(generate(fixed, "fixed-model")), CFixedEvaluator(generate(fixed, "c-fixed"))
+    model, in_c = ModelEvaluator(generate(fixed, "fixed-model")), CEvaluator(generate(fixed, "c-fixed"))
     inputs = corners_and_random(model, 400, rng)
     inputs[0][:60] = inputs[0][-60:]  # corners of the counts with attitudes
     inputs[0][1] = (

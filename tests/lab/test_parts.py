@@ -10,8 +10,8 @@ import strapgen
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.recording import Recording, propagate
 from strapgen.lab.simulate import runs
+from strapgen.run import backends, numpy_evaluator
 from strapgen.run import increments as gyro
-from strapgen.run import numpy_backend, protocol
 from strapgen.run.increments import StepWindows, pulses, run_parts, windows
 
 STEPS = 50
@@ -20,9 +20,9 @@ STEPS = 50
 @pytest.fixture
 def short_parts(monkeypatch):
     """Propagate some steps together; the spans of the numpy back end are as long as the parts."""
-    for module in (gyro, protocol, runs):
+    for module in (gyro, backends, runs):
         monkeypatch.setattr(module, "PART", 8)
-    monkeypatch.setattr(numpy_backend, "_SPAN", 8)
+    monkeypatch.setattr(numpy_evaluator, "_SPAN", 8)
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ def test_the_orders_on_rates_and_on_increments_differ_as_the_series_predict(meth
 @pytest.mark.parametrize("part", [None, 7])
 def test_an_initial_attitude_turns_the_error(make, algorithm, part, monkeypatch):
     if part is not None:
-        monkeypatch.setattr(strapgen.run.protocol, "PART", part)
+        monkeypatch.setattr(strapgen.run.backends, "PART", part)
         monkeypatch.setattr(strapgen.run.increments, "PART", part)
     start = strapgen.evaluator("dcm-from-euler-angles")(np.radians([25.0, -40.0, 130.0]))
     coning = strapgen.motion("coning", **CONING)

@@ -16,7 +16,7 @@ from strapgen.navigation.systems.compiled_system import CompiledSystem
 from strapgen.navigation.systems.fitting import fitted
 from strapgen.navigation.systems.system_backends import SystemMemory, system_runner
 from strapgen.navigation.systems.system_file import parsed
-from strapgen.navigation.systems.system_runner import InterpretedSystem
+from strapgen.navigation.systems.system_runner import SystemRunner
 from strapgen.navigation.systems.wiring import Description, read_system, wired
 from strapgen.navigation.two_speed.two_speed_c import LOOPS
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, sources
@@ -58,7 +58,7 @@ def test_passes_in_three_words_stay_below_their_bounds_and_come_near(rounding):
 @pytest.mark.parametrize(("algorithm", "word"), [("dcm", 16), ("euler", 24)])
 def test_loops_of_two_speeds_stay_below_their_bounds_and_come_near(algorithm, word):
     settings = Settings(word=word, rounding="truncation", carry="full")
-    runner = InterpretedSystem(two_speeds(algorithm, 2, settings), "fixed-model")
+    runner = SystemRunner(two_speeds(algorithm, 2, settings), "fixed-model")
     for loop, cell in enumerate(("fast_sculling", "slow_navigation_rotation", "nav_velocity_change")):
         share, _, worst = search(PassErrors(runner, alone=loop), cell, 12, 5, 1)
         assert 0.5 < share <= 1
@@ -95,7 +95,7 @@ def memory_of(passes: Passes, cycle: int) -> SystemMemory:
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_worst_cycles_of_two_speeds_in_c_store_what_the_model_stores(algorithm):
     settings = Settings(word=16, rounding="truncation", carry="full")
-    passes = PassErrors(InterpretedSystem(two_speeds(algorithm, 1, settings), "fixed-model"))
+    passes = PassErrors(SystemRunner(two_speeds(algorithm, 1, settings), "fixed-model"))
     _, worst, _ = search(passes, "nav_velocity_change", 12, 4, 1)
     memory = memory_of(worst, 0)
     loops = sources(algorithm, 1, "c-fixed", settings)
@@ -165,7 +165,7 @@ def test_longer_climbs_in_two_speeds_stay_below_their_bounds(rounding, carry, wo
     no more than half of it can be reached.
     """
     settings = Settings(word=word, rounding=rounding, carry=carry)
-    runner = InterpretedSystem(two_speeds(algorithm, sculling, settings), "fixed-model")
+    runner = SystemRunner(two_speeds(algorithm, sculling, settings), "fixed-model")
     least = 0.25 if (rounding, carry) == ("truncation", "all") else 0.5
     for loop in range(3):
         worst = climbs(PassErrors(runner, alone=loop), 16, 4, 3)

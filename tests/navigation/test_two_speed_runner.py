@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.two_speed.loops import LoopsFromPython, LoopSources
+from strapgen.navigation.two_speed.loops import Loops, LoopSources
 from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.run import compiler
@@ -173,7 +173,7 @@ def test_the_whole_is_its_loops_bit_for_bit(backend, carry, rng):
     angles, velocities, turns = noisy(48, rng)
     whole = runner.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)
     single = pickle.loads(pickle.dumps(runner))
-    single._runner = LoopsFromPython(
+    single._runner = Loops(
         LoopSources(runner.loops, runner._runner.sources.system), evaluator_class(runner.loops[0].target)
     )
     parts = single.run(angles, velocities, fast_cycles=4, slow_cycles=3, turns=turns)

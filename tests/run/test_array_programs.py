@@ -39,7 +39,7 @@ def test_a_program_has_the_bits_of_its_function(kernel, rng):
 
 def test_work_arrays_serve_again_and_begin_a_line():
     backend = strapgen.backend("euler", backend="numpy")
-    transition, _ = backend._array_programs
+    transition = backend.evaluator._transition
     assert 0 < transition.temporaries < backend.sources.operations["multiply"] / 2
     assert {row.ctypes.data % 64 for row in work_arrays(5, 13)} == {0}
 

@@ -16,7 +16,7 @@ import strapgen
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.program import Program
 from strapgen.run import blocked_scan
-from strapgen.run import numpy_backend as numpy_module
+from strapgen.run import numpy_evaluator as numpy_module
 from strapgen.run.backends import BACKENDS
 from strapgen.run.increments import windows
 

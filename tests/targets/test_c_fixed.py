@@ -20,7 +20,8 @@ from strapgen.ir.decimals import above, places_above
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.run import compiler
-from strapgen.run.fixed import CFixedEvaluator, ModelEvaluator
+from strapgen.run.c import CEvaluator
+from strapgen.run.fixed import ModelEvaluator
 from strapgen.targets.c_fixed.statements import _noted
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
@@ -52,9 +53,9 @@ def choices_of(*methods) -> list[Choice]:
 
 
 @cache
-def pair(choice: Choice, settings: Settings) -> tuple[CFixedEvaluator, ModelEvaluator]:
+def pair(choice: Choice, settings: Settings) -> tuple[CEvaluator, ModelEvaluator]:
     fixed = quantized(choice, settings)
-    return CFixedEvaluator(generate(fixed, "c-fixed")), ModelEvaluator(generate(fixed, "fixed-model"))
+    return CEvaluator(generate(fixed, "c-fixed")), ModelEvaluator(generate(fixed, "fixed-model"))
 
 
 def results(evaluator, inputs, residuals):
@@ -90,7 +91,7 @@ def test_c_and_model_agree_bit_for_bit(word, carry, methods, rng):
     @each("choice", every)
     def agree(choice, rng):
         fixed = every[choice]
-        in_c = CFixedEvaluator(generate(fixed, "c-fixed"))
+        in_c = CEvaluator(generate(fixed, "c-fixed"))
         model = ModelEvaluator(generate(fixed, "fixed-model"))
         c_agrees_with_the_model(in_c, model, word, rng)
 

@@ -16,7 +16,7 @@ from strapgen import generate
 from strapgen.catalogue import Choice
 from strapgen.ir import decimals
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run.fixed import CFixedEvaluator
+from strapgen.run.c import CEvaluator
 from strapgen.storage import resources
 from strapgen.targets.contract_lines import Contract
 
@@ -84,7 +84,7 @@ def test_a_program_can_check_the_integers_of_a_call_by_the_header_alone(choice, 
     memory = {
         r[2]: draw.integers(int(r[1]), int(r[4]), int(r[3]) + 1, endpoint=True).tolist() for r in ranges
     }
-    of = CFixedEvaluator(sources)
+    of = CEvaluator(sources)
     arrays = [np.array([memory[a.signal.name]]) for a in fixed.interface.inputs]
     (after,), _ = of.run(arrays, of.fresh(1))
     names: dict[str, Fraction] = {}

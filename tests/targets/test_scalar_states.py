@@ -43,8 +43,8 @@ def test_fixed_point_carries_the_one_rounding_of_a_scalar(word, carry):
     assert len(fixed.interface.residuals) == (carry == "state")
     in_c, model = (of_sources(strapgen.generate(fixed, target)) for target in ("c-fixed", "fixed-model"))
     highest = fixed.interface.inputs[1].high
-    drive = np.array([[highest], [-highest // 3], [1]], in_c.integer_type)
-    states = [np.zeros((3, 1), in_c.integer_type)] * 2
+    drive = np.array([[highest], [-highest // 3], [1]], in_c.number)
+    states = [np.zeros((3, 1), in_c.number)] * 2
     feedback = [evaluator.fresh(3) for evaluator in (in_c, model)]
     for _ in range(50):
         for k, evaluator in enumerate((in_c, model)):

@@ -41,21 +41,9 @@ class _Value(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 class ArrayProgram:
-    """The operations of a generated function with one output, on arrays (elements, ...).
+    """The operations of a generated function with one output, whose inputs have shapes, on arrays (elements, ...).
 
-    A function that selects by a condition runs as it is.
-
-    Parameters
-    ----------
-    function : callable
-        Generated function of arrays (..., shape of an input); it returns an array (..., shape of the output).
-    inputs : list of tuple of int
-        Shapes of its inputs.
-
-    Attributes
-    ----------
-    temporaries : int
-        Number of work arrays that a call needs.
+    A function that selects by a condition runs as it is. A call needs so many work arrays as `temporaries`.
 
     Examples
     --------
@@ -82,16 +70,7 @@ class ArrayProgram:
         self._operations = _compiled(tape, [*map(len, values), len(outputs), self.temporaries])
 
     def __call__(self, inputs: Sequence[Array], out: Array, work: Array) -> None:
-        """Evaluate on arrays that broadcast to the shape of the output.
-
-        Parameters
-        ----------
-        inputs : sequence of array, (elements, ...)
-        out : array, (elements, ...)
-            Memory for the output, which must not be that of an input.
-        work : array, (temporaries, ...)
-            Memory that a call overwrites.
-        """
+        """Evaluate on arrays (elements, ...) that broadcast to the output, which shares no memory with them."""
         self._operations(*inputs, out, work)
 
     def _whole(self, *arrays: Array) -> None:
@@ -166,16 +145,7 @@ def _compiled(tape: list[_Value], counts: list[int]) -> Callable[..., None]:
 
 
 def work_arrays(count: int, length: int) -> Array:
-    """Return uninitialized arrays, each of which begins with a line of the processor's cache.
-
-    Parameters
-    ----------
-    count, length : int
-
-    Returns
-    -------
-    array, (count, at least `length`)
-    """
+    """Return uninitialized arrays, (count, `length` or more), each of which begins with a line of the cache."""
     whole = -(-length // _LINE) * _LINE
     memory = np.empty(count * whole + _LINE)
     skipped = -memory.ctypes.data % (_LINE * memory.itemsize) // memory.itemsize

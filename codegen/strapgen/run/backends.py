@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
 
 from strapgen import catalogue
 from strapgen.catalogue import Choice
 from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir import checks, stage_arguments
 from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.sources import Sources
-from strapgen.run.evaluators import Evaluator
-from strapgen.run.kernel_sources import sources_of_choice
-from strapgen.run.protocol import Backend
-from strapgen.run.registry import BACKENDS, DEFAULT_BACKENDS, Entry, backend_class, of_sources
-from strapgen.run.step_sources import StepSources
+from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
+from strapgen.run.increments import PART, run_parts
+from strapgen.run.kernel_sources import StepSources, sources_of_choice
+from strapgen.run.registry import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
+from strapgen.targets.registry import NUMPY
 
 __all__ = [
     "BACKENDS",
@@ -33,19 +41,433 @@ __all__ = [
 ]
 
 
-def fitted(backend: str, settings: Settings | None) -> Settings | None:
-    """Return the settings that a back end runs with, in its own word; where none are stated, the defaults.
+#: Orthonormalizations that leave the attitude where it is, but for rounding: one factor for all parameters, and for
+#: matrices a symmetric expansion of the inverse root of C'C.
+KEEP_THE_ATTITUDE = frozenset(
+    (
+        *("euler-normalize", "euler-normalize-first-order"),
+        *("cayley-klein-normalize", "cayley-klein-normalize-first-order"),
+        *("dcm-orthonormalize-first-order", "dcm-orthonormalize-second-order"),
+    )
+)
+#: The orthonormalization that turns the attitude by a little: the scheme of dual rows.
+_DUAL_ROWS = "dcm-orthonormalize"
+
+
+class Backend:
+    """An attitude algorithm that runs.
+
+    It can be pickled, so that a pool of processes can run it: the sources of the step and of its kernels travel, and
+    compiled C comes from the cache.
 
     Parameters
     ----------
-    backend : str
-        A key of `BACKENDS`.
-    settings : Settings or None
+    parts : StepSources
+        Sources of an attitude step and of its kernels.
 
-    Returns
-    -------
-    Settings or None
-        None in floating point.
+    Attributes
+    ----------
+    evaluator : Evaluator
+        The step as a callable.
+    name : str
+        Name of the back end.
+    kernel : str
+        Name of the kernel that it runs.
+    dtype : dtype
+        Type of its states.
+    takes : str
+        Name of the step's second input: "increments", or "turns" where a step takes rates at nodes times its length.
+    increments : int
+        Number of increments of a step.
+    previous, ahead : int
+        Numbers of increments from before the step and from after it that it takes in addition.
+    samples : int
+        Number of increments that a step takes in all.
+    state_shape : tuple of int
+        Shape of the state.
+    elements : tuple of str
+        Names of the state's elements, row-major.
+    identity : array
+        The state of zero rotation.
+    attitude : str or None
+        Kernel that converts the state to a direction cosine matrix; None where the state is one.
+    unit : float
+        Unit in the last place of a state's element near 1.
+    increment_unit : float or None
+        Unit in the last place of an increment in rad, in fixed point; None in floating point.
+    count : float or None
+        Angle of a count in rad for a step that takes a gyro's counts; None for any other.
+    saturates : bool
+        Whether an element of a state that would exceed 1 is stored as the largest number.
+    sources : Sources
+        Sources of the step.
+    interface : Interface
+        Formats, ranges and error bounds of the step; an attribute in fixed point alone.
+    """
+
+    interface: Interface
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        state = f"state {counted_shape(self.state_shape)} {self.dtype}"
+        return f"{self.name}: {self.kernel}, {self.samples} {self.takes} a step, {state}"
+
+    def __init__(self, parts: StepSources) -> None:
+        sources, kernels = parts.step, parts.step_kernels
+        state, samples = sources.function.inputs
+        self._parts = parts
+        self.sources = sources
+        self.evaluator = of_sources(sources)
+        self.name = self.evaluator.name
+        self.kernel = sources.kernel
+        self.takes = samples.name
+        self.samples = samples.shape[0]
+        self.previous, self.ahead = kernels.previous, kernels.ahead
+        self.increments = self.samples - kernels.beside
+        self.state_shape = state.shape
+        self.elements = state.elements
+        self.attitude = kernels.attitude
+        self._orthonormalization = parts.orthonormalization or kernels.orthonormalize
+        self._product = kernels.product if self.evaluator.needs_product else None
+        self._beside: dict[str, Evaluator] = {}
+        self.dtype = self.evaluator.dtype
+        self.identity: Array = np.array([float(x) for x in kernels.identity], self.dtype).reshape(state.shape)
+        self.unit = float(np.finfo(self.dtype).eps)
+        self.increment_unit: float | None = None
+        self.count: float | None = None
+        self.saturates = False
+        if sources.fixed is not None:
+            self.interface = sources.fixed
+            taken, result = sources.fixed.inputs[1], sources.fixed.outputs[0]
+            self.unit = float(result.format.unit)
+            self.increment_unit = float(taken.unit)
+            self.saturates = result.saturates
+            self.count = None if taken.sensor is None else self.increment_unit
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the class and its sources, from which another process builds the same back end."""
+        target = self.sources.target
+        needed = [(self._orthonormalization, target), (self._product, target), (self.attitude, NUMPY)]
+        return type(self), (self._parts.complete(needed),)
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Nodes at which a step takes the rate, as fractions of its length; empty if it takes increments."""
+        return self._parts.nodes
+
+    def beside(self, kernel: str) -> Evaluator:
+        """Return another kernel on the same target as the step: one that restores a state, or converts it.
+
+        Parameters
+        ----------
+        kernel : str
+            A kernel that the step brings, or of the catalogue.
+        """
+        if kernel not in self._beside:
+            self._beside[kernel] = of_sources(self._parts.sources(kernel, self.sources.target))
+        return self._beside[kernel]
+
+    def matrices(self, states: Any) -> Array:
+        """Return the attitude of states.
+
+        Parameters
+        ----------
+        states : array_like, (..., state shape)
+
+        Returns
+        -------
+        array, (..., 3, 3)
+            Direction cosine matrices, body to reference, in double.
+        """
+        states = np.asarray(states, np.float64)
+        if self.attitude is None:
+            return np.array(states)
+        return np.asarray(of_sources(self._parts.sources(self.attitude, NUMPY))(states))
+
+    def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
+        """Return a certified bound of what rounding does to a run without orthonormalization.
+
+        Parameters
+        ----------
+        steps : int
+        rounded_inputs : bool, optional
+            Whether the bound covers increments that must be rounded to the input's format first.
+
+        Returns
+        -------
+        float or None
+            Bound of the distance from the same algorithm in exact arithmetic, as the length of the difference of two
+            states, or of two rows of matrices; None where nothing is certified, as in floating point. Where a state
+            saturates, it holds as long as no element of the exact state exceeds 1 in magnitude.
+        """
+        fixed = self.sources.fixed
+        if fixed is None or fixed.accumulation is None:
+            return None
+        return fixed.accumulation.bound(steps, rounded_inputs)
+
+    def angle_bound(
+        self,
+        steps: int,
+        rounded_inputs: bool = False,
+        orthonormalize_every: int = 0,
+        shortest: float = 0.0,
+    ) -> float | None:
+        """Return a certified bound of the angle by which rounding turns the attitude over a run.
+
+        A run begins at a proper attitude. The bound holds while the state stays near one: `AngleAccumulation` says how
+        near, and for how many steps that is proved.
+
+        Parameters
+        ----------
+        steps : int
+        rounded_inputs : bool, optional
+            Whether the bound covers increments that must be rounded to the input's format first.
+        orthonormalize_every : int, optional
+            Steps from one orthonormalization to the next; 0 for none.
+        shortest : float, optional
+            Length that no state of the run falls short of, or singular value of a matrix, where more is known of it
+            than is proved of every run.
+
+        Returns
+        -------
+        float or None
+            Angle in rad from the same algorithm in exact arithmetic; None where nothing is certified.
+        """
+        fixed, count, error, dual_rows = self.sources.fixed, 0, Fraction(0), False
+        if fixed is None or fixed.angle_accumulation is None:
+            return None
+        angles = fixed.angle_accumulation
+        if (orthonormalize_every or steps) > angles.proved_steps and shortest < angles.shortest:
+            return None
+        if orthonormalize_every:
+            kernel = self._need_orthonormalization()
+            dual_rows = kernel == _DUAL_ROWS
+            if not (
+                kernel in KEEP_THE_ATTITUDE or (dual_rows and orthonormalize_every <= angles.dual_rows_apart)
+            ):
+                return None
+            count = steps // orthonormalize_every
+            error = max(self.beside(kernel).interface.outputs[0].errors)
+        bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
+        return bound if math.isfinite(bound) else None
+
+    def representable(self, increments: Any) -> Array:
+        """Return increments rounded to the numbers that the step takes: to `dtype`, or to a format."""
+        fixed = self.sources.fixed
+        values = np.asarray(increments, self.dtype)
+        return values if fixed is None else in_si(self.evaluator.stored(1, values), fixed.inputs[1])
+
+    def prepared(self, increments: Any) -> Callable[[], Any]:
+        """Return a call that propagates from zero rotation and records all states, for timing.
+
+        Every conversion of the increments is done before.
+
+        Parameters
+        ----------
+        increments : array_like, (N, K, 3)
+            Angle increments in rad.
+        """
+        rows = self._rows(np.asarray(increments, self.dtype)[None])
+        loop = self._begun(self.identity[None])
+        return lambda: self.evaluator.loop(rows, loop)
+
+    def need_increments(self) -> None:
+        """Check that steps take angle increments.
+
+        Raises
+        ------
+        InputError
+            If they take something else.
+        """
+        if self.takes != "increments":
+            raise InputError(
+                f"kernel {self.kernel} takes {self.takes}; a step that takes increments is needed"
+            )
+
+    def step(self, state: Any, increments: Any) -> Array:
+        """Advance the state by one step.
+
+        Parameters
+        ----------
+        state : array_like, (..., state shape)
+            Body-to-reference attitude.
+        increments : array_like, (..., samples, 3)
+            Angle increments of the step in rad, body axes, oldest first, after those from before it.
+
+        Returns
+        -------
+        array, (..., state shape)
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If a shape, a dtype or a value does not fit.
+        """
+        return np.asarray(self.evaluator(state, increments))
+
+    def orthonormalize(self, state: Any) -> Array:
+        """Restore the constraint of a state: its length, or its orthogonality.
+
+        Parameters
+        ----------
+        state : array_like, (..., state shape)
+
+        Returns
+        -------
+        array, (..., state shape)
+        """
+        return np.asarray(self.beside(self._need_orthonormalization())(state))
+
+    def _need_orthonormalization(self) -> str:
+        """Return the kernel that orthonormalizes, if there is one."""
+        if self._orthonormalization is None:
+            raise InputError(f"kernel {self.kernel} has nothing to orthonormalize its state with")
+        return self._orthonormalization
+
+    def propagate(
+        self,
+        increments: Any,
+        record_every: int = 1,
+        orthonormalize_every: int | None = None,
+        initial: Any = None,
+        jobs: int = 1,
+    ) -> Array:
+        """Run the algorithm over a sequence of increments.
+
+        Parameters
+        ----------
+        increments : array_like, (..., N, samples, 3)
+            Angle increments of N steps in rad, body axes; leading axes are independent runs. `gyro.windows` cuts a
+            row of increments into those of each step.
+        record_every, orthonormalize_every : int, optional
+            Steps from record to record, and from orthonormalization to orthonormalization; never by default. A record
+            of the same step is taken after it.
+        initial : array_like, (..., state shape), optional
+            State at the start, by default zero rotation.
+        jobs : int, optional
+            Number of threads that share independent runs of C in double or float, which needs no lock of the
+            interpreter; other back ends use one. The bits are those of one thread.
+
+        Returns
+        -------
+        array, (..., 1 + N // record_every, state shape)
+            The initial state and the records.
+
+        Raises
+        ------
+        InputError, InputTypeError
+            If a shape, a dtype or a value does not fit.
+
+        Examples
+        --------
+        >>> from strapgen import backend
+        >>> turn = np.tile([0.0, 0.0, np.pi / 64], (16, 2, 1))
+        >>> backend("euler", backend="numpy").propagate(turn)[-1].round(6)
+        array([0.      , 0.      , 0.707107, 0.707107])
+        """
+        d = checks.real_array("increments", increments, (self.samples, 3), self.dtype)
+        if d.ndim < 3:
+            raise InputError(f"increments has shape {d.shape}; (..., steps, {self.samples}, 3) is needed")
+        schedule = self._schedule(record_every, orthonormalize_every)
+        checks.count("jobs", jobs)
+        start = self._start(initial)
+        batch, steps = d.shape[:-3], d.shape[-3]
+        try:
+            start = np.broadcast_to(start, batch + self.state_shape)
+        except ValueError:
+            raise InputError(
+                f"initial has shape {start.shape}; it must broadcast to {batch + self.state_shape}"
+            ) from None
+        shape = (*batch, 1 + steps // record_every, *self.state_shape)
+        runs = math.prod(batch)
+        if not runs:
+            return np.empty(shape, self.dtype)
+        rows = self._rows(d.reshape(runs, steps, self.samples, 3))
+        begun = self._begun(start.reshape(runs, *self.state_shape))
+        history, _ = self.evaluator.loop(rows, replace(begun, **schedule, jobs=jobs))
+        return self._states(history).reshape(shape)
+
+    def propagate_parts(
+        self,
+        part: Callable[[int, int], Any],
+        steps: int,
+        record_every: int = 1,
+        orthonormalize_every: int | None = None,
+        initial: Any = None,
+    ) -> Array:
+        """Run the algorithm over increments that come part by part.
+
+        The result has the bits of `propagate`, whose arrays hold the whole run.
+
+        Parameters
+        ----------
+        part : callable
+            ``part(first, count)`` returns the increments of some steps, (count, samples, 3), one part after the other.
+        steps : int
+            Number of steps of the run.
+        record_every, orthonormalize_every, initial : optional
+            As for `propagate`; one run has one initial state.
+
+        Returns
+        -------
+        array, (1 + steps // record_every, state shape)
+
+        Raises
+        ------
+        InputError, InputTypeError
+            As `propagate` does.
+        """
+        if steps <= PART:
+            return self.propagate(part(0, steps), record_every, orthonormalize_every, initial)
+        schedule = self._schedule(record_every, orthonormalize_every) | {"record_every": 1}
+        history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
+        history[0] = start = self._start(initial)
+        loop = self._begun(np.broadcast_to(start, self.state_shape)[None])
+        for first, count, restore_every in run_parts(steps, orthonormalize_every or 0):
+            increments = checks.real_array("increments", part(first, count), (self.samples, 3), self.dtype)
+            loop = replace(loop, **schedule | {"first": first, "restore_every": restore_every})
+            states, feedback = self.evaluator.loop(self._rows(increments[None]), loop)
+            loop = replace(loop, state=states[:, -1], feedback=feedback)
+            ahead = -first % record_every or record_every
+            recorded = self._states(states[0, ahead::record_every])
+            place = (first + ahead) // record_every
+            history[place : place + len(recorded)] = recorded
+        return history
+
+    def _rows(self, increments: Array) -> Array:
+        """Return increments, (runs, N, samples, 3), in the numbers of the code, (runs, N, elements)."""
+        return self.evaluator.stored(1, increments.reshape(*increments.shape[:2], 3 * self.samples))
+
+    def _states(self, rows: Array) -> Array:
+        """Return states in the numbers of the code, (..., elements), as numbers of the same shape."""
+        return self.evaluator.in_si(0, rows).reshape(*rows.shape[:-1], *self.state_shape)
+
+    def _start(self, initial: Any) -> Array:
+        """Return the checked state at the start, by default zero rotation."""
+        start = self.identity if initial is None else initial
+        return checks.real_array("initial", start, self.state_shape, self.dtype)
+
+    def _begun(self, states: Array) -> Loop:
+        """Return what runs begin with, from states, (runs, state shape)."""
+        return Loop(
+            self.evaluator.stored(0, states.reshape(len(states), self.identity.size)),
+            self.evaluator.fresh(len(states)),
+            product=None if self._product is None else self.beside(self._product),
+        )
+
+    def _schedule(self, record_every: int, orthonormalize_every: int | None) -> dict[str, Any]:
+        """Return the fields of a `Loop` that say when states are recorded and orthonormalized, checked."""
+        checks.count("record_every", record_every, largest=checks.MOST)
+        if orthonormalize_every is None:
+            return {"record_every": record_every}
+        checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
+        restore = self.beside(self._need_orthonormalization())
+        return {"record_every": record_every, "restore_every": orthonormalize_every, "restore": restore}
+
+
+def fitted(backend: str, settings: Settings | None) -> Settings | None:
+    """Return the settings that a back end runs with, in its own word; None in floating point.
 
     Raises
     ------
@@ -164,20 +586,13 @@ def backend(
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))
-    return backend_class(step.target)(StepSources(step, choice, orthonormalization))
+    return Backend(StepSources(step, choice, orthonormalization))
 
 
 def sources_to_build(choice: Choice, backend: str, settings: Settings | None = None) -> list[Sources]:
     """Return what a back end of an attitude step builds: the step, and the kernel that orthonormalizes its state.
 
     `strapgen.compile_together` compiles those of many steps in one call of the compiler.
-
-    Parameters
-    ----------
-    choice : Choice
-        What `strapgen.choose_step` returned.
-    backend, settings
-        As for `backend`.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     step = StepSources(sources_of_choice(choice, entry.target, fitted(backend, settings)), choice)
@@ -192,13 +607,7 @@ def chosen_step(
     previous: int | None = None,
     ahead: int | None = None,
 ) -> Choice:
-    """Return the choice of an attitude step from its name and options; a choice is returned as it is.
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed, or options go with a choice, which has its own.
-    """
+    """Return the choice of a step from its name and options; a choice, which has its own, as it is."""
     if not isinstance(algorithm, Choice):
         return catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
     options = {"method": method, "increments": increments, "previous": previous, "ahead": ahead}
@@ -235,4 +644,4 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     'numpy'
     """
     stage_arguments.require("build", sources, Sources)
-    return backend_class(sources.target)(StepSources(sources, None, orthonormalization))
+    return Backend(StepSources(sources, None, orthonormalization))

@@ -24,16 +24,9 @@ _PASS = 12_000
 
 
 class BlockedScan:
-    """Turns the increments of many steps into their states.
+    """Turns the increments of many steps into their states, by the transition of a step and the product of two.
 
     It holds the memory in which it works; calls in several threads need one scan each.
-
-    Parameters
-    ----------
-    transition, product : ArrayProgram
-        The transition of a step's increments, and the state after a transition.
-    identity : array, (elements,)
-        The transition of zero rotation.
     """
 
     def __init__(self, transition: ArrayProgram, product: ArrayProgram, identity: Array) -> None:
@@ -44,19 +37,10 @@ class BlockedScan:
         self._local = np.empty(0)
 
     def totals(self, increments: Array, length: int, segments: int) -> Array:
-        """Return the products of the transitions of whole blocks.
+        """Return the products of transitions up to the end of each block, (elements, blocks, runs * segments).
 
-        Parameters
-        ----------
-        increments : array, (runs, N, samples, 3)
-            Angle increments of N steps in rad, body axes.
-        length, segments : int
-            Each run consists of so many segments of `length` steps, of which the last may be shorter.
-
-        Returns
-        -------
-        array, (elements, blocks, runs * segments)
-            The product of a segment's transitions up to the end of each block. Steps beyond its end do not turn it.
+        Samples are (runs, N, numbers of a step); each run consists of so many segments of `length` steps, of which the
+        last may be shorter. Steps beyond its end do not turn it.
         """
         width = increments.shape[0] * segments
         blocks, depth = _cut(length, width)
@@ -69,16 +53,10 @@ class BlockedScan:
         return self._scan(self._local[:, depth - 1])
 
     def states(self, begin: Array, totals: Array, out: Array) -> None:
-        """Store the states after each step of the last call of `totals`.
+        """Store the states after each step of the last call of `totals`, which returned `totals`.
 
-        Parameters
-        ----------
-        begin : array, (elements, runs * segments)
-            States at the beginning of each segment.
-        totals : array, (elements, blocks, runs * segments)
-            What that call returned.
-        out : array, (elements, depth, blocks, runs, segments)
-            Memory of any order for the states, by the depth in their block.
+        They go from those at the beginning of each segment, (elements, runs * segments), to `out` by the depth in their
+        block, (elements, depth, blocks, runs, segments), in memory of any order.
         """
         depth, rows, local = out.shape[1], self._rows, self._local
         heads = self._room("heads", len(totals), totals.shape[1:])

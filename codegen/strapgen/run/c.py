@@ -1,115 +1,142 @@
-"""The C back ends compile generated C in double or float and call it through cffi; all loops are in C."""
+"""Compiles generated C, C++ and Rust, and calls it through cffi; all loops are in that language."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
-from strapgen.run.evaluators import Array, Evaluator
-from strapgen.run.protocol import Backend
-from strapgen.run.step_sources import StepSources
+from strapgen.run.evaluators import Array, Evaluator, Loop
 from strapgen.targets import BUILT_IN
 
-#: The types of C in numpy.
-_TYPES = {"double": np.float64, "float": np.float32}
+#: The types of floating-point targets in numpy.
+_TYPES: dict[str, np.dtype[Any]] = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
 #: Runs that generated loops take side by side, in any type.
 _GROUP = 16
 
 
-def real_type(target: str) -> tuple[str, Any]:
-    """Return the name of the C type of a target's numbers, and the same type in numpy."""
-    name = BUILT_IN[target].number
-    return name, _TYPES[name]
+def real_type(target: str) -> np.dtype[Any]:
+    """Return the type of the numbers that go in and out of the code of a target: doubles in fixed point."""
+    return _TYPES.get(BUILT_IN[target].number, np.dtype(np.float64))
+
+
+@cache
+def array_type(kind: np.dtype[Any]) -> str:
+    """Return the C type of an array, whose name takes numpy longer to find than a short step takes."""
+    if kind.kind in "iu":
+        return f"{kind.name}_t[]"
+    return next(f"{name}[]" for name, other in _TYPES.items() if other == kind)
 
 
 class CEvaluator(Evaluator):
-    """A generated C function."""
+    """A generated function in C, C++ or Rust, in floating or fixed point."""
 
     def __init__(self, sources: Sources) -> None:
-        self.real, dtype = real_type(sources.target)
-        super().__init__(sources, dtype)
+        fixed = sources.fixed
+        super().__init__(sources, real_type(sources.target))
+        #: Types of the inputs, of all outputs and of error feedback in C.
+        self.input_types, self.word_type = [self.dtype] * len(self.function.inputs), self.dtype
+        self.feedback_type = self.dtype
+        if fixed is not None:
+            word = fixed.settings.word
+            self.input_types = [np.dtype(f"int{argument.format.word}") for argument in fixed.inputs]
+            self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
         self.module = compiler.load(sources)
-        self._array = getattr(self.module.lib, f"{sources.function.name}_array")
+        self._array = getattr(self.module.lib, f"{self.function.name}_array")
 
-    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
-        """Evaluate on checked arrays."""
-        inputs = [
-            np.ascontiguousarray(np.broadcast_to(array, batch + signal.shape))
-            for signal, array in zip(self.function.inputs, arrays, strict=True)
+    @property
+    def name(self) -> str:
+        """Name of the back end."""
+        fixed = self.sources.fixed
+        return self.sources.target if fixed is None else f"{self.sources.target}{fixed.settings.word}"
+
+    def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
+        """Call the function on rows, see `Evaluator.call`."""
+        count = len(feedback)
+        words = [
+            np.ascontiguousarray(rows, kind) for rows, kind in zip(inputs, self.input_types, strict=True)
         ]
-        outputs = tuple(np.empty(batch + signal.shape, self.dtype) for signal in self.function.outputs)
-        count = int(np.prod(batch, dtype=int))
-        self._array(count, *(self.pointer(array) for array in (*inputs, *outputs)))
-        return outputs
+        outputs = [np.empty((count, signal.size), self.word_type) for signal in self.function.outputs]
+        if self.sources.fixed is None:
+            self._array(count, *map(self.pointer, (*words, *outputs)))
+            return outputs, feedback
+        feedback = np.array(feedback, self.feedback_type)
+        status = self.module.ffi.new("int *")
+        carried = [feedback] if self.sources.fixed.residuals else []
+        done = self._array(count, status, *map(self.pointer, (*words, *carried, *outputs)))
+        if status[0]:
+            raise self.refused(status[0], f" (sample {done})" if count > 1 else where)
+        return outputs, feedback
+
+    def refused(self, status: int, where: str = "") -> InputError:
+        """Return the error of a user's input that a status of the generated code stands for."""
+        if status == 1:
+            limits = ", ".join(
+                f"{a.signal.name} up to {float(a.high * a.unit):.6g}" for a in self.interface.inputs
+            )
+            return InputError(
+                f"{self.kernel} refuses its input{where}: its formats were chosen for {limits}; orthonormalize more "
+                "often, or allow for a larger drift or rate"
+            )
+        return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
 
     def pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
-        return self.module.ffi.from_buffer(f"{self.real}[]", array)
+        return self.module.ffi.from_buffer(array_type(array.dtype), array)
 
     def address(self) -> int:
         """Return the address of the function on one sample."""
         ffi = self.module.ffi
-        function = ffi.addressof(self.module.lib, self.function.name)
-        return int(ffi.cast("uintptr_t", function))
+        return int(ffi.cast("uintptr_t", ffi.addressof(self.module.lib, self.function.name)))
 
-
-class CBackend(Backend):
-    """Runs generated C."""
-
-    def __init__(self, parts: StepSources) -> None:
-        step = CEvaluator(parts.step)
-        super().__init__(parts, step)
-        self._module, self._pointer = step.module, step.pointer
-        name = self.sources.function.name
-        self._generated_propagate = getattr(self._module.lib, f"{name}_propagate")
-        self._orthonormalizer = self._module.ffi.NULL
-        if self._orthonormalization is not None:
-            address = self.beside(self._orthonormalization).address()
-            self._orthonormalizer = self._module.ffi.cast(f"{name}_orthonormalizer", address)
-
-    def beside(self, kernel: str) -> CEvaluator:
-        """Return another kernel in C, see `Backend.beside`."""
-        return CEvaluator(self._sources(kernel))
-
-    def _propagate(
-        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
-    ) -> Array:
-        return self._in_threads(increments, record_every, orthonormalize_every, initial, 1)
-
-    def _in_threads(
-        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array, jobs: int
-    ) -> Array:
-        runs, steps = increments.shape[:2]
-        history = np.empty((runs, 1 + steps // record_every, *self.state_shape), self.dtype)
+    def loop(self, samples: Array, loop: Loop) -> tuple[Array, Array]:
+        """Run the loop in C, see `Evaluator.loop`; threads share independent runs in floating point."""
+        ffi, name, fixed = self.module.ffi, self.function.name, self.sources.fixed
+        propagate = getattr(self.module.lib, f"{name}_propagate")
+        runs, steps = samples.shape[:2]
+        state, rows = (
+            np.ascontiguousarray(array, kind)
+            for array, kind in zip((loop.state, samples), self.input_types, strict=True)
+        )
+        feedback = np.array(loop.feedback, self.feedback_type)
+        history = np.empty((runs, 1 + steps // loop.record_every, state.shape[1]), self.word_type)
+        restore = ffi.NULL
+        if isinstance(loop.restore, CEvaluator):
+            restore = ffi.cast(f"{name}_orthonormalizer", loop.restore.address())
+        stopped = ffi.new("size_t[2]")
+        carried = [feedback] if fixed is not None and fixed.residuals else []
 
         def work(part: slice) -> int:
-            arrays = (initial[part], increments[part], history[part])
-            status: int = self._generated_propagate(
-                len(arrays[0]),
-                steps,
-                record_every,
-                orthonormalize_every,
-                self._orthonormalizer,
-                *map(self._pointer, arrays),
+            arrays = [self.pointer(array[part]) for array in (state, rows, *carried, history)]
+            last = [] if fixed is None else [stopped]
+            count = len(range(runs)[part])
+            status: int = propagate(
+                count, steps, loop.record_every, loop.restore_every, restore, *arrays, *last
             )
             return status
 
-        parts = _parts(runs, jobs)
+        # Error feedback and the place of a refusal are those of one call.
+        parts = _parts(runs, loop.jobs if fixed is None else 1)
         if len(parts) == 1:
             statuses = [work(parts[0])]
         else:
             with ThreadPoolExecutor(len(parts)) as pool:  # cffi calls C without the interpreter's lock
                 statuses = list(pool.map(work, parts))
-        if any(statuses):
+        if any(statuses) and fixed is None:
             raise RuntimeError(
                 f"{self.kernel}: the generated loop refused its arguments with status {max(statuses)}"
             )
-        return history
+        if any(statuses):
+            of_run = f" of run {stopped[0] + 1}" if runs > 1 else ""
+            raise self.refused(statuses[0], f" in step {loop.first + stopped[1] + 1}{of_run}")
+        return history, feedback.astype(loop.feedback.dtype)
 
 
 def _parts(runs: int, jobs: int) -> list[slice]:

@@ -1,12 +1,12 @@
 """The exact back end: programs in arithmetic of 40 digits, the reference for what rounding does on the others.
 
 Nothing is generated: the back end interprets the lowered program of a kernel on numbers of mpmath. Inputs are the exact
-numbers that doubles are, and results are rounded to double at the end; methods with `digits` in their names take and
-return all digits.
+numbers that doubles are, and results are rounded to double at the end. An `Interpreter` takes and returns all digits.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from fractions import Fraction
@@ -23,15 +23,12 @@ from strapgen.ir import checks, stage_arguments
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import OPERATIONS, Program
 from strapgen.ir.sources import Sources
-from strapgen.run.evaluators import Array, Evaluator
-from strapgen.run.kernel_sources import program_of, sources_of_choice, sources_of_program
-from strapgen.run.protocol import Backend
-from strapgen.run.step_sources import StepSources
+from strapgen.run.backends import Backend
+from strapgen.run.evaluators import Evaluator
+from strapgen.run.kernel_sources import StepSources, program_of, sources_of_program
 
 #: Decimal digits of the arithmetic, of which a million steps lose six.
 DIGITS = 40
-#: Name of the target in the table of back ends; no text is generated for it.
-_TARGET = "exact"
 
 
 def _sqrt(x: Any) -> Any:
@@ -110,11 +107,7 @@ def states(program: Program, increments: Iterable[Sequence[Any]], initial: Seque
     initial : sequence of mpf
         The first state, row-major.
     """
-    step = Interpreter(program)
-    history = [list(initial)]
-    for row in increments:
-        history.append(step(history[-1], row))
-    return history
+    return list(itertools.accumulate(increments, Interpreter(program), initial=list(initial)))
 
 
 def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray[np.float64]:
@@ -146,8 +139,8 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
     array([0.019996, 0.019996, 0.019996, 0.9994  ])
     """
     stage_arguments.require("propagate", program, Program)
-    backend = ExactBackend(StepSources(sources_of_program(program, _TARGET)))
-    return backend.propagate(checks.numbers("increments", increments), initial=initial)
+    step = Backend(StepSources(sources_of_program(program, "exact")))
+    return step.propagate(checks.numbers("increments", increments), initial=initial)
 
 
 def interpreter(name: str, step: Program | None = None) -> Interpreter:
@@ -161,41 +154,16 @@ def _program(name: str) -> Program:
     return pipeline.program(Choice(name))
 
 
-def in_digits(values: Any) -> Array:
-    """Return doubles as numbers of mpmath, in an array of the same shape."""
-    doubles = np.asarray(values, np.float64)
-    numbers = np.empty(doubles.size, object)
-    numbers[:] = [mpmath.mpf(value) for value in doubles.ravel().tolist()]
-    return numbers.reshape(doubles.shape)
-
-
-def rounded(numbers: Any) -> Array:
-    """Return numbers of mpmath rounded to double, in an array of the same shape."""
-    return np.asarray(numbers, object).astype(np.float64)
-
-
 class ExactEvaluator(Evaluator):
-    """A kernel in 40 digits: doubles go in, and doubles come out."""
+    """A kernel in 40 digits: doubles go in, and doubles come out; `digits` interprets its program."""
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources, np.float64)
+        self.number = np.dtype(object)
         self.digits = Interpreter(program_of(sources))
 
-    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
-        """Evaluate on checked arrays."""
-        count = int(np.prod(batch, dtype=int))
-        rows = [
-            in_digits(np.broadcast_to(array, batch + signal.shape).reshape(count, signal.size))
-            for array, signal in zip(arrays, self.function.inputs, strict=True)
-        ]
-        outputs, _ = self.run(rows, self.fresh(count))
-        return tuple(
-            rounded(output).reshape(batch + signal.shape)
-            for output, signal in zip(outputs, self.function.outputs, strict=True)
-        )
-
-    def run(self, inputs: Sequence[Array], feedback: Array) -> tuple[Sequence[Array], Array]:
-        """Evaluate the kernel once for each row of numbers of mpmath, see `Evaluator.run`."""
+    def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
+        """Interpret the program on each row, see `Evaluator.call`."""
         outputs = [np.full((len(feedback), s.size), mpmath.nan, object) for s in self.function.outputs]
         with mpmath.workdps(DIGITS):
             for place in range(len(feedback)):
@@ -207,97 +175,14 @@ class ExactEvaluator(Evaluator):
         return outputs, feedback
 
 
-class ExactBackend(Backend):
-    """Runs the program of a step in 40 digits; states are rounded to double at the end of a run."""
+def attitudes(backend: Backend, increments: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
+    """Yield the matrices of a run of the back end "exact", row by row with all digits, from zero rotation on.
 
-    def __init__(self, parts: StepSources) -> None:
-        step = ExactEvaluator(parts.step)
-        super().__init__(parts, step)
-        self._digits = step.digits
-        self._start = parts.step_kernels.identity
-
-    @classmethod
-    def of_choice(cls, choice: Choice) -> ExactBackend:
-        """Return a chosen attitude step."""
-        return cls(StepSources(sources_of_choice(choice, _TARGET), choice))
-
-    def beside(self, kernel: str) -> ExactEvaluator:
-        """Return another kernel in 40 digits, see `Backend.beside`."""
-        return ExactEvaluator(self._sources(kernel))
-
-    def states_in_digits(
-        self,
-        increments: Iterable[Sequence[Any]],
-        initial: Sequence[Any] | None = None,
-        restore_every: int = 0,
-    ) -> Iterator[list[Any]]:
-        """Yield the states of a run with all digits, the initial one first.
-
-        The caller sets the precision of mpmath to `DIGITS`.
-
-        Parameters
-        ----------
-        increments : iterable of sequence of mpf
-            Angle increments of each step in rad, row-major.
-        initial : sequence of mpf, optional
-            State at the start, row-major; by default zero rotation.
-        restore_every : int, optional
-            Steps from orthonormalization to orthonormalization; 0 for never.
-
-        Yields
-        ------
-        list of mpf
-            A state, row-major.
-        """
-        restore = self.beside(self._need_orthonormalization()).digits if restore_every else None
-        state = [number(value) for value in self._start] if initial is None else list(initial)
-        yield state
-        for count, row in enumerate(increments, 1):
-            state = self._digits(state, row)
-            if restore is not None and count % restore_every == 0:
-                state = restore(state)
-            yield state
-
-    def attitude_in_digits(self) -> Callable[[Sequence[Any]], Sequence[Any]]:
-        """Return the function that converts a state to the elements of its matrix, row by row, with all digits."""
-        return (lambda state: state) if self.attitude is None else self.beside(self.attitude).digits
-
-    def _propagate(
-        self, increments: Array, record_every: int, orthonormalize_every: int, initial: Array
-    ) -> Array:
-        runs, steps = increments.shape[:2]
-        history = np.full((runs, 1 + steps // record_every, initial[0].size), np.nan)
-        with mpmath.workdps(DIGITS):
-            for run, records in enumerate(history):
-                rows = in_digits(increments[run].reshape(steps, 3 * self.samples))
-                start = list(in_digits(initial[run].ravel()))
-                # From a division by zero on, states are not numbers, as in floating point.
-                with suppress(ZeroDivisionError):
-                    for count, state in enumerate(self.states_in_digits(rows, start, orthonormalize_every)):
-                        if count % record_every == 0:
-                            records[count // record_every] = rounded(state)
-        return history.reshape(*history.shape[:2], *self.state_shape)
-
-    def _continue(
-        self, increments: Array, orthonormalize_every: int, memory: Any, first: int
-    ) -> tuple[Array, Any]:
-        states = np.full((len(increments), self.identity.size), np.nan)
-        if memory == []:  # a division by zero: from there on, states are not numbers
-            return states.reshape(-1, *self.state_shape), memory
-        with mpmath.workdps(DIGITS):
-            rows = in_digits(increments.reshape(-1, 3 * self.samples))
-            try:
-                for count, state in enumerate(self.states_in_digits(rows, memory, orthonormalize_every)):
-                    memory = state
-                    if count:
-                        states[count - 1] = rounded(state)
-            except ZeroDivisionError:
-                memory = []
-        return states.reshape(-1, *self.state_shape), memory
-
-    def _memory(self, initial: Array) -> Any:
-        with mpmath.workdps(DIGITS):
-            return list(in_digits(initial.ravel()))
-
-    def _kernels(self) -> list[tuple[str | None, str]]:
-        return [*super()._kernels(), (self.attitude, self.sources.target)]
+    Increments are those of each step in rad, row-major, as numbers of mpmath.
+    """
+    step, convert = backend.evaluator, backend.attitude and backend.beside(backend.attitude)
+    assert isinstance(step, ExactEvaluator), "doubles hold no further digits"
+    assert backend.sources.companions is not None, "a back end runs an attitude step"
+    state = [number(value) for value in backend.sources.companions.identity]
+    for after in itertools.accumulate(increments, step.digits, initial=state):
+        yield convert.digits(after) if isinstance(convert, ExactEvaluator) else after

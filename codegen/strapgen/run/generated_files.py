@@ -26,14 +26,7 @@ def command_of(text: str) -> str | None:
 
 
 def difference(folder: Path, files: Mapping[str, str]) -> str:
-    """Return a unified diff from the files in a folder to generated ones; "" if they are the same.
-
-    Parameters
-    ----------
-    folder : Path
-    files : mapping of str to str
-        The generated text by path.
-    """
+    """Return a unified diff from the files in a folder to generated ones by path; "" if they are the same."""
     lines: list[str] = []
     for name, text in files.items():
         path = folder / name

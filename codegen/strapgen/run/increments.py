@@ -164,18 +164,8 @@ class StepWindows:
 def run_parts(steps: int, segment: int) -> Iterator[tuple[int, int, int]]:
     """Cut the steps of a run into parts that are propagated one after the other.
 
-    Parameters
-    ----------
-    steps : int
-    segment : int
-        Steps from orthonormalization to orthonormalization; 0 for never.
-
-    Yields
-    ------
-    first, count : int
-        First step and number of steps. A part holds whole segments, or a piece of one that is longer than `PART`.
-    segment : int
-        Steps from orthonormalization to orthonormalization inside the part; 0 for never.
+    Yields first step, number of steps, and steps from orthonormalization to orthonormalization in the part, 0 for
+    never. A part holds whole segments, or a piece of one that is longer than `PART`.
     """
     first = 0
     while first < steps:

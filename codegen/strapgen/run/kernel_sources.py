@@ -1,12 +1,14 @@
-"""Returns what a back end runs: the generated text of a kernel or, for a back end that interprets it, its program."""
+"""What a back end runs: the generated text of a kernel or, where it is interpreted, its program; all as plain data."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 
-from strapgen import pipeline
+from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir.exceptions import InputTypeError
+from strapgen.ir.attitude_step import Companions
+from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
@@ -14,36 +16,17 @@ from strapgen.targets import BUILT_IN
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProgramSources(Sources):
-    """Sources without text, for a back end that runs the program of a kernel.
-
-    Parameters
-    ----------
-    program : Program
-    """
+class _ProgramSources(Sources):
+    """Sources without text, for a back end that runs the program of a kernel."""
 
     program: Program
 
 
 def sources_of_program(program: Program, target: str, settings: Settings | None = None) -> Sources:
-    """Return what a back end runs of a program.
-
-    Parameters
-    ----------
-    program : Program
-    target : str
-        The target of the back end, see `registry.Entry`.
-    settings : Settings, optional
-        Settings of fixed point.
-
-    Returns
-    -------
-    Sources
-        Generated text where `target` is one of strapgen, else the program itself.
-    """
+    """Return what a back end runs of a program: generated text for a target of strapgen, else the program itself."""
     if target in BUILT_IN:
         return pipeline.generate(program, target, settings)
-    return ProgramSources(
+    return _ProgramSources(
         kernel=program.kernel,
         target=target,
         files={},
@@ -58,22 +41,84 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
 
 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
-    """Return what a back end runs of a chosen kernel, from the cache; parameters are those of `sources_of_program`."""
+    """Return what a back end runs of a chosen kernel, from the cache, see `sources_of_program`."""
     if target in BUILT_IN:
         return pipeline.compile(choice, target, settings)
     return sources_of_program(pipeline.program(choice), target)
 
 
 def program_of(sources: Sources) -> Program:
-    """Return the program that sources hold.
-
-    Raises
-    ------
-    InputTypeError
-        If they are generated text.
-    """
-    if not isinstance(sources, ProgramSources):
+    """Return the program that sources hold, if they are not generated text."""
+    if not isinstance(sources, _ProgramSources):
         raise InputTypeError(
             f"sources of {sources.kernel} for {sources.target} hold text; a program is needed"
         )
     return sources.program
+
+
+@dataclass(frozen=True)
+class StepSources:
+    """Sources of an attitude step, and of its product, orthonormalization and attitude as they are needed."""
+
+    step: Sources
+    choice: Choice | None = None  # None where the step brings every kernel that is not in the catalogue
+    orthonormalization: str | None = None  # by default the kernel that goes with the step
+    #: Sources of other kernels by name and target; where a kernel cannot be generated, the reason.
+    beside: dict[tuple[str, str], Sources | str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _ = self.step_kernels
+
+    @property
+    def step_kernels(self) -> Companions:
+        """Names of the step's kernels, and what else its sources tell of an attitude step."""
+        if self.step.companions is None:
+            raise InputError(f"kernel {self.step.kernel} is no attitude step; back ends are built from steps")
+        return self.step.companions
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Nodes at which the step takes the rate, as fractions of its length; empty if it takes increments."""
+        if self.step.function.inputs[1].name == "increments":
+            return ()
+        if self.choice is None or not (nodes := catalogue.nodes(self.choice)):
+            raise InputError(
+                f"kernel {self.step.kernel} takes turns at nodes that its sources do not tell; "
+                "strapgen.backend knows them from a choice"
+            )
+        return tuple(float(node) for node in nodes)
+
+    def sources(self, kernel: str, target: str) -> Sources:
+        """Return the sources of the step or of another kernel, if it can be generated for the target."""
+        if (kernel, target) == (self.step.kernel, self.step.target):
+            return self.step
+        known = self.beside.get((kernel, target))
+        if isinstance(known, str):
+            raise InputError(known)
+        if known is None:
+            known = self.beside[kernel, target] = self._generated(kernel, target)
+        return known
+
+    def _generated(self, kernel: str, target: str) -> Sources:
+        fixed = self.step.fixed if target == self.step.target else None
+        settings = fixed.companion_settings if fixed else None
+        if self.choice is not None:
+            return sources_of_choice(self.choice.companion(kernel), target, settings)
+        for program in self.step.own:
+            if program.kernel == kernel:
+                return sources_of_program(program, target, settings)
+        return sources_of_choice(Choice(kernel), target, settings)
+
+    def complete(self, needed: Iterable[tuple[str | None, str]]) -> StepSources:
+        """Return the same with the sources of the kernels and targets that are needed.
+
+        A process that unpickles it then derives no kernel.
+        """
+        beside: dict[tuple[str, str], Sources | str] = {}
+        for kernel, target in needed:
+            if kernel is not None:
+                try:
+                    beside[kernel, target] = self.sources(kernel, target)
+                except InputError as error:  # raised only where the kernel is used, as without a copy
+                    beside[kernel, target] = str(error)
+        return replace(self, choice=None, beside=beside)

@@ -61,13 +61,7 @@ Array = NDArray[np.float64]
 
 
 def command() -> list[str]:
-    """Return the command of Octave: that of $OCTAVE, or `octave-cli`.
-
-    Raises
-    ------
-    CompilerError
-        If there is no such program.
-    """
+    """Return the command of Octave: that of $OCTAVE, or `octave-cli`; a `CompilerError` says that there is none."""
     text = os.environ.get("OCTAVE", "").strip() or "octave-cli"
     try:
         program, *rest = shlex.split(text)
@@ -90,7 +84,7 @@ def missing() -> str:
     return ""
 
 
-class OctaveProcess:
+class _Process:
     """A process of Octave that serves one request after another until this process ends."""
 
     def __init__(self) -> None:
@@ -122,25 +116,10 @@ class OctaveProcess:
         shapes: Sequence[tuple[int, ...]],
         *rest: str,
     ) -> list[Array]:
-        """Call a function; after an interruption or a failure of Octave itself the process is stopped.
+        """Call a function with the arrays and further arguments as text; return its results, which have the shapes.
 
-        Parameters
-        ----------
-        sources : sequence of Sources
-            What is called, and what that calls.
-        name : str
-            Name of the function.
-        arguments : sequence of array
-            Its first arguments, whose indices are in the order of those in Octave.
-        shapes : sequence of tuple of int
-            Shapes of its results.
-        *rest : str
-            Its other arguments, as text.
-
-        Raises
-        ------
-        CompilerError
-            If Octave refuses the function, or ends.
+        Sources are those of what is called, and of what that calls. After an interruption or a failure of Octave
+        itself the process is stopped.
         """
         (self._folder / "arguments").write_bytes(b"".join(array.tobytes(order="F") for array in arguments))
         sizes = ", ".join(f"[{' '.join(map(str, (*array.shape, 1, 1)))}]" for array in arguments)
@@ -207,7 +186,7 @@ class OctaveProcess:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-_running: list[OctaveProcess] = []
+_running: list[_Process] = []
 _one_at_a_time = threading.Lock()
 
 
@@ -218,10 +197,10 @@ def call(
     shapes: Sequence[tuple[int, ...]],
     *rest: str,
 ) -> list[Array]:
-    """Call a generated function in Octave, in the process that serves all calls; see `OctaveProcess.call`."""
+    """Call a generated function in Octave, in the process that serves all calls; see `_Process.call`."""
     with _one_at_a_time:
         if not _running or not _running[0].serves:
             for process in _running:
                 process.stop()
-            _running[:] = [OctaveProcess()]
+            _running[:] = [_Process()]
         return _running[0].call(sources, name, arguments, shapes, *rest)

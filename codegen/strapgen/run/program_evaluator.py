@@ -6,7 +6,7 @@ and roots have the same bits. Sines and arc tangents are those of numpy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,14 +45,7 @@ LIBRARY_OPERATIONS = frozenset({"sin", "cos", "sinc", "atan2", "direction", "wra
 
 
 class ProgramEvaluator(Evaluator):
-    """A program in the numbers of a target in C.
-
-    Parameters
-    ----------
-    sources : Sources
-        The program, see `kernel_sources.ProgramSources`.
-    target : str
-        "c" or "c-float".
+    """A program in the numbers of a target in C, "c" or "c-float".
 
     Examples
     --------
@@ -79,16 +72,15 @@ class ProgramEvaluator(Evaluator):
         """Return the number that the C has for an exact constant."""
         return self.dtype.type(self._printer.constant(value).removesuffix(self._printer.real.suffix))
 
-    def evaluate(self, arrays: list[Array], batch: tuple[int, ...]) -> tuple[Array, ...]:
-        """Evaluate on checked arrays, see `Evaluator.evaluate`."""
+    def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
+        """Evaluate on the columns of rows, see `Evaluator.call`."""
         values: dict[str, Any] = {RESOLUTION: self._number(self._printer.resolution)}
-        for signal, array in zip(self.function.inputs, arrays, strict=True):
-            flat = np.broadcast_to(array, batch + signal.shape).reshape(*batch, signal.size)
-            values |= {name: flat[..., k] for k, name in enumerate(signal.elements)}
+        for signal, rows in zip(self.function.inputs, inputs, strict=True):
+            values |= zip(signal.elements, rows.T, strict=True)
         with np.errstate(all="ignore"):
             results = self.program.run(values, self._number, _OPERATIONS)
         outputs = []
         for signal in self.function.outputs:
-            elements = [np.broadcast_to(np.asarray(x, self.dtype), batch) for x in results[signal.name]]
-            outputs.append(np.stack(elements, axis=-1).reshape(batch + signal.shape))
-        return tuple(outputs)
+            columns = [np.asarray(x, self.dtype) for x in results[signal.name]]
+            outputs.append(np.stack([np.broadcast_to(x, len(feedback)) for x in columns], axis=-1))
+        return outputs, feedback

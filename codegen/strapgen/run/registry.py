@@ -13,8 +13,6 @@ from strapgen.targets import BUILT_IN
 if TYPE_CHECKING:
     from strapgen.ir.sources import Sources
     from strapgen.run.evaluators import Evaluator
-    from strapgen.run.protocol import Backend
-    from strapgen.run.step_sources import StepSources
 
 
 class Entry(NamedTuple):
@@ -26,8 +24,8 @@ class Entry(NamedTuple):
         One line that says what it is.
     target : str
         The target whose text it runs; a name that is no target where it runs the program itself.
-    evaluator, backend : str
-        The classes that run a kernel and an attitude step, "module:name".
+    evaluator : str
+        The class that runs a kernel, and the loop over its steps, "module:name".
     word : int or None
         Bits of a word in fixed point; None where the user chooses them, or in floating point.
     slow : bool
@@ -41,7 +39,6 @@ class Entry(NamedTuple):
     title: str
     target: str
     evaluator: str
-    backend: str
     word: int | None = None
     slow: bool = False
     many_digits: bool = False
@@ -53,8 +50,7 @@ class Entry(NamedTuple):
         return self.target in BUILT_IN and BUILT_IN[self.target].fixed
 
 
-_C = ("strapgen.run.c:CEvaluator", "strapgen.run.c:CBackend")
-_C_FIXED = ("strapgen.run.fixed:CFixedEvaluator", "strapgen.run.fixed:CFixedBackend")
+_C = "strapgen.run.c:CEvaluator"
 
 #: Other names of back ends, which every command takes too.
 ALIASES = {"c-q31": "c-fixed32", "c-q15": "c-fixed16"}
@@ -88,27 +84,26 @@ BACKENDS: Mapping[str, Entry] = _Backends(
             "generated numpy code in double",
             "numpy",
             "strapgen.run.numpy_evaluator:NumpyEvaluator",
-            "strapgen.run.numpy_backend:NumpyBackend",
         ),
-        "c": Entry("generated C in double, compiled", "c", *_C),
-        "c-float": Entry("generated C in float, compiled", "c-float", *_C),
-        "c-fixed32": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=32),
-        "c-fixed16": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", *_C_FIXED, word=16),
-        "cpp": Entry("generated C++ in double, compiled", "cpp", *_C, by_default=False),
-        "cpp-float": Entry("generated C++ in float, compiled", "cpp-float", *_C, by_default=False),
+        "c": Entry("generated C in double, compiled", "c", _C),
+        "c-float": Entry("generated C in float, compiled", "c-float", _C),
+        "c-fixed32": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", _C, word=32),
+        "c-fixed16": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", _C, word=16),
+        "cpp": Entry("generated C++ in double, compiled", "cpp", _C, by_default=False),
+        "cpp-float": Entry("generated C++ in float, compiled", "cpp-float", _C, by_default=False),
         "cpp-fixed32": Entry(
             "generated C++ in 32-bit fixed point, compiled",
             "cpp-fixed",
-            *_C_FIXED,
+            _C,
             word=32,
             by_default=False,
         ),
-        "rust": Entry("generated Rust in double, compiled", "rust", *_C, by_default=False),
-        "rust-float": Entry("generated Rust in float, compiled", "rust-float", *_C, by_default=False),
+        "rust": Entry("generated Rust in double, compiled", "rust", _C, by_default=False),
+        "rust-float": Entry("generated Rust in float, compiled", "rust-float", _C, by_default=False),
         "rust-fixed32": Entry(
             "generated Rust in 32-bit fixed point, compiled",
             "rust-fixed",
-            *_C_FIXED,
+            _C,
             word=32,
             by_default=False,
         ),
@@ -116,21 +111,18 @@ BACKENDS: Mapping[str, Entry] = _Backends(
             "generated MATLAB in double, run by GNU Octave",
             "matlab",
             "strapgen.run.octave:OctaveEvaluator",
-            "strapgen.run.octave:OctaveBackend",
             by_default=False,
         ),
         "fixed-model": Entry(
             "integer model of the fixed-point C in Python, any word",
             "fixed-model",
             "strapgen.run.fixed:ModelEvaluator",
-            "strapgen.run.fixed:ModelBackend",
             slow=True,
         ),
         "exact": Entry(
             "arithmetic of 40 digits in Python, rounded to double at the end",
             "exact",
             "strapgen.run.exact:ExactEvaluator",
-            "strapgen.run.exact:ExactBackend",
             slow=True,
             many_digits=True,
         ),
@@ -152,12 +144,6 @@ def _of_target(target: str) -> Entry:
 def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
     """Return the class that runs a kernel for a target."""
     loaded: Callable[[Sources], Evaluator] = applications.load(_of_target(target).evaluator)
-    return loaded
-
-
-def backend_class(target: str) -> Callable[[StepSources], Backend]:
-    """Return the class that runs an attitude step for a target."""
-    loaded: Callable[[StepSources], Backend] = applications.load(_of_target(target).backend)
     return loaded
 
 

@@ -39,19 +39,9 @@ def folder_of(target: str) -> str:
 
 
 def tree(lowered: Iterable[Program], targets: Iterable[str] | None = None) -> dict[str, str]:
-    """Return the text of every file of the tree, or of the files for some targets alone.
+    """Return the text of every file of the tree by its path, or of the files for some targets of `TARGETS` alone.
 
-    Parameters
-    ----------
-    lowered : iterable of Program
-        The programs of the catalogue, from `programs`.
-    targets : iterable of str, optional
-        Keys of `strapgen.targets.TARGETS`; by default those of the tree, with the list of all kernels.
-
-    Returns
-    -------
-    dict of str to str
-        By paths with forward slashes.
+    Paths have forward slashes. The list of all kernels belongs to the whole tree.
     """
     files: dict[str, str] = {}
     rows: list[str] = []
@@ -90,25 +80,10 @@ call in floating point.
 
 
 def write(folder: Path, files: dict[str, str]) -> list[Path]:
-    """Write the tree and remove generated files that no longer belong to it.
+    """Write the tree, return what was written, and remove generated files that no longer belong to it.
 
-    Files that strapgen did not generate are not touched.
-
-    Parameters
-    ----------
-    folder : Path
-    files : dict of str to str
-        The texts from `tree`, by path.
-
-    Returns
-    -------
-    list of Path
-        The files that were written.
-
-    Raises
-    ------
-    InputError
-        If such a file stands in the place of one of the tree; nothing is written then.
+    Files that strapgen did not generate are not touched; where one stands in the place of a file of the tree, an
+    `InputError` says so, and nothing is written.
     """
     for name in files:
         path = folder / name
@@ -128,14 +103,7 @@ def write(folder: Path, files: dict[str, str]) -> list[Path]:
 
 
 def strangers(folder: Path, files: dict[str, str]) -> list[Path]:
-    """Return the files in a folder that are no part of the tree, and that `write` leaves, as they are not its own.
-
-    Parameters
-    ----------
-    folder : Path
-    files : dict of str to str
-        The texts from `tree`, by path.
-    """
+    """Return the files in a folder that are no part of the tree, and that `write` leaves, as they are not its own."""
     return [path for path in _unexpected(folder, files) if not _is_leftover(path, folder, files)]
 
 
@@ -153,20 +121,7 @@ def _is_leftover(path: Path, folder: Path, files: dict[str, str]) -> bool:
 
 
 def difference(folder: Path, files: dict[str, str]) -> str:
-    """Return a unified diff from the files in a folder to those of the tree; "" if they are the same.
-
-    The diff also covers files that do not belong in the folder.
-
-    Parameters
-    ----------
-    folder : Path
-    files : dict of str to str
-        The texts from `tree`, by path.
-
-    Returns
-    -------
-    str
-    """
+    """Return a unified diff from the files in a folder, all of them, to those of the tree; "" if they are the same."""
     lines = [generated_files.difference(folder, files)]
     for path in _unexpected(folder, files):
         lines += generated_files.unified(generated_files.text_of(path), "", str(path), "/dev/null")

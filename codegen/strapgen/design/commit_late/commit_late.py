@@ -14,8 +14,7 @@ import numpy as np
 
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.commit_late import commit_late_sources
-from strapgen.design.commit_late.late_unit import LateUnit, SampleKind
-from strapgen.design.commit_late.late_unit_fixed import LateUnitInFixedC, LateUnitOnIntegers, sample_integers
+from strapgen.design.commit_late.late_unit import LateUnit, LateUnitOnIntegers, SampleKind, sample_integers
 from strapgen.design.commit_late.late_unit_in_c import LateUnitInC
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -24,8 +23,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sources import Sources
 from strapgen.run.backends import fitted
-from strapgen.run.evaluators import Array
-from strapgen.run.fixed_numbers import integers, numbers
+from strapgen.run.evaluators import Array, integers, numbers
 from strapgen.run.registry import BACKENDS
 
 
@@ -109,7 +107,7 @@ class CommitLate:
         if target in commit_late_sources.TARGETS:
             whole = commit_late_sources.sources(window, algorithm, target, sample_hz, settings=settings)
             self._note(whole)
-            return LateUnitInC(whole) if settings is None else LateUnitInFixedC(whole)
+            return LateUnitInC(whole)
         interpreted = ("numpy", "fixed-model")
         if target not in interpreted:
             able = (*interpreted, *commit_late_sources.TARGETS)

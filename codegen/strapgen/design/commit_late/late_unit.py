@@ -2,7 +2,7 @@
 
 Interval k lies between two instants and has sample k. It is committed when L samples after it are there, by the step of
 the window. The attitude of now is the committed one times the steps of the last intervals, with filters for the samples
-that are there. The C of `targets.commit_late_c` does the same in the same order.
+that are there. The C of `commit_late_c` does the same in the same order.
 """
 
 from __future__ import annotations
@@ -10,14 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntEnum
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from strapgen.design.commit_late.commit_late_sources import LateSources
+from strapgen.design.commit_late.fixed_filters import NORMALIZED_EVERY
 from strapgen.design.commit_late.late_filters import NEXT, SHORT, short_place
 from strapgen.design.commit_late.lost_samples import REACH
 from strapgen.ir.exceptions import InputError
-from strapgen.run.evaluators import Array
+from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.sources import Sources
+from strapgen.run.evaluators import Array, Evaluator, in_units
 from strapgen.run.registry import of_sources
 
 
@@ -60,7 +64,7 @@ def refusal(kind: int, gap: int, count: int) -> str:
 
 
 class LateUnit:
-    """Commits late and answers now, in double.
+    """Commits late and answers now, in the numbers of generated functions: doubles, or integers of the model.
 
     Parameters
     ----------
@@ -77,42 +81,47 @@ class LateUnit:
         Attitudes at the ends of the intervals that the last call committed, the oldest first.
     """
 
+    #: Commits from one normalization to the next.
+    _normalized_every = 1
+
     def __init__(self, sources: LateSources) -> None:
         self.filters = sources.filters
         self._step = of_sources(sources.step)
         self._rotation = of_sources(sources.rotation)
         self._normalization = of_sources(sources.normalization)
-        self._sets = [_table(rows) for rows in self.filters.sets]
-        self._short = [_table(rows) for rows in self.filters.short]
-        self._restoring = _table(self.filters.restoration)
-        self._next = _table([NEXT])[0]
-        self._first_is_sample = self.filters.sums.start == 1
+        sums = self.filters.sums
+        self._sets: Sequence[Any] = [_table(rows[sums.start :]) for rows in self.filters.sets]
+        self._short: Sequence[Any] = [_table(rows[sums.start :]) for rows in self.filters.short]
+        #: Bits by which sums are shifted down: those of filters, of an estimate and of a lost sample.
+        self._shifts: Sequence[int] = [0] * len(sums)
+        self._next: tuple[Any, int] = _table([NEXT])[0], 0
+        self._restoring: tuple[Any, int] = _table(self.filters.restoration), 0
         size = self._step.function.inputs[0].size
-        self.attitude: Array = np.eye(3) if size == 9 else np.array([0.0, 0, 0, 1])
+        identity = np.eye(3) if size == 9 else np.array([0.0, 0, 0, 1])
+        self.attitude: Array = self._step.stored(0, identity)
         self.committed: list[Array] = []
         self.pending = 0
-        self._samples = np.empty((0, 3))
+        self._samples = np.empty((0, 3), self._step.number)
         self._gap, self._merged = 0, False
+        self._feedback, self._commits = self._step.fresh(1), 0
 
     def reset(self, attitude: Array) -> None:
         """Replace the committed attitude."""
         self.attitude = attitude
+        self._feedback, self._commits = self._step.fresh(1), 0
 
     def push(self, sample: Array, kind: int) -> int:
-        """Take a sample and return how many intervals it commits.
-
-        Parameters
-        ----------
-        sample : array, (3,)
-        kind : int
-            A `SampleKind`.
+        """Take a sample, (3,), of a `SampleKind`, and return how many intervals it commits.
 
         Raises
         ------
         GapError
             If a lost sample cannot be restored, or the sum of two intervals follows no lost one.
         """
-        self._require(kind)
+        reason = refusal(kind, self._gap, len(self._samples))
+        if reason:
+            raise GapError(reason)
+        sample = sample.astype(self._samples.dtype)
         if kind == SampleKind.LOST:
             sample, self._gap = self._estimate(), 1
         elif self._gap:
@@ -130,24 +139,19 @@ class LateUnit:
 
     def now(self) -> Array:
         """Return the attitude at the end of the last interval; nothing is stored."""
-        attitude = self.attitude
+        attitude, feedback = self.attitude, self._feedback
         for place in range(len(self._samples) - self.pending, len(self._samples)):
-            attitude = self._advanced(attitude, place)
+            attitude, feedback = self._advanced(attitude, feedback, place)
         return attitude
 
     def flush(self) -> int:
         """Commit all intervals with the samples that are there, and return how many."""
         return self._commit(self.pending)
 
-    def _require(self, kind: int) -> None:
-        """Refuse a sample that leaves a gap which cannot be restored."""
-        reason = refusal(kind, self._gap, len(self._samples))
-        if reason:
-            raise GapError(reason)
-
     def _estimate(self) -> Array:
         """Return an estimate of the next sample, from the last ones."""
-        return _weighted(self._next, self._samples[-len(self._next) :])
+        taps, shift = self._next
+        return self._near(self._sum(taps, self._samples[-len(taps) :], shift))
 
     def _restore(self) -> None:
         """Put the lost sample in place of its estimate, and take it out of the sum where there is one."""
@@ -160,53 +164,91 @@ class LateUnit:
 
     def _restored(self, around: Array) -> Array:
         """Return the lost sample in the middle of others."""
-        return _weighted(self._restoring[int(self._merged)], around)
+        taps, shift = self._restoring
+        return self._near(self._sum(taps[int(self._merged)], around, shift))
 
     def _split(self, both: Array, lost: Array) -> tuple[Array, Array]:
         """Return a lost sample and the next one, whose sum is known."""
         return lost, both - lost
 
+    def _near(self, values: Array) -> Array:
+        """Return the nearest values in the range of a sample."""
+        return values
+
+    def _sum(self, taps: Any, samples: Array, shift: int) -> Array:
+        """Return the sum of samples, each times its tap, in their order; integers are shifted down."""
+        total: Array = taps[0] * samples[0]
+        for tap, sample in zip(taps[1:], samples[1:], strict=True):
+            total = total + tap * sample
+        return total
+
     def _commit(self, count: int) -> int:
         """Commit the oldest intervals that are not."""
         self.committed = []
         for _ in range(count):
-            advanced = self._advanced(self.attitude, len(self._samples) - self.pending)
+            place = len(self._samples) - self.pending
+            attitude, self._feedback = self._advanced(self.attitude, self._feedback, place)
             self.pending -= 1
-            self.attitude = self._normalized(advanced)
+            self._commits += 1
+            if self._commits == self._normalized_every:
+                self._commits = 0
+                # The first words of the step's error feedback are those of its state.
+                words = self._normalization.fresh(1).shape[1]
+                attitude, first = _called(self._normalization, self._feedback[:, :words], attitude)
+                self._feedback = np.concatenate([first, self._feedback[:, words:]], axis=1)
+            self.attitude = attitude
             self.committed.append(self.attitude)
         return count
 
-    def _normalized(self, attitude: Array) -> Array:
-        """Return a committed attitude without its rounding."""
-        result: Array = self._normalization(attitude)
-        return result
-
-    def _advanced(self, attitude: Array, place: int) -> Array:
-        """Return an attitude after the interval of the sample at a place, with the samples that are there."""
+    def _advanced(self, attitude: Array, feedback: Array, place: int) -> tuple[Array, Array]:
+        """Return attitude and error feedback after the interval of a sample, with the samples that are there."""
         window, count = self.filters.window, len(self._samples)
         after = count - 1 - place
         if count < self.filters.samples:
             width = min(count, SHORT)
             first = min(max(place - 1, 0), count - width)
             rows = self._short[short_place(width, place - first)]
-            return self._rotated(attitude, rows, self._samples[first : first + width], place)
+            return self._rotated(attitude, rows, self._samples[first : first + width], place), feedback
         if place >= window.previous and after >= window.ahead:
             samples = self._samples[place - window.previous : place + window.ahead + 1]
-            return self._stepped(attitude, samples)
+            return _called(self._step, feedback, attitude, samples)
         before = place if after > window.ahead else self.filters.samples - 1 - after
         samples = self._samples[place - before : place - before + self.filters.samples]
-        return self._rotated(attitude, self._sets[before], samples, place)
+        return self._rotated(attitude, self._sets[before], samples, place), feedback
 
-    def _stepped(self, attitude: Array, samples: Array) -> Array:
-        """Return an attitude after an interval with all samples ahead."""
-        result: Array = self._step(attitude, samples)
-        return result
-
-    def _rotated(self, attitude: Array, rows: Array, samples: Array, place: int) -> Array:
+    def _rotated(self, attitude: Array, rows: Any, samples: Array, place: int) -> Array:
         """Return an attitude after an interval, by filters on samples."""
-        rate = self._samples[place] if self._first_is_sample else _weighted(rows[0], samples)
-        coefficients = [rate, *(_weighted(taps, samples) for taps in rows[1:])]
-        result: Array = self._rotation(attitude, *coefficients)
+        sums = [self._sum(taps, samples, shift) for taps, shift in zip(rows, self._shifts, strict=True)]
+        if self.filters.sums.start:
+            sums = [self._samples[place], *sums]
+        return _called(self._rotation, self._rotation.fresh(1), attitude, *sums)[0]
+
+
+class LateUnitOnIntegers(LateUnit):
+    """Commits late and answers now in the integer model."""
+
+    _normalized_every = NORMALIZED_EVERY
+
+    def __init__(self, sources: LateSources) -> None:
+        super().__init__(sources)
+        fixed = sources.fixed
+        assert fixed is not None, "its target is one of fixed point"
+        self._limit, self._shifts = fixed.limit, fixed.shifts
+        self._sets, self._short = fixed.sets, fixed.short
+        self._next = (-2, 8, -12, 8), 1
+        self._restoring = fixed.restoring, fixed.restoring_shift
+
+    def _split(self, both: Array, lost: Array) -> tuple[Array, Array]:
+        following = self._near(both - lost)
+        return both - following, following
+
+    def _near(self, values: Array) -> Array:
+        return np.clip(values, -self._limit, self._limit)
+
+    def _sum(self, taps: Any, samples: Array, shift: int) -> Array:
+        """Return the sum of samples, each times its tap, shifted down and rounded to the nearest, halves up."""
+        total = np.asarray(taps, np.int64) @ samples + (1 << (shift - 1))
+        result: Array = total >> shift
         return result
 
 
@@ -214,9 +256,32 @@ def _table(rows: Sequence[Sequence[Fraction]]) -> Array:
     return np.array([[float(tap) for tap in row] for row in rows])
 
 
-def _weighted(taps: Array, samples: Array) -> Array:
-    """Return the sum of samples, each times its tap, in their order."""
-    total: Array = taps[0] * samples[0]
-    for tap, sample in zip(taps[1:], samples[1:], strict=True):
-        total = total + tap * sample
-    return total
+def _called(evaluator: Evaluator, feedback: Array, attitude: Array, *inputs: Array) -> tuple[Array, Array]:
+    """Return the attitude that a function makes of one, and its error feedback."""
+    outputs, feedback = evaluator.run([x.reshape(1, -1) for x in (attitude, *inputs)], feedback)
+    return np.asarray(outputs[0]).reshape(attitude.shape), feedback
+
+
+def state_argument(step: Sources) -> Argument:
+    """Return the format of the state of a step."""
+    assert step.fixed is not None, "its target is one of fixed point"
+    return step.fixed.inputs[0]
+
+
+def sample_integers(argument: Argument, values: Any, kind: int, rest: Array) -> tuple[Array, Array]:
+    """Return a sample in rad, (3,), as nearest integers, and what rounding leaves for the next one.
+
+    As from a gyro that counts pulses, the error of a sum of samples is at most a unit: `rest` is what the samples
+    before have left, in units. A sample outside its range, or that of the sum of two, is refused.
+    """
+    limit = argument.high * (2 if kind == SampleKind.MERGED else 1)
+    scaled = in_units(argument, np.asarray(values, np.float64))
+    if (np.abs(np.rint(scaled)) > limit).any():
+        raise InputError(
+            f"sample holds {float(np.abs(values).max()):.9g}; formats were chosen for at most "
+            f"{float(limit * argument.unit):.9g} in magnitude"
+        )
+    if kind == SampleKind.LOST:
+        return np.zeros(3, np.int64), rest
+    counts = np.clip(np.rint(scaled + rest), -limit, limit)
+    return counts.astype(np.int64), scaled + rest - counts

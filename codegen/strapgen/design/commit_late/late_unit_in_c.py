@@ -10,28 +10,18 @@ from strapgen.design.commit_late.late_unit import GapError, refusal
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
-from strapgen.run.c import real_type
+from strapgen.run.c import array_type, real_type
 from strapgen.run.evaluators import Array
 
 
 class LateUnitInC:
-    """Commits late and answers now in generated C; its interface is that of `LateUnit`.
-
-    Parameters
-    ----------
-    sources : Sources
-        What `library.commit_late_sources.sources` returns.
-    """
-
-    #: Types of a number in C and in numpy.
-    number: str = ""
-    dtype: Any = None
+    """Commits late and answers now in the C of `commit_late_sources.sources`; its interface is that of `LateUnit`."""
 
     def __init__(self, sources: Sources) -> None:
         module = compiler.load(sources)
         self._ffi, self._lib, self._name = module.ffi, module.lib, sources.function.name
-        if sources.fixed is None:
-            self.number, self.dtype = real_type(sources.target)
+        self.fixed = sources.fixed
+        self.dtype = real_type(sources.target) if sources.fixed is None else np.dtype(np.int32)
         self._state = sources.function.inputs[0]
         self._memory = self._ffi.new(f"{self._name}_memory *")
         self._call("init")
@@ -79,6 +69,10 @@ class LateUnitInC:
 
     def _refused(self, status: int, kind: int, gap: int, count: int) -> InputError:
         """Return the error that a status stands for."""
+        if self.fixed is not None and status == -1:
+            return InputError("a sample lies outside the range of its format")
+        if self.fixed is not None and status == -2:
+            return InputError("the state is too far from a proper one to be advanced; reset it")
         return GapError(refusal(kind, gap, count))
 
     def _commit(self, count: int) -> int:
@@ -90,4 +84,4 @@ class LateUnitInC:
 
     def _pointer(self, array: Array) -> Any:
         """Return the C pointer to a contiguous array's first element."""
-        return self._ffi.from_buffer(f"{self.number}[]", array)
+        return self._ffi.from_buffer(array_type(array.dtype), array)

@@ -27,6 +27,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.step_series.quantization_noise import QuantizationNoise, quantization_noise
 from strapgen.run import exact
+from strapgen.run.backends import backend as attitude_backend
 
 #: Deg/h in a rad/s, and rad in an arc second.
 DEG_H = math.degrees(1) * 3600
@@ -69,7 +70,7 @@ def truncation(choice: Choice, brief: DesignBrief) -> float:
         An attitude step.
     brief : DesignBrief
     """
-    backend = exact.ExactBackend.of_choice(choice)
+    backend = attitude_backend(choice, backend="exact")
     step = float(step_length(choice, brief.gyro))
     with mpmath.workdps(exact.DIGITS):
         angle = mpmath.radians(exact.number(brief.max_rate_deg_s)) * exact.number(
@@ -77,8 +78,7 @@ def truncation(choice: Choice, brief: DesignBrief) -> float:
         )
         sample = [mpmath.mpf(0), mpmath.mpf(0), angle / choice.increments]
         row = sample * backend.samples
-        *_, state = backend.states_in_digits([row])
-        c = backend.attitude_in_digits()(state)
+        *_, c = exact.attitudes(backend, [row])
         lost = angle - mpmath.atan2(c[3] - c[1], c[0] + c[4])
         turns = 2 * mpmath.pi
         lost -= turns * mpmath.nint(lost / turns)

@@ -15,7 +15,7 @@ from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.run.step_sources import StepSources
+from strapgen.run.kernel_sources import StepSources
 from strapgen.targets.contract import options
 from strapgen.targets.names import UNNAMED, Naming
 

@@ -22,7 +22,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.navigation.two_speed.loops import Cycles, LoopsFromPython, LoopSources
+from strapgen.navigation.two_speed.loops import Cycles, Loops, LoopSources
 from strapgen.navigation.two_speed.two_speed_c import wiring
 from strapgen.run.evaluators import Array
 from strapgen.run.fixed import ModelEvaluator
@@ -87,7 +87,7 @@ def _cycle_table(whole: Sources, parts: LoopSources, command: str) -> CycleTable
     for part in _PARTS:
         samples = _samples(runner, part, random.Random(SEED))
         start = _start(loops)
-        cycles = Cycles(_arrays(samples, runner.dtype), _arrays(start, runner.dtype), FAST, SLOW)
+        cycles = Cycles(_arrays(samples, runner.number), _arrays(start, runner.number), FAST, SLOW)
         try:
             attitudes, changes = runner.run(cycles)
             break
@@ -114,7 +114,7 @@ def _cycle_table(whole: Sources, parts: LoopSources, command: str) -> CycleTable
     )
 
 
-def _runner(whole: Sources, parts: LoopSources) -> LoopsFromPython:
+def _runner(whole: Sources, parts: LoopSources) -> Loops:
     """Return what runs the loops without their C: the integer models, or the programs in one floating-point type."""
     loops = parts.loops
     if loops[0].fixed is not None:
@@ -123,11 +123,11 @@ def _runner(whole: Sources, parts: LoopSources) -> LoopsFromPython:
             for loop in loops
             if loop.fixed is not None
         )
-        return LoopsFromPython(LoopSources(models, parts.system), ModelEvaluator)
-    programs = tuple(sources_of_program(pipeline.program(Choice(loop.kernel)), "exact") for loop in loops)
-    return LoopsFromPython(
-        LoopSources(programs, parts.system), lambda sources: ProgramEvaluator(sources, whole.target)
+        return Loops(LoopSources(models, parts.system), ModelEvaluator)
+    programs = tuple(
+        sources_of_program(pipeline.program(Choice(loop.kernel)), "exact") for loop in loops
     )
+    return Loops(LoopSources(programs, parts.system), lambda sources: ProgramEvaluator(sources, whole.target))
 
 
 def _arrays(values: Mapping[str, Any], dtype: Any) -> dict[str, Array]:
@@ -138,7 +138,7 @@ def _arrays(values: Mapping[str, Any], dtype: Any) -> dict[str, Array]:
     }
 
 
-def _samples(runner: LoopsFromPython, part: int, stream: random.Random) -> dict[str, list[tuple[Any, ...]]]:
+def _samples(runner: Loops, part: int, stream: random.Random) -> dict[str, list[tuple[Any, ...]]]:
     """Return random samples of every cycle, of at most a part of their ranges."""
     wires, loops = runner.wires, runner.sources.loops
     counts = (FAST * SLOW * NAVIGATION, SLOW * NAVIGATION)

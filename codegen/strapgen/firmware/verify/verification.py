@@ -22,14 +22,13 @@ from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.sources import Sources
+from strapgen.run.backends import Backend
 from strapgen.run.c import CEvaluator
 from strapgen.run.exact import DIGITS, Interpreter, number
-from strapgen.run.fixed import CFixedEvaluator, ModelEvaluator
+from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.generated_files import command_of, text_of
 from strapgen.run.generation import Request
-from strapgen.run.protocol import Backend
-from strapgen.run.registry import backend_class
-from strapgen.run.step_sources import StepSources
+from strapgen.run.kernel_sources import StepSources
 from strapgen.targets.contract_lines import Contract
 
 Array = NDArray[Any]
@@ -167,7 +166,7 @@ def file_backend(file: Path, request: Request, *, run_differing: bool = False) -
     if differences and not run_differing:
         raise InputError(f"{differences[0]}; --run-differing compiles and runs the file as it stands")
     step = StepSources(replace(sources, files={**sources.files, **here}), request.choice)
-    backend = backend_class(sources.target)(step)
+    backend = Backend(step)
     backend.name = str(file)
     return backend
 
@@ -251,7 +250,7 @@ def _fixed(
 ) -> tuple[int, int, float, float]:
     """Run a function on integers; return wrong calls, calls, the largest error and its bound in last places."""
     assert sources.fixed is not None
-    of = CFixedEvaluator(sources)
+    of = CEvaluator(sources)
     model = ModelEvaluator(pipeline.compile(request.choice, MODEL, request.settings))
     exact, wrong, worst = _Exact(request, sources.fixed), 0, 0.0
     for row in rows:
@@ -279,7 +278,7 @@ def _fixed(
     return wrong, calls, worst, float_above(bound)
 
 
-def _called(of: CFixedEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
+def _called(of: CEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
     """Return the integers of a call and what it returns; None for a refusal."""
     inputs = [tuple(map(int, values)) for values in row.inputs]
     feedback = np.array([row.feedback], of.feedback_type).reshape(1, -1)

@@ -14,7 +14,9 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.motions.rate_motion import RateMotion
 from strapgen.lab.motions.users_motions import UsersMotion
-from strapgen.run.exact import DIGITS, ExactBackend, interpreter, number
+from strapgen.run.backends import Backend
+from strapgen.run.backends import backend as attitude_backend
+from strapgen.run.exact import DIGITS, attitudes, interpreter, number
 
 if TYPE_CHECKING:
     from strapgen.kernel.kernel import Kernel
@@ -67,13 +69,12 @@ def exact_attitudes(
     InputError
         If the attitude of the motion has no closed form.
     """
-    backend = ExactBackend.of_choice(choice)
+    backend = attitude_backend(choice, backend="exact")
     steps_of, truth = _in_digits(motion, backend)
-    attitude = backend.attitude_in_digits()
 
     def run(length: Fraction, count: int) -> Iterator[tuple[list[Any], list[Any]]]:
-        for place, state in enumerate(backend.states_in_digits(steps_of(length, count))):
-            yield list(attitude(state)), truth(place * length)
+        for place, matrix in enumerate(attitudes(backend, steps_of(length, count))):
+            yield matrix, truth(place * length)
 
     return run
 
@@ -100,7 +101,7 @@ def uncertainty(motion: Motion, length: Fraction, count: int) -> float:
     return rounding + (motion.error_bound(float(length * count)) if isinstance(motion, RateMotion) else 0.0)
 
 
-def _in_digits(motion: Motion, backend: ExactBackend) -> tuple[_Steps, _Truth]:
+def _in_digits(motion: Motion, backend: Backend) -> tuple[_Steps, _Truth]:
     """Return the increments of the steps of a back end, and the true attitude, of a motion."""
     if isinstance(motion, UsersMotion):
         return _of_functions(motion, backend)
@@ -141,7 +142,7 @@ def _integrated(motion: RateMotion) -> tuple[_Row, _Truth]:
     return motion.samples_in_digits, motion.attitude_in_digits
 
 
-def _of_functions(motion: UsersMotion, backend: ExactBackend) -> tuple[_Steps, _Truth]:
+def _of_functions(motion: UsersMotion, backend: Backend) -> tuple[_Steps, _Truth]:
     """Return what the functions of a file return, whose digits are those of double."""
 
     def steps_of(length: Fraction, count: int) -> Iterator[list[Any]]:

@@ -16,7 +16,6 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.outputs.output_filter import OutputFilter
 from strapgen.run import backends as run
 from strapgen.run.evaluators import Evaluator
-from strapgen.run.fixed import FixedEvaluator
 
 Array = NDArray[np.float64]
 KERNEL = "butterworth-2"
@@ -183,21 +182,21 @@ def _measured(
     last = outputs[start:]
     constant = float(np.abs(last[:, count] - samples[-1, count]).max())
     rest = float(np.abs(last[:, count + 1]).max())
-    if not isinstance(evaluator, FixedEvaluator):
+    if evaluator.sources.fixed is None:
         return Measured(name, carry, responses, constant, rest, None, None)
     unit = float(evaluator.interface.outputs[-1].unit)
     bound = certified_bound(evaluator, output_filter)
     return Measured(name, carry, responses, constant, rest, bound, unit)
 
 
-def certified_bound(evaluator: FixedEvaluator, output_filter: OutputFilter) -> float:
+def certified_bound(evaluator: Evaluator, output_filter: OutputFilter) -> float:
     """Return by how much the output in fixed point may differ from that of exact arithmetic, in a run of any length.
 
     What a call adds to the errors of the states dies out as the filter forgets, and the sum of that is finite.
 
     Parameters
     ----------
-    evaluator : FixedEvaluator
+    evaluator : Evaluator
         Of the kernel, whose coefficients are constants.
     output_filter : OutputFilter
     """
@@ -229,18 +228,12 @@ def run_filter(evaluator: Evaluator, samples: Array) -> Array:
     array, (cycles, runs, 3)
     """
     outputs = np.empty(samples.shape)
-    if isinstance(evaluator, FixedEvaluator):
-        argument, result = evaluator.interface.inputs[-1], evaluator.interface.outputs[-1]
-        integers = evaluator.integers(argument, samples.reshape(-1, 3)).reshape(samples.shape)
-        states = [np.zeros(samples.shape[1:], evaluator.integer_type)] * 2
-        feedback = evaluator.fresh(samples.shape[1])
-        for number, row in enumerate(integers):
-            (*states, filtered), feedback = evaluator.run([*states, row], feedback)
-            outputs[number] = evaluator.numbers(result, filtered)
-        return outputs
-    states = [np.zeros(samples.shape[1:], evaluator.dtype)] * 2
-    for number, row in enumerate(samples.astype(evaluator.dtype)):
-        *states, outputs[number] = evaluator(*states, row)
+    rows = evaluator.stored(-1, samples.reshape(-1, 3)).reshape(samples.shape)
+    states = [np.zeros(samples.shape[1:], evaluator.number)] * 2
+    feedback = evaluator.fresh(samples.shape[1])
+    for number, row in enumerate(rows):
+        (*states, filtered), feedback = evaluator.run([*states, row], feedback)
+        outputs[number] = evaluator.in_si(-1, filtered)
     return outputs
 
 

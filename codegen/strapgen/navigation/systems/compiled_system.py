@@ -14,7 +14,7 @@ from strapgen.navigation.systems.fitting import Fitted
 from strapgen.navigation.systems.system_memory import SystemMemory
 from strapgen.navigation.systems.system_runner import SystemRunner
 from strapgen.run import compiler
-from strapgen.run.c import real_type
+from strapgen.run.c import array_type, real_type
 from strapgen.run.evaluators import Array
 
 
@@ -28,15 +28,13 @@ class CompiledSystem(SystemRunner):
         self.name = self.sources.function.name
 
     @property
-    def _dtype(self) -> Any:
-        return real_type(self.fit.target)[1]
+    def number(self) -> np.dtype[Any]:
+        """Type of the numbers in floating point."""
+        return real_type(self.fit.target)
 
     def _type(self, name: str) -> np.dtype[Any]:
         argument = self.fit.arguments.get(name)
-        if argument is None:
-            kind: np.dtype[Any] = np.dtype(real_type(self.fit.target)[1])
-            return kind
-        return np.dtype(f"int{argument.format.word}")
+        return self.number if argument is None else np.dtype(f"int{argument.format.word}")
 
     def struct(self, memory: SystemMemory) -> Any:
         """Return a memory as the struct of the generated C."""
@@ -85,7 +83,7 @@ class CompiledSystem(SystemRunner):
             for name in system.outputs
         ]
         done = ffi.new("size_t *")
-        pointers = [ffi.from_buffer(f"{_c_type(array)}[]", array) for array in (*inputs, *outputs)]
+        pointers = [ffi.from_buffer(array_type(array.dtype), array) for array in (*inputs, *outputs)]
         status = getattr(self.module.lib, f"{self.name}_run")(count, held, *pointers, done)
         if status:
             raise self._refused(status, held, int(done[0]))
@@ -117,7 +115,7 @@ class CompiledSystem(SystemRunner):
         ffi = self.module.ffi
         held = self.struct(memory or self.begin())
         rows = [np.ascontiguousarray(samples[s.name], self._type(s.name)) for s in self.system.inputs]
-        first = [ffi.from_buffer(f"{_c_type(array)}[]", array) for array in rows]
+        first = [ffi.from_buffer(array_type(array.dtype), array) for array in rows]
         sizes = [signal.size for signal in self.system.inputs]
         cycle, view = getattr(self.module.lib, f"{self.name}_cycle"), ffi.buffer(held)
         states = bytearray(view)
@@ -143,11 +141,3 @@ class CompiledSystem(SystemRunner):
         stage = self.system.stages[held.refused - 1].name
         why = "an input lies outside its range" if status == 1 else "its input is too far from a proper one"
         return InputError(f"stage {stage} refuses its input in cycle {done + 1} ({why})")
-
-
-def _c_type(array: Array) -> str:
-    return (
-        f"{array.dtype.name}_t"
-        if array.dtype.kind == "i"
-        else {4: "float", 8: "double"}[array.dtype.itemsize]
-    )

@@ -7,7 +7,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.systems.compiled_system import CompiledSystem
 from strapgen.navigation.systems.fitting import Fitted, fitted
 from strapgen.navigation.systems.system_memory import SystemMemory, SystemRun
-from strapgen.navigation.systems.system_runner import InterpretedSystem, SystemRunner
+from strapgen.navigation.systems.system_runner import SystemRunner
 from strapgen.navigation.systems.wiring import Description
 from strapgen.run.backends import fitted as fitted_settings
 from strapgen.run.kernel_sources import sources_of_choice
@@ -42,7 +42,7 @@ def system_runner(
     chosen = fitted_settings(backend, settings)
     if entry.target not in BUILT_IN:
         sources = {name: sources_of_choice(c, entry.target) for name, c in description.choices.items()}
-        return InterpretedSystem(Fitted(description, entry.target, None, sources), backend)
+        return SystemRunner(Fitted(description, entry.target, None, sources), backend)
     fit = fitted(description, entry.target, chosen)
     compiled = BUILT_IN[entry.target].compiled
-    return (CompiledSystem if compiled else InterpretedSystem)(fit, backend)
+    return (CompiledSystem if compiled else SystemRunner)(fit, backend)

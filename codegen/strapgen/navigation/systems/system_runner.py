@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
@@ -20,20 +19,18 @@ from strapgen.navigation.systems.system import Push, Rate, SystemStage
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.system_memory import SystemMemory, SystemRun, rescaled
 from strapgen.run import compiler
-from strapgen.run.evaluators import Array, Evaluator
-from strapgen.run.exact import in_digits, rounded
-from strapgen.run.fixed_numbers import fresh_feedback, integers, numbers
+from strapgen.run.evaluators import Array, Evaluator, fresh_feedback, in_si, stored
 from strapgen.run.increments import pulses
 from strapgen.run.registry import BACKENDS, evaluator_class
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
-_EXACT_BITS = 53
+EXACT_BITS = 53
 #: Cycles, about, whose outputs are held at a time.
 BLOCK = 1 << 14
 
 
-class SystemRunner(ABC):
-    """A described system on a back end.
+class SystemRunner:
+    """A described system on a back end: calls the generated function of each stage from Python.
 
     Parameters
     ----------
@@ -63,11 +60,7 @@ class SystemRunner(ABC):
 
     def fresh(self, runs: int) -> dict[str, Array]:
         """Return the error feedback with which runs begin, by stage, (runs, number of words)."""
-        interfaces = {name: sources.fixed for name, sources in self.fit.sources.items()}
-        return {
-            name: np.empty((runs, 0)) if interface is None else fresh_feedback(interface, runs)
-            for name, interface in interfaces.items()
-        }
+        return {name: fresh_feedback(sources.fixed, runs) for name, sources in self.fit.sources.items()}
 
     def begin(self, runs: int = 1) -> SystemMemory:
         """Return the memory with which a run begins."""
@@ -77,10 +70,8 @@ class SystemRunner(ABC):
             if argument is not None:
                 words = [argument.format.nearest(value) for value in cell.initial]
                 row: Array = np.array([words], object if argument.format.word > 32 else np.int64)
-            elif self.many_digits:
-                row = in_digits(np.array([[float(value) for value in cell.initial]]))
             else:
-                row = np.array([[float(value) for value in cell.initial]], self._dtype)
+                row = stored([[float(value) for value in cell.initial]], self.number)
             cells[cell.name] = np.repeat(row, runs, axis=0)
         return SystemMemory(cells, self.fresh(runs))
 
@@ -90,8 +81,9 @@ class SystemRunner(ABC):
         return bounds(self.fit)
 
     @property
-    def _dtype(self) -> Any:
-        return next(iter(self.evaluators.values())).dtype
+    def number(self) -> np.dtype[Any]:
+        """Type of the numbers in floating point; an object is one of mpmath."""
+        return next(iter(self.evaluators.values())).number
 
     def set(self, memory: SystemMemory, cell: str, value: Any) -> None:
         """Set a cell to a value in SI units, for instance an attitude at the start."""
@@ -103,20 +95,11 @@ class SystemRunner(ABC):
 
     def stored(self, name: str, values: Array) -> Array:
         """Return numbers in SI units as the system stores them."""
-        argument = self.fit.arguments.get(name)
-        if argument is not None:
-            return integers(argument, values, self.system.name)
-        if self.many_digits:
-            return in_digits(values)
-        with np.errstate(over="ignore"):
-            return np.ascontiguousarray(values, self._dtype)
+        return stored(values, self.number, self.fit.arguments.get(name), self.system.name)
 
     def in_si(self, name: str, values: Array) -> Array:
         """Return stored values of a cell as numbers in SI units, (count, elements)."""
-        argument = self.fit.arguments.get(name)
-        if argument is not None:
-            return numbers(argument, values)
-        return np.asarray(rounded(values)) if self.many_digits else np.asarray(values, np.float64)
+        return np.asarray(in_si(values, self.fit.arguments.get(name)), np.float64)
 
     def samples(self, inputs: Mapping[str, Any]) -> dict[str, Array]:
         """Return samples of the inputs as the system takes them, checked.
@@ -144,7 +127,7 @@ class SystemRunner(ABC):
             values = checks.real_array(signal.name, inputs[signal.name], signal.shape, np.float64)
             values = values.reshape(-1, signal.size)
             argument = self.fit.arguments.get(signal.name)
-            if argument is not None and signal.over == CYCLE and argument.format.word < _EXACT_BITS:
+            if argument is not None and signal.over == CYCLE and argument.format.word < EXACT_BITS:
                 values = carried(values, argument.unit)
             result[signal.name] = self.stored(signal.name, values)
             counts.add(len(values))
@@ -204,11 +187,23 @@ class SystemRunner(ABC):
         }
         return SystemRun(shaped, after)
 
-    @abstractmethod
     def _run(
         self, samples: Mapping[str, Array], count: int, memory: SystemMemory
     ) -> tuple[dict[str, Array], SystemMemory]:
         """Run checked samples, and return the outputs after each of their cycles and the memory."""
+        recorded: dict[str, list[Array]] = {name: [] for name in self.system.outputs}
+        every = {name: self.system.every(name) for name in self.system.outputs}
+        for k in range(count):
+            memory.cycle = (memory.cycle + 1) % self.system.cycle
+            due = [rate for rate in self.system.rates if memory.cycle % rate.every == 0]
+            self.call(memory, {name: rows[k : k + 1] for name, rows in samples.items()}, due)
+            for name, rows in recorded.items():
+                if memory.cycle % every[name] == 0:
+                    rows.append(memory.cells[name])
+        empty = {name: memory.cells[name][:0] for name in recorded}
+        return {
+            name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
+        }, memory
 
     def call(self, memory: SystemMemory, samples: Mapping[str, Array], rates: Sequence[Rate]) -> None:
         """Run some rates once on every row of a memory, each with its samples.
@@ -261,30 +256,9 @@ class SystemRunner(ABC):
         return rescaled(values, there.format, here.format)
 
 
-class InterpretedSystem(SystemRunner):
-    """Calls one generated function for each stage, from Python."""
-
-    def _run(
-        self, samples: Mapping[str, Array], count: int, memory: SystemMemory
-    ) -> tuple[dict[str, Array], SystemMemory]:
-        recorded: dict[str, list[Array]] = {name: [] for name in self.system.outputs}
-        every = {name: self.system.every(name) for name in self.system.outputs}
-        for k in range(count):
-            memory.cycle = (memory.cycle + 1) % self.system.cycle
-            due = [rate for rate in self.system.rates if memory.cycle % rate.every == 0]
-            self.call(memory, {name: rows[k : k + 1] for name, rows in samples.items()}, due)
-            for name, rows in recorded.items():
-                if memory.cycle % every[name] == 0:
-                    rows.append(memory.cells[name])
-        empty = {name: memory.cells[name][:0] for name in recorded}
-        return {
-            name: np.concatenate(rows) if rows else empty[name] for name, rows in recorded.items()
-        }, memory
-
-
 def carried(values: Array, unit: Fraction) -> Array:
     """Return increments of any number of elements, (cycles, elements), as differences of rounded sums."""
     count, size = values.shape
     padded = np.pad(values, ((0, 0), (0, -size % 3)))
-    triples = padded.reshape(count, -1, 1, 3).swapaxes(0, 1)
-    return pulses(triples, unit).swapaxes(0, 1).reshape(count, -1)[:, :size]
+    triples = padded.reshape(count, -(-size // 3), 1, 3).swapaxes(0, 1)
+    return pulses(triples, unit).swapaxes(0, 1).reshape(padded.shape)[:, :size]

@@ -1,8 +1,7 @@
-"""Runs the loops of an algorithm in two speeds from Python, one call for each cycle."""
+"""Runs the loops of an algorithm in two speeds: from Python, one call for each cycle, or in one function of C."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,73 +13,50 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem
+from strapgen.navigation.systems.system_runner import EXACT_BITS, carried
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.two_speed_c import LOOPS, wiring
-from strapgen.run.evaluators import Array, Evaluator
-from strapgen.run.fixed_numbers import integers, numbers
-from strapgen.run.increments import pulses
+from strapgen.run import compiler
+from strapgen.run.c import array_type, real_type
+from strapgen.run.evaluators import Array, Evaluator, in_si, stored
 from strapgen.run.kernel_sources import sources_of_choice
 from strapgen.targets import BUILT_IN
-
-#: From this word length on, a word resolves what a double does, and the gyro need not count pulses.
-_EXACT_BITS = 53
 
 
 @dataclass(frozen=True)
 class LoopSources:
-    """Sources of an algorithm in two speeds, as plain data.
+    """Sources of an algorithm in two speeds, as plain data."""
 
-    Parameters
-    ----------
-    loops : tuple of Sources
-        The fast, the slow and the navigation loop.
-    system : DescribedSystem
-        How they are wired, and what is reset.
-    whole : Sources or None
-        C of all loops in one function; None where the loops are called from Python.
-    """
+    loops: tuple[Sources, ...]  # the fast, the slow and the navigation loop
+    system: DescribedSystem  # how they are wired, and what is reset
+    whole: Sources | None = None  # C of all loops in one function; None where they are called from Python
 
-    loops: tuple[Sources, ...]
-    system: DescribedSystem
-    whole: Sources | None = None
+
+def loop_sources(algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
+    """Return what runs on a target; parameters are those of `two_speed_sources.loops`."""
+    system = two_speed_sources.description(algorithm, sculling).system
+    if target in BUILT_IN and BUILT_IN[target].fixed:
+        loops = tuple(two_speed_sources.loops(algorithm, sculling, target, settings))
+    else:
+        names = two_speed_sources.kernels(algorithm, sculling)
+        loops = tuple(sources_of_choice(Choice(name), target) for name in names)
+    if target not in BUILT_IN or not BUILT_IN[target].compiled:
+        return LoopSources(loops, system)
+    return LoopSources(loops, system, two_speed_sources.sources(algorithm, sculling, target, settings))
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """What a run of the loops takes, in the numbers that they compute with.
+    """What a run of the loops takes, in the numbers that they compute with."""
 
-    Parameters
-    ----------
-    samples : mapping of str to array, (count, elements)
-        Samples of every cycle by the names of the loops' inputs.
-    start : mapping of str to array, (1, elements)
-        Values at the start that are not zero.
-    fast, slow : int
-        Fast cycles in a slow cycle, and slow cycles in a navigation cycle.
-    """
-
-    samples: Mapping[str, Array]
-    start: Mapping[str, Array]
-    fast: int
-    slow: int
+    samples: Mapping[str, Array]  # of every cycle by the names of the loops' inputs, (count, elements)
+    start: Mapping[str, Array]  # values at the start that are not zero, (1, elements)
+    fast: int  # fast cycles in a slow cycle
+    slow: int  # slow cycles in a navigation cycle
 
 
-class Loops(ABC):
-    """Runs the loops of an algorithm in two speeds on one kind of code.
-
-    Parameters
-    ----------
-    sources : LoopSources
-    evaluator : callable
-        Class that runs a single kernel of the same target.
-
-    Attributes
-    ----------
-    dtype : dtype
-        Type of the samples in floating point.
-    """
-
-    dtype: Any = np.dtype(np.float64)
+class Loops:
+    """Calls one function for each cycle of each loop."""
 
     def __init__(self, sources: LoopSources, evaluator: Callable[[Sources], Evaluator]) -> None:
         self.sources = sources
@@ -91,48 +67,31 @@ class Loops(ABC):
             if loop.fixed is not None:
                 for argument in (*loop.fixed.inputs, *loop.fixed.outputs):
                     self._arguments.setdefault(argument.signal.name, (argument, loop.kernel))
+        self._load()
 
-    @classmethod
-    def generated(cls, algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
-        """Return the sources that the class runs; parameters are those of `systems.two_speed_sources.loops`."""
-        system = two_speed_sources.description(algorithm, sculling).system
-        if target in BUILT_IN and BUILT_IN[target].fixed:
-            return LoopSources(two_speed_sources.loops(algorithm, sculling, target, settings), system)
-        names = two_speed_sources.kernels(algorithm, sculling)
-        return LoopSources(tuple(sources_of_choice(Choice(name), target) for name in names), system)
+    def _load(self) -> None:
+        """Load the code."""
+        self.evaluators = tuple(map(self.evaluator, self.sources.loops))
+        #: Type of the samples in floating point; an object is one of mpmath.
+        self.number = self.evaluators[0].number
 
-    def converted(self, name: str, values: Array, *, summed: bool = False) -> Array:
-        """Return samples as the loops take them.
+    def stored(self, name: str, values: Array, *, summed: bool = False) -> Array:
+        """Return samples of an input in SI units, (count, elements), as the loops take them.
 
-        Parameters
-        ----------
-        name : str
-            Name of the input.
-        values : array, (count, elements)
-            Samples in SI units.
-        summed : bool, optional
-            Whether the loops sum the samples. In fixed point each then takes over the rounding error of the one before,
-            as from a gyro that counts pulses, and a sum is off by at most one unit.
+        In fixed point a sample that the loops sum takes over the rounding error of the one before, as from a gyro that
+        counts pulses, and a sum is off by at most one unit.
         """
-        if name not in self._arguments:
-            with np.errstate(over="ignore"):  # a number that overflows is refused after the run
-                return np.ascontiguousarray(values, self.dtype)
-        argument, kernel = self._arguments[name]
-        if summed and argument.format.word < _EXACT_BITS:
-            values = pulses(values[:, None], argument.unit)[:, 0]
-        return integers(argument, values, kernel)
+        argument, kernel = self._arguments.get(name, (None, ""))
+        if summed and argument is not None and argument.format.word < EXACT_BITS:
+            values = carried(values, argument.unit)
+        return stored(values, self.number, argument, kernel)
 
     def in_si(self, name: str, values: Array) -> Array:
         """Return what a loop returned, by the name of the argument, as numbers in SI units."""
-        return numbers(self._arguments[name][0], values) if name in self._arguments else values
+        return in_si(values, self._arguments.get(name, (None, ""))[0])
 
-    @abstractmethod
     def run(self, cycles: Cycles) -> tuple[Array, Array]:
         """Run whole navigation cycles.
-
-        Parameters
-        ----------
-        cycles : Cycles
 
         Returns
         -------
@@ -146,18 +105,6 @@ class Loops(ABC):
         InputError
             If a loop refuses its input; the message names the loop.
         """
-
-
-class LoopsFromPython(Loops):
-    """Calls one function for each cycle of each loop."""
-
-    def __init__(self, sources: LoopSources, evaluator: Callable[[Sources], Evaluator]) -> None:
-        super().__init__(sources, evaluator)
-        self.evaluators = tuple(map(evaluator, sources.loops))
-        self.dtype = self.evaluators[0].dtype
-
-    def run(self, cycles: Cycles) -> tuple[Array, Array]:
-        """Run whole navigation cycles, see `Loops.run`."""
         if not len(cycles.samples["turn"]):
             return np.empty((0, cycles.start["state"].shape[1])), np.empty((0, 3))
         fast, slow, navigation = range(len(LOOPS))
@@ -222,3 +169,53 @@ class LoopsFromPython(Loops):
             named = zip((s.name for s in evaluator.function.outputs), outputs, strict=True)
             memory = {updates[name]: value for name, value in named}
         return memory
+
+
+class LoopsInC(Loops):
+    """Runs all loops in one call of the generated function of the whole."""
+
+    def _load(self) -> None:
+        whole = self.sources.whole
+        assert whole is not None, "loops without a whole are called from Python"
+        self.number = real_type(whole.target)
+        self._function = whole.function.name
+        self._module = compiler.load(whole)
+
+    def run(self, cycles: Cycles) -> tuple[Array, Array]:
+        """Run whole navigation cycles in C, see `Loops.run`."""
+        ffi, lib = self._module.ffi, self._module.lib
+        memory = ffi.new(f"{self._function}_memory *")
+        values = {
+            name: np.ascontiguousarray(array, self._kind(name))
+            for name, array in {**cycles.samples, **cycles.start}.items()
+        }
+        getattr(lib, f"{self._function}_begin")(memory, self._pointer(values["state"]))
+        for name in ("previous_turn", "previous_increment"):
+            getattr(memory, name)[0:3] = values[name][0].tolist()
+        slow_cycles = len(values["turn"])
+        navigation_cycles = slow_cycles // cycles.slow
+        attitudes = np.empty((slow_cycles, values["state"].shape[1]), self._kind("state"))
+        changes = np.empty((navigation_cycles, 3), self._kind("velocity_change"))
+        if navigation_cycles:
+            inputs = [values[signal.name] for group in self.wires.samples for signal in group]
+            status = getattr(lib, f"{self._function}_run")(
+                navigation_cycles,
+                cycles.slow,
+                cycles.fast,
+                memory,
+                *map(self._pointer, (*inputs, attitudes, changes)),
+            )
+            if status:
+                # One by one, the loops raise the error that names the loop and its input.
+                Loops(self.sources, self.evaluator).run(cycles)
+                raise AssertionError("the loops by themselves refuse what the whole refuses")
+        return attitudes, changes
+
+    def _kind(self, name: str) -> np.dtype[Any]:
+        """Return the type of an argument's elements."""
+        held = self._arguments.get(name)
+        return self.number if held is None else np.dtype(f"int{held[0].format.word}")
+
+    def _pointer(self, array: Array) -> Any:
+        """Return the C pointer to a contiguous array's first element."""
+        return self._module.ffi.from_buffer(array_type(array.dtype), array)

@@ -15,21 +15,10 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
-from strapgen.navigation.two_speed.exact_loops import ExactLoops
-from strapgen.navigation.two_speed.loops import Cycles, Loops, LoopsFromPython, LoopSources
-from strapgen.navigation.two_speed.loops_in_c import LoopsInC
+from strapgen.navigation.two_speed.loops import Cycles, Loops, LoopsInC, LoopSources, loop_sources
 from strapgen.run.backends import fitted
 from strapgen.run.evaluators import Array, Evaluator
-from strapgen.run.exact import ExactEvaluator
 from strapgen.run.registry import BACKENDS, evaluator_class
-from strapgen.targets import BUILT_IN
-
-
-def _loops(target: str) -> type[Loops]:
-    """Return the class that runs the loops for a target."""
-    if target in BUILT_IN and BUILT_IN[target].compiled:
-        return LoopsInC
-    return ExactLoops if evaluator_class(target) is ExactEvaluator else LoopsFromPython
 
 
 class TwoSpeedRun(NamedTuple):
@@ -106,7 +95,7 @@ class TwoSpeed:
     ) -> None:
         target = BACKENDS[checks.choice("backend", backend, BACKENDS)].target
         chosen = fitted(backend, settings)
-        self._load(backend, _loops(target).generated(algorithm, sculling, target, chosen))
+        self._load(backend, loop_sources(algorithm, sculling, target, chosen))
 
     @classmethod
     def of_sources(cls, name: str, sources: LoopSources) -> TwoSpeed:
@@ -117,10 +106,10 @@ class TwoSpeed:
 
     def _load(self, name: str, sources: LoopSources) -> None:
         """Load the code of the loops."""
-        target = sources.loops[0].target
         self.name = name
         self.loops = sources.loops
-        self._runner = _loops(target)(sources, evaluator_class(target))
+        loops = Loops if sources.whole is None else LoopsInC
+        self._runner = loops(sources, evaluator_class(self.loops[0].target))
         self.state = self.loops[1].function.inputs[0]
         self.identity: Array = np.eye(3) if self.state.size == 9 else np.array([0.0, 0, 0, 1])
 
@@ -188,17 +177,17 @@ class TwoSpeed:
         start = checks.real_array("initial", start, self.state.shape, np.float64)
         before = np.zeros(3) if previous is None else previous
         before = checks.real_array("previous", before, (3,), np.float64)
-        converted = self._runner.converted
+        stored = self._runner.stored
         cycles = Cycles(
             samples={
-                "increment": converted("increment", angles, summed=True),
-                "velocity_increment": converted("velocity_increment", velocities, summed=True),
-                "turn": converted("turn", rates[1:]),
+                "increment": stored("increment", angles, summed=True),
+                "velocity_increment": stored("velocity_increment", velocities, summed=True),
+                "turn": stored("turn", rates[1:]),
             },
             start={
-                "state": converted("state", start.reshape(1, -1)),
-                "previous_turn": converted("previous_turn", rates[:1]),
-                "previous_increment": converted("previous_increment", before.reshape(1, -1)),
+                "state": stored("state", start.reshape(1, -1)),
+                "previous_turn": stored("previous_turn", rates[:1]),
+                "previous_increment": stored("previous_increment", before.reshape(1, -1)),
             },
             fast=fast_cycles,
             slow=slow_cycles,
