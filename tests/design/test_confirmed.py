@@ -81,6 +81,11 @@ def test_what_is_of_higher_order_is_predicted(text, first, ran, parts, tmp_path)
     assert answer[0].name == "euler coning-combined:3+3" and answer[0].meets
     assert answer[0].run_deg_h["coning"] == pytest.approx(answer[0].drift_deg_h["coning"], rel=0.01)
     assert [one.run_deg_h for one in answer[1:]] == [None] * 7
+    third, fourth = (one.coning_parts_deg_h[order] for order in "34")
+    assert verdicts(brief, answer)[2] == (
+        "4 meet it to second order alone, the first euler coning-compressed:8: the lines leave "
+        f"{third:.2g} deg/h of third order and {fourth:.2g} of fourth"
+    )
 
 
 def test_the_cheapest_that_holds_in_its_run_is_the_answer(tmp_path):

@@ -116,6 +116,18 @@ def verdicts(brief: DesignBrief, ordered: list[Judgement]) -> list[str]:
             f"{len(undone)} cheaper by prediction {'does' if len(undone) == 1 else 'do'} not meet it in a run, the "
             f"first {undone[0].name}: {undone[0].reason.removeprefix('in a run ')}"
         )
+    rectified = [
+        one
+        for one in ordered
+        if one.binding == "coning" and one.coning_parts_deg_h and one.coning_parts_deg_h["2"] <= share
+        if one.run_deg_h is None
+    ]
+    if rectified:
+        parts = rectified[0].coning_parts_deg_h or {}
+        sentences.append(
+            f"{len(rectified)} {'meets' if len(rectified) == 1 else 'meet'} it to second order alone, the first "
+            f"{rectified[0].name}: the lines leave {parts['3']:.2g} deg/h of third order and {parts['4']:.2g} of fourth"
+        )
     effect = _coning_effect(brief)
     if effect is not None and brief.environment is not None:
         needed = "is needed" if effect > share else "is not needed here"
