@@ -10,7 +10,7 @@ from gathering import each
 from small_programs import EXACT, node, program
 
 from strapgen.fixedpoint.floating import rounding_bounds
-from strapgen.fixedpoint.floating.errors import ComputedNumbers, _ComputedNumber, _root_share
+from strapgen.fixedpoint.floating.errors import _ComputedNumber, _ComputedNumbers, _root_share
 from strapgen.fixedpoint.floating.expressions import Expression, Expressions
 from strapgen.fixedpoint.floating.number_formats import NUMBERS, NumberFormat, exponent
 from strapgen.fixedpoint.intervals import Interval, root
@@ -197,7 +197,7 @@ LARGEST = (Fraction(3), Fraction(2))
 def relative(kind: str, ranges: list[Interval], rounding: Fraction) -> tuple[Fraction, Fraction] | None:
     """Return the relative bound of an operation on two operands."""
     expression = Expression(kind, (0, 1))
-    numbers = ComputedNumbers(Expressions(), ranges, COARSE)
+    numbers = _ComputedNumbers(Expressions(), ranges, COARSE)
     for (share, rest), largest, known in zip(PAIRS, LARGEST, ranges, strict=True):
         numbers.items.append(
             _ComputedNumber(known, share * largest + rest, Fraction(0), relative=(share, rest))
@@ -229,7 +229,7 @@ def test_a_difference_has_no_relative_bound():
 
 
 def test_the_relative_error_of_a_literal_is_all_of_it():
-    numbers = ComputedNumbers(Expressions(), [], COARSE)
+    numbers = _ComputedNumbers(Expressions(), [], COARSE)
     for value in (Fraction(1, 3), Fraction(17, 16), Fraction(25, 7)):
         share, rest = numbers._literal(value).relative
         assert abs(COARSE.rounded(value) - value) == pytest.approx(share * value, rel=1e-30)

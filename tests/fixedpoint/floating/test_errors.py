@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from small_programs import EXACT, TYPES, computed, exactly, node, program
 
 from strapgen.fixedpoint.floating import bounds, rounding_bounds
-from strapgen.fixedpoint.floating.errors import ComputedNumbers
+from strapgen.fixedpoint.floating.errors import _ComputedNumbers
 from strapgen.fixedpoint.floating.number_formats import NUMBERS, NumberFormat
 from strapgen.ir.program import Program
 
@@ -61,12 +61,12 @@ def test_without_the_rounding_of_one_operation_the_bound_would_be_exceeded(kind,
     code, share = LARGEST[kind]
     error = measured(code, inputs(code, 1000))
     assert share * bound(code) < error <= bound(code)
-    rounding = ComputedNumbers._rounding
+    rounding = _ComputedNumbers._rounding
 
     def without(self, expression, before):
         return Fraction(0) if expression.kind == kind else rounding(self, expression, before)
 
-    monkeypatch.setattr(ComputedNumbers, "_rounding", without)
+    monkeypatch.setattr(_ComputedNumbers, "_rounding", without)
     assert bound(code) < error
 
 
@@ -146,8 +146,8 @@ def test_without_the_terms_of_second_order_the_bound_would_be_exceeded(monkeypat
     code = program({"x": rounding, "y": node("multiply", "x", "x")}, {"a": 1})
     error = measured(code, inputs(code, 1000))
     assert bound(code) / 10 < error <= bound(code)
-    propagated = ComputedNumbers._propagated
-    monkeypatch.setattr(ComputedNumbers, "_propagated", lambda *a: (propagated(*a)[0], Fraction(0)))
+    propagated = _ComputedNumbers._propagated
+    monkeypatch.setattr(_ComputedNumbers, "_propagated", lambda *a: (propagated(*a)[0], Fraction(0)))
     assert bound(code) < error / 1000
 
 

@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from strapgen.fixedpoint.floating import proved
-from strapgen.fixedpoint.floating.errors import ComputedNumbers
+from strapgen.fixedpoint.floating.errors import added_errors
 from strapgen.fixedpoint.floating.expressions import Expressions, NoBoundError
 from strapgen.fixedpoint.floating.number_formats import NUMBERS
 from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
@@ -132,10 +132,9 @@ def _bounds(program: Program, limits: tuple[tuple[str, Fraction], ...], number: 
     if isinstance(analysis, str):
         return RoundingBounds(number, format_.precision, inputs, reason=analysis)
     try:
-        computed = ComputedNumbers(analysis.expressions, analysis.ranges, format_)
+        added = added_errors(analysis.expressions, analysis.ranges, format_)
     except NoBoundError as error:
         return RoundingBounds(number, format_.precision, inputs, reason=str(error))
-    added = [item.added for item in computed.items]
     left_out = _left_out(program, analysis)
     if left_out is None:
         reason = "the series of its transition does not converge on this range"

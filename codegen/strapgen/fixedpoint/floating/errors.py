@@ -34,9 +34,16 @@ class _ComputedNumber:
     relative: tuple[Fraction, Fraction] | None = None
 
 
+def added_errors(
+    expressions: Expressions, ranges: Sequence[Interval], number: NumberFormat
+) -> list[Fraction]:
+    """Return the new part of every operation's error; NoBoundError for an overflow, or a comparison that may turn."""
+    return [item.added for item in _ComputedNumbers(expressions, ranges, number).items]
+
+
 @dataclass
-class ComputedNumbers:
-    """The computed numbers of all operations; NoBoundError where one may overflow, or a comparison may turn."""
+class _ComputedNumbers:
+    """The computed numbers of all operations."""
 
     expressions: Expressions
     ranges: Sequence[Interval]  # exact range of every operation
