@@ -46,19 +46,7 @@ TOOL = Tool(
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
-    """Compare calls, and a run of a step, with balls.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Nothing is written there.
-
-    Returns
-    -------
-    list of Verdict
-        The claim "error bound: 10000 calls", and for an attitude step "error bound: 10000 steps".
-    """
+    """Compare calls, and a run of a step, with balls."""
     claims = {"calls": partial(_judged_calls, subject)}
     if subject.fixed.interface.accumulation is not None:
         claims["steps"] = partial(_judged_run, subject)
@@ -72,20 +60,13 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
 
 @dataclass(frozen=True)
 class CertifiedCalls:
-    """The largest errors of calls, and the largest radius of a ball, as parts of the bounds and of the last place.
+    """The largest errors of calls, and the largest radius of a ball, as parts of the bounds and of the last place."""
 
-    Parameters
-    ----------
-    count : int
-        Calls that were not refused.
-    share : float
-        The largest error, as a part of its bound.
-    radius : float
-        The largest radius, in units of the last place.
-    """
-
+    #: Calls that were not refused
     count: int
+    #: The largest error, as a part of its bound
     share: float
+    #: The largest radius, in units of the last place
     radius: float
 
 
@@ -98,14 +79,7 @@ def _judged_calls(subject: Subject) -> tuple[Result, str]:
 
 
 def errors_of_calls(subject: Subject, count: int) -> CertifiedCalls:
-    """Return the largest errors of calls at corners of the ranges, near them and anywhere.
-
-    Parameters
-    ----------
-    subject : Subject
-    count : int
-        Number of calls; those that are refused do not count.
-    """
+    """Return the largest errors of calls at corners of the ranges, near them and anywhere."""
     from flint import ctx
 
     table = vectors_of_choice(subject.choice, "c-fixed", subject.settings, count)
@@ -143,21 +117,14 @@ def _radius(number: Any) -> float:
 
 @dataclass(frozen=True)
 class CertifiedRun:
-    """The largest angle from the exact attitude in a run, with its bound at the same step.
-
-    Parameters
-    ----------
-    steps, normalizations : int
-    angle, bound : float
-        In rad, where the angle is the largest part of the bound.
-    proper : bool
-        Whether the state stayed proper after every step.
-    """
+    """The largest angle from the exact attitude in a run, with its bound at the same step."""
 
     steps: int
     normalizations: int
+    #: In rad, where the angle is the largest part of the bound
     angle: float
     bound: float
+    #: Whether the state stayed proper after every step
     proper: bool
 
 
@@ -180,20 +147,6 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
 
     Where the state is proved to stay proper for some steps, the increments fill their range and the state is normalized
     as often as that; elsewhere they are small.
-
-    Parameters
-    ----------
-    subject : Subject
-        A step.
-    angles : AngleAccumulation
-        Its bound.
-    steps : int
-    seed : int, optional
-
-    Raises
-    ------
-    InputError
-        If a step is refused.
     """
     model, beside = _models(subject)
     state, samples = subject.fixed.interface.inputs
@@ -262,13 +215,7 @@ def _exact_states(
 
 
 def angle_between(state: Sequence[Any], exact: Sequence[Any]) -> float:
-    """Return an upper end of the angle between two attitudes, in rad.
-
-    Parameters
-    ----------
-    state, exact : sequence of arb
-        Four parameters of any length and sign, or the elements of matrices, which stand for the nearest rotations.
-    """
+    """Return an upper end of the angle between two attitudes, in rad."""
     from flint import arb, arb_mat, ctx
 
     with ctx.workprec(PRECISION):

@@ -32,14 +32,7 @@ def column_of(integers: Sequence[int]) -> Any:
 
 
 def outcome(program: Program, values: Sequence[Any]) -> list[Any]:
-    """Return the elements of a program's only output.
-
-    Parameters
-    ----------
-    program : Program
-    values : sequence of arb, or of arrays of them
-        The elements of its inputs, in order.
-    """
+    """Return the elements of a program's only output."""
     (elements,) = outcomes(program, values)
     return elements
 
@@ -52,15 +45,7 @@ def outcomes(program: Program, values: Sequence[Any]) -> list[list[Any]]:
 
 
 def multiplied(product: Program, turns: Sequence[Any]) -> list[Any]:
-    """Return the product of transitions.
-
-    Parameters
-    ----------
-    product : Program
-        The kernel that multiplies one transition by the next.
-    turns : sequence of array of arb
-        For each element of a transition, its values in the order of the steps.
-    """
+    """Return the product of transitions."""
     while len(turns[0]) > 1:
         odd = len(turns[0]) % 2
         pairs = [[column[k : len(column) - odd : 2] for column in turns] for k in (0, 1)]

@@ -33,23 +33,8 @@ CHECKS: dict[str, tuple[str, str]] = {
 def collect(subjects: Sequence[Subject], folder: Path, tools: Sequence[str] = ()) -> Iterator[list[Verdict]]:
     """Run every check on every kernel.
 
-    Parameters
-    ----------
-    subjects : sequence of Subject
-    folder : Path
-        Each kernel has a folder of its function's name in it, with what the tools read and a reader can run again.
-    tools : sequence of str, optional
-        Keys of `CHECKS`; by default all.
-
-    Yields
-    ------
-    list of Verdict
-        What one check says of one kernel, in the order in which they end.
-
-    Raises
-    ------
-    InputError
-        If a tool is not known.
+    `folder`: each kernel has a folder of its function's name in it, with what the tools read and a reader can
+    run again.
     """
     for tool in tools:
         checks.choice("tool", tool, CHECKS)

@@ -46,19 +46,7 @@ TOOL = Tool("Coq", ("coqc", "gappa"), "coq, libcoq-gappa and gappa", _version)
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
-    """Have Coq check the proof of the error bound of a call.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        For the proof, ``one_step.v``.
-
-    Returns
-    -------
-    list of Verdict
-        For `STEP` as it stands in the standard catalogue; for any other kernel none.
-    """
+    """Have Coq check the proof of the error bound of a call."""
     if subject.choice.kernel != STEP or (subject.settings or Settings()) != Settings():
         return []
 
@@ -69,20 +57,7 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
 
 
 def checked(script: Script, file: Path) -> tuple[Result, str]:
-    """Have Coq check the proof that Gappa finds of the claim of a script.
-
-    Parameters
-    ----------
-    script : Script
-        Its rules are identities of polynomials.
-    file : Path
-        Where the proof is written.
-
-    Returns
-    -------
-    str, str
-        "proved" if it needs no axiom but those of the real numbers; and the reason.
-    """
+    """Have Coq check the proof that Gappa finds of the claim of a script."""
     claim = file.with_suffix(".claim.g")
     claim.write_text(script.claim())
     said = subprocess.run(
@@ -103,8 +78,6 @@ def checked(script: Script, file: Path) -> tuple[Result, str]:
 def strange_axioms(said: str) -> list[str]:
     r"""Return what a theorem needs beside the axioms of the real numbers, from what Coq says of its assumptions.
 
-    Examples
-    --------
     >>> strange_axioms("Axioms:\nClassical_Prop.classic : forall P : Prop, P\na1 : (x = y)%R\n")
     ['a1']
     """

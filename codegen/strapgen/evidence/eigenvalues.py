@@ -29,13 +29,7 @@ def exact(number: Fraction) -> Any:
 
 
 def turns_alone(matrix: Matrix) -> bool:
-    """Tell whether rotations of all vectors turn a symmetric matrix of polynomials, and leave one element as it is.
-
-    Parameters
-    ----------
-    matrix : list of list of fmpq_mpoly
-        One row, or one for each dimension of space.
-    """
+    """Tell whether rotations of all vectors turn a symmetric matrix of polynomials, and leave one element as it is."""
     gens = matrix[0][0].context().gens()
     size = len(matrix)
     for i, j in itertools.combinations(range(_SPACE), 2):
@@ -55,13 +49,7 @@ def turns_alone(matrix: Matrix) -> bool:
 
 
 def largest(matrices: list[Matrix]) -> Fraction:
-    """Return an upper bound of 0 and of all eigenvalues for x and z from 0 to 1, y from -1 to 1, y^2 + z^2 up to 1.
-
-    Parameters
-    ----------
-    matrices : list of matrix of fmpq_mpoly
-        Symmetric matrices of polynomials in x, y and z.
-    """
+    """Return an upper bound of 0 and of all eigenvalues for x and z from 0 to 1, y from -1 to 1, y^2 + z^2 up to 1."""
     power = min(
         (int(powers[0]) for m in matrices for row in m for p in row for powers in p.to_dict()), default=0
     )

@@ -35,12 +35,7 @@ def evidence_report(verdicts: Sequence[Verdict]) -> Report:
 def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> str:
     """Return the page of the standard catalogue in Markdown.
 
-    Parameters
-    ----------
-    verdicts : sequence of Verdict
-        Their claims are a promise and a case, as "no overflow: x86_64".
-    digests : mapping of str to str
-        Digest of each kernel's files.
+    `digests`: digest of each kernel's files.
     """
     parts = [_HEAD, "## Summary", summary(verdicts).as_markdown()]
     for promise in dict.fromkeys(_promise(verdict)[0] for verdict in verdicts):
@@ -55,32 +50,19 @@ def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> st
 
 @dataclass(frozen=True)
 class EvidencePage:
-    """What a page of evidence says of its kernels.
+    """What a page of evidence says of its kernels."""
 
-    Parameters
-    ----------
-    results : dict of str to dict of str to str
-        By the name of the function, then by the claim: a result and its tools, as in "proved, Gappa".
-    digests : dict of str to str
-        Digest of each kernel's files.
-    versions : tuple of str
-        The tools, with their versions.
-    """
-
+    #: By the name of the function, then by the claim: a result and its tools, as in "proved, Gappa"
     results: dict[str, dict[str, str]]
+    #: Digest of each kernel's files
     digests: dict[str, str]
+    #: The tools, with their versions
     versions: tuple[str, ...]
 
 
 def read_page(page: str) -> EvidencePage:
     """Return what the text of `evidence_page` says.
 
-    Parameters
-    ----------
-    page : str
-
-    Examples
-    --------
     >>> proof = Verdict("a_w32", "no overflow: AVR", "z3", "4.16", "proved", 0.1)
     >>> read_page(evidence_page([proof], {"a_w32": "0123"})).results
     {'a_w32': {'no overflow: AVR': 'proved, z3'}}

@@ -21,22 +21,7 @@ def driver_name(sources: Sources) -> str:
 
 
 def driver_files(sources: Sources, guarded: bool, commands: Sequence[str] = ()) -> dict[str, str]:
-    """Print the driver of a function.
-
-    Parameters
-    ----------
-    sources : Sources
-        The function in C in fixed point.
-    guarded : bool
-        Whether a value on the way is checked, so that inputs inside their ranges may be refused.
-    commands : sequence of str, optional
-        Commands that compile and run the driver, for its head.
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name.
-    """
+    """Print the driver of a function."""
     assert sources.fixed is not None
     numbers, interface = numbers_of(sources), sources.fixed
     inputs, outputs = interface.inputs, interface.outputs

@@ -24,19 +24,7 @@ _PROGRAM = "./fuzz"
 
 
 def fuzzing(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell whether a fuzzer finds a call that does not what the header says, or that a sanitizer reports.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Folder of the kernel; the driver goes into ``fuzzing/`` in it.
-
-    Returns
-    -------
-    list of Verdict
-        The claim "no undefined behaviour: fuzzing".
-    """
+    """Tell whether a fuzzer finds a call that does not what the header says, or that a sanitizer reports."""
     place = folder / "fuzzing"
 
     def judge() -> tuple[Result, str]:
@@ -73,15 +61,7 @@ def built(folder: Path, sources: Sources) -> str:
 
 
 def run_fuzzer(folder: Path, options: Sequence[str]) -> str:
-    """Let the fuzzer run; return what it reports, with the input that it reports it of, otherwise nothing.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the driver; the fuzzer leaves the input that fails there, as ``crash-*``.
-    options : sequence of str
-        Options of libFuzzer, and folders of inputs.
-    """
+    """Let the fuzzer run; return what it reports, with the input that it reports it of, otherwise nothing."""
     command = [_PROGRAM, f"-max_len={LONGEST}", "-len_control=0", "-timeout=10", *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False)
     return reported(done.stderr.decode(errors="replace")) if done.returncode else ""
@@ -90,8 +70,6 @@ def run_fuzzer(folder: Path, options: Sequence[str]) -> str:
 def reported(said: str) -> str:
     r"""Return what a fuzzer's messages report: the contract's line, or that of a sanitizer, and the input.
 
-    Examples
-    --------
     >>> reported("f: an input is changed\nartifact_prefix='./'; Test unit written to ./crash-1\nBase64: AQ==\n")
     'f: an input is changed; input in base 64: AQ=='
     """

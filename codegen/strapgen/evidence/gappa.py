@@ -33,18 +33,7 @@ TOOL = Tool("Gappa", ("gappa",), "gappa", _version)
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
-    """Have Gappa prove the error bounds of a call in fixed point, in double and in float.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        For the scripts, ``one_step.g`` and one for each type.
-
-    Returns
-    -------
-    list of Verdict
-    """
+    """Have Gappa prove the error bounds of a call in fixed point, in double and in float."""
     verdicts = [
         _verdict(subject.name, "one step", folder / "one_step.g", lambda: [fixed_script(subject.fixed)])
     ]
@@ -81,28 +70,16 @@ def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Sc
 
 @dataclass(frozen=True)
 class Answer:
-    """What Gappa says of a script that asks for bounds.
+    """What Gappa says of a script that asks for bounds."""
 
-    Parameters
-    ----------
-    bounds : tuple of Fraction
-        A bound of the magnitude of each expression, in order; fewer where it has none.
-    complaint : str
-        A rule that is no identity, or why it gave up; "" where all is well.
-    """
-
+    #: A bound of the magnitude of each expression, in order; fewer where it has none
     bounds: tuple[Fraction, ...]
+    #: A rule that is no identity, or why it gave up; "" where all is well
     complaint: str = ""
 
 
 def answered(file: Path) -> Answer:
-    """Return the bounds that Gappa proves.
-
-    Parameters
-    ----------
-    file : Path
-        A script that asks for bounds of magnitudes.
-    """
+    """Return the bounds that Gappa proves."""
     outcome = _run([f"-Eprecision={PRECISION}", str(file)])
     if outcome.returncode < 0:
         return Answer((), f"no answer in {SECONDS} s")
@@ -121,16 +98,8 @@ def answered(file: Path) -> Answer:
 def judged(script: Script, answer: Answer) -> tuple[Result, str]:
     """Compare the bounds that Gappa proves with those that the header states.
 
-    Parameters
-    ----------
-    script : Script
-    answer : Answer
-
-    Returns
-    -------
-    tuple of str and str
-        "proved" if none is larger, otherwise "fails"; and the bounds that are the closest to the header's, or farthest
-        above.
+    Returns: "proved" if none is larger, otherwise "fails"; and the bounds that are the closest to the header's,
+    or farthest above.
     """
     if answer.complaint:
         return "fails", answer.complaint

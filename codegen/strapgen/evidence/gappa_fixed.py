@@ -30,22 +30,7 @@ _SMALLER = 1 + Fraction(1, 1000)
 
 
 def fixed_script(fixed: FixedProgram) -> Script:
-    """Return the script of one call of a program in fixed point.
-
-    Parameters
-    ----------
-    fixed : FixedProgram
-
-    Returns
-    -------
-    Script
-        Its goals are the errors of the outputs, with the bounds that the header states.
-
-    Raises
-    ------
-    CannotFollowError
-        If the program has what Gappa has no theorem for.
-    """
+    """Return the script of one call of a program in fixed point."""
     return _FixedScriptWriter(fixed).script
 
 

@@ -29,26 +29,7 @@ _SMALLER = 1 + Fraction(1, 1000)
 
 
 def floating_script(program: Program, rounding: RoundingBounds, degree: int = DEGREES[0]) -> Script:
-    """Return the script of one call of a program in floating point.
-
-    Parameters
-    ----------
-    program : Program
-    rounding : RoundingBounds
-        What the header states.
-    degree : int, optional
-        Degree up to which operations are expanded in the inputs for their ranges.
-
-    Returns
-    -------
-    Script
-        Its goals are the errors of the outputs, with the bounds that the header states.
-
-    Raises
-    ------
-    CannotFollowError
-        If the header states no bound, or one with conditions, or the program calls what Gappa has no theorem for.
-    """
+    """Return the script of one call of a program in floating point."""
     if not rounding.errors:
         raise CannotFollowError(f"the header states no bound: {rounding.reason}")
     if rounding.conditions:

@@ -22,19 +22,13 @@ class CannotFollowError(Exception):
 
 @dataclass
 class Script:
-    """A script for Gappa.
+    """A script for Gappa."""
 
-    Parameters
-    ----------
-    definitions, hypotheses, rules : list of str
-        Lines ``name = expression;``, facts of the inputs, and lines that tell Gappa how to rewrite an expression.
-    goals : dict of str to Fraction
-        Expressions, each with the bound of its magnitude that the project states.
-    """
-
+    #: Lines ``name = expression;``, facts of the inputs, and lines that tell Gappa how to rewrite an expression
     definitions: list[str] = field(default_factory=list)
     hypotheses: list[str] = field(default_factory=list)
     rules: list[str] = field(default_factory=list)
+    #: Expressions, each with the bound of its magnitude that the project states
     goals: dict[str, Fraction] = field(default_factory=dict)
 
     def claim(self) -> str:
@@ -65,8 +59,6 @@ class Script:
 def number(value: Fraction) -> str:
     """Return an exact number as Gappa reads it.
 
-    Examples
-    --------
     >>> number(Fraction(-3, 8)), number(Fraction(1, 48)), number(Fraction(2))
     ('-3b-3', '(1/48)', '2')
     """
@@ -86,8 +78,6 @@ def product(coefficient: Fraction, names: Sequence[str]) -> str:
 def total(terms: Sequence[str]) -> str:
     """Return a sum; what is less than nothing is subtracted, as programs have it.
 
-    Examples
-    --------
     >>> total(["a * b", "-1 * c", "1b-3"])
     'a * b - c + 1b-3'
     """
@@ -102,24 +92,7 @@ def total(terms: Sequence[str]) -> str:
 def exact_lines(
     program: Program, name_of_input: Callable[[str], str]
 ) -> tuple[list[str], dict[str, list[str]]]:
-    """Return an exact program as definitions, and what holds its results.
-
-    Parameters
-    ----------
-    program : Program
-    name_of_input : callable
-        ``name_of_input(element)`` returns the name that the script has for an element of an input.
-
-    Returns
-    -------
-    tuple of list of str and dict of str to list of str
-        The definitions of names ``x_...``, and for each output the expressions of its elements.
-
-    Raises
-    ------
-    CannotFollowError
-        If Gappa does not know an operation.
-    """
+    """Return an exact program as definitions, and what holds its results."""
     inputs = {element for signal in program.inputs for element in signal.elements}
 
     def name(reference: str) -> str:

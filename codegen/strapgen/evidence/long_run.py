@@ -54,20 +54,7 @@ class _WithBalls(Tool):
 
 
 def million_steps(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell how far a million steps with error feedback end from exact arithmetic.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Folder of the kernel; the program goes into ``million_steps/`` in it.
-
-    Returns
-    -------
-    list of Verdict
-        The claim "error of a million steps: cortex-m3" for `STEP` of the standard catalogue, generated with `SETTINGS`
-        in place of its own; for any other kernel none.
-    """
+    """Tell how far a million steps with error feedback end from exact arithmetic."""
     if subject.choice.kernel != STEP or (subject.settings or Settings()) != Settings():
         return []
     runner = RUNNERS[PROCESSOR]
@@ -97,15 +84,7 @@ def million_steps(subject: Subject, folder: Path) -> list[Verdict]:
 
 
 def noisy_run(subject: Subject, rows: int, passes: int) -> LongRun:
-    """Return a run along a motion that cones, with noise.
-
-    Parameters
-    ----------
-    subject : Subject
-        A step in fixed point.
-    rows, passes : int
-        Steps of the motion, and how many times they are taken.
-    """
+    """Return a run along a motion that cones, with noise."""
     assert subject.sources.fixed is not None
     state, samples = subject.sources.fixed.inputs
     motion = tuple(row[state.signal.size :] for row in motion_rows(subject.sources.fixed, rows, _PART))
@@ -115,8 +94,6 @@ def noisy_run(subject: Subject, rows: int, passes: int) -> LongRun:
 def states_of(said: str) -> list[list[int]]:
     """Return the states that a program reports, up to the first call that is refused.
 
-    Examples
-    --------
     >>> states_of("state 00000001 ffffffff")
     [[1, -1]]
     """
@@ -126,20 +103,7 @@ def states_of(said: str) -> list[list[int]]:
 
 
 def exact_states(subject: Subject, run: LongRun) -> list[list[Any]]:
-    """Return the state after every pass as balls that hold what exact arithmetic makes of the integers.
-
-    Parameters
-    ----------
-    subject : Subject
-        A step that is linear in its state.
-    run : LongRun
-        Its run.
-
-    Returns
-    -------
-    list of list of arb
-        In the unit of the state.
-    """
+    """Return the state after every pass as balls that hold what exact arithmetic makes of the integers."""
     from flint import ctx
 
     sources = subject.sources
@@ -172,20 +136,7 @@ def noisy_integers(run: LongRun) -> Iterator[list[int]]:
 def compared(
     states: Sequence[Sequence[int]], exact: Sequence[Sequence[Any]], run: LongRun
 ) -> tuple[Result, str]:
-    """Return whether states are as near to balls as is claimed, in units of the last place.
-
-    Parameters
-    ----------
-    states : sequence of sequence of int
-        What the processor reports after each pass.
-    exact : sequence of sequence of arb
-    run : LongRun
-
-    Returns
-    -------
-    str, str
-        The result, and the figures.
-    """
+    """Return whether states are as near to balls as is claimed, in units of the last place."""
     from flint import ctx
 
     assert run.sources.fixed is not None

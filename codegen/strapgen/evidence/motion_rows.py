@@ -18,23 +18,7 @@ _PART = 0.9
 
 
 def motion_rows(interface: Interface, count: int, part: float = _PART) -> tuple[tuple[int, ...], ...]:
-    """Return the elements of all inputs along a motion whose axis and angle change.
-
-    Parameters
-    ----------
-    interface : Interface
-        Of the kernel.
-    count : int
-        Number of rows.
-    part : float, optional
-        Part of its range that an input without the constraint of an attitude fills.
-
-    Returns
-    -------
-    tuple of tuple of int
-        Attitudes are those of the motion, rounded to their formats; every other input is an integral of its rate, or
-        two of them or more, scaled to fill a part of the range.
-    """
+    """Return the elements of all inputs along a motion whose axis and angle change."""
     coning = motion("coning", **GENERAL)
     columns = [_column(argument, coning, count, part) for argument in interface.inputs]
     return tuple(

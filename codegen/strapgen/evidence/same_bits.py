@@ -38,19 +38,7 @@ class Part:
 
 
 def same_bits(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell, for each processor, whether a kernel returns the integers of the model.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Folder of the kernel; the programs go into ``processors/`` in it.
-
-    Returns
-    -------
-    list of Verdict
-        Claims "same bits: cortex-m0" and so on. None for words of 64 bits: no processor here has their products.
-    """
+    """Tell, for each processor, whether a kernel returns the integers of the model."""
     if subject.settings is not None and subject.settings.word > LONGEST_WORD:
         return []
     assert subject.sources.fixed is not None
@@ -102,8 +90,6 @@ def _judged(runner: Runner, place: Path, sources: Sequence[str], expected: list[
 def parts_of(said: str) -> list[Part]:
     """Return the parts of a run that a program reports.
 
-    Examples
-    --------
     >>> parts_of("coning 000003e9 000003e8 00c0ffee")
     [Part(name='coning', calls=1001, accepted=1000, checksum=12648430)]
     """
@@ -177,18 +163,7 @@ class _ModelRun:
 
 
 def of_model(subject: Subject, run: CallRun) -> Iterator[Part]:
-    """Yield what each part of a run must report, from the model in Python integers.
-
-    Parameters
-    ----------
-    subject : Subject
-    run : CallRun
-
-    Yields
-    ------
-    Part
-        "coning", then "random".
-    """
+    """Yield what each part of a run must report, from the model in Python integers."""
     model = ModelEvaluator(pipeline.compile(subject.choice, MODEL, subject.settings))
     yield _coning(_ModelRun(subject, run, model))
     yield _random(_ModelRun(subject, run, model))

@@ -27,20 +27,7 @@ _SPACE = 3
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
-    """Prove the numbers of steps for which the header says that a state stays in its format, and proper.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Nothing is written there.
-
-    Returns
-    -------
-    list of Verdict
-        The claims "state: stays in its format" and "state: stays proper" of steps from two increments; of any other
-        kernel none.
-    """
+    """Prove the numbers of steps for which the header says that a state stays in its format, and proper."""
     program, interface = subject.program, subject.fixed.interface
     if interface.accumulation is None or [signal.size for signal in program.inputs[1:]] != [2 * _SPACE]:
         return []
@@ -87,25 +74,14 @@ def _judged(
 
 @dataclass(frozen=True)
 class Stretch:
-    """Bounds of the squared singular values of a transition, less 1.
-
-    Parameters
-    ----------
-    low, high : Fraction
-    """
+    """Bounds of the squared singular values of a transition, less 1."""
 
     low: Fraction
     high: Fraction
 
 
 def in_format(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
-    """Compare the number of calls until one is refused with that of the header.
-
-    Parameters
-    ----------
-    subject : Subject
-    stretch : Stretch
-    """
+    """Compare the number of calls until one is refused with that of the header."""
     interface = subject.fixed.interface
     assert interface.accumulation is not None
     stated = _calls(subject)
@@ -118,13 +94,7 @@ def in_format(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
 
 
 def is_proper(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
-    """Compare the number of steps in which the state does not get too short for a bound with that of the header.
-
-    Parameters
-    ----------
-    subject : Subject
-    stretch : Stretch
-    """
+    """Compare the number of steps in which the state does not get too short for a bound with that of the header."""
     interface = subject.fixed.interface
     angles, adds_up = interface.angle_accumulation, interface.accumulation
     assert angles is not None and adds_up is not None
@@ -144,14 +114,7 @@ def is_proper(subject: Subject, stretch: Stretch) -> tuple[Result, str]:
 
 
 def steps_between(start: float, end: float, growth: float, added: float) -> int:
-    """Return for how many steps x' = (1 + growth) x + added stays between two numbers.
-
-    Parameters
-    ----------
-    start, end : float
-    growth, added : float
-        Of one sign, that of the difference.
-    """
+    """Return for how many steps x' = (1 + growth) x + added stays between two numbers."""
     if (end - start) * (growth + added) <= 0:
         return 0
     if not growth:
@@ -166,12 +129,7 @@ def stretch_of(transition: Program, limit: Fraction) -> Stretch | None:
 
     None stands for a transition that does not turn with its increments.
 
-    Parameters
-    ----------
-    transition : Program
-        Its output is a quaternion, whose |p|^2 - 1 is bounded, or a matrix; its input are two vectors.
-    limit : Fraction
-        In rad.
+    `limit`: in rad.
     """
     from flint import Ordering, fmpq_mpoly_ctx
 

@@ -36,19 +36,7 @@ _VECTORS = 20
 
 
 def style(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell what two tools find in the C of a kernel.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        Folder of the kernel; the files go into ``style/`` in it.
-
-    Returns
-    -------
-    list of Verdict
-        Claims "style: fixed point", "style: floating point" and "style: tests", each with clang-tidy and with clang.
-    """
+    """Tell what two tools find in the C of a kernel."""
     verdicts = []
     for case, files in _cases(subject).items():
         place = folder / "style" / case.replace(" ", "_")
@@ -97,13 +85,7 @@ def judged(findings: list[str]) -> tuple[Result, str]:
 
 
 def found_by_clang_tidy(folder: Path) -> list[str]:
-    """Return the findings of clang-tidy in all C files below a folder, a line each.
-
-    Parameters
-    ----------
-    folder : Path
-        A header stands beside what includes it, or in a folder below.
-    """
+    """Return the findings of clang-tidy in all C files below a folder, a line each."""
     sources, include = _sources(folder)
     command = [
         "clang-tidy",

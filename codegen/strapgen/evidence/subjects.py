@@ -21,19 +21,12 @@ from strapgen.targets.names import UNNAMED, Naming
 
 @dataclass(frozen=True)
 class Subject:
-    """A kernel whose C in fixed point is to be examined.
-
-    Parameters
-    ----------
-    choice : Choice
-    settings : Settings, optional
-        Word, ranges and rounding; by default 32 bits and 1/8 rad.
-    naming : Naming, optional
-        Name of the function, where it is a stage of a system.
-    """
+    """A kernel whose C in fixed point is to be examined."""
 
     choice: Choice
+    #: Word, ranges and rounding; by default 32 bits and 1/8 rad
     settings: Settings | None = None
+    #: Name of the function, where it is a stage of a system
     naming: Naming = UNNAMED
 
     @cached_property
@@ -76,19 +69,7 @@ def standard() -> Iterator[Subject]:
 
 
 def of_system(description: Description, settings: Settings | None = None) -> Iterator[Subject]:
-    """Yield the stages of a described system, each with the word, ranges and formats that it has there.
-
-    Parameters
-    ----------
-    description : Description
-    settings : Settings, optional
-        Word, rounding and error feedback where a stage states none.
-
-    Raises
-    ------
-    InputError
-        If a stage cannot be generated in fixed point; the message names it.
-    """
+    """Yield the stages of a described system, each with the word, ranges and formats that it has there."""
     fit = fitted(description, "c-fixed", settings)
     for stage in description.system.stages:
         sources = fit.sources[stage.name]

@@ -14,43 +14,25 @@ Result = Literal["proved", "agrees", "fails", "not examined", "not installed"]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What an independent tool says of one promise of a kernel's code.
+    """What an independent tool says of one promise of a kernel's code."""
 
-    Parameters
-    ----------
-    kernel : str
-        Name of the kernel with its word, as the files have it: "euler_rk4_2_w32".
-    claim : str
-        The promise and the case, as "no overflow: x86_64" or "same bits: cortex-m0".
-    tool, version : str
-        As "Frama-C Eva", "26.0".
-    result : {"proved", "agrees", "fails", "not examined", "not installed"}
-        "proved" is of all inputs in the ranges; "agrees" is of those that were run; "not examined" is where the tool
-        has no theorem for the code, and the detail tells for what.
-    seconds : float
-    detail : str
-        What a reader needs beside it: the figures that were compared, the first alarm, the reason.
-    """
-
+    #: Name of the kernel with its word, as the files have it: "euler_rk4_2_w32"
     kernel: str
+    #: The promise and the case, as "no overflow: x86_64" or "same bits: cortex-m0"
     claim: str
+    #: As "Frama-C Eva", "26.0"
     tool: str
     version: str
+    #: "proved" is of all inputs in the ranges; "agrees" is of those that were run; "not examined" is where the
+    #: tool has no theorem for the code, and the detail tells for what
     result: Result
     seconds: float
+    #: What a reader needs beside it: the figures that were compared, the first alarm, the reason
     detail: str = ""
 
 
 def verdict(kernel: str, claim: str, tool: Tool, judge: Callable[[], tuple[Result, str]]) -> Verdict:
-    """Return what a tool says, or that it is not installed.
-
-    Parameters
-    ----------
-    kernel, claim : str
-    tool : Tool
-    judge : callable
-        Runs the tool; it returns the result and the detail.
-    """
+    """Return what a tool says, or that it is not installed."""
     if not tool.installed():
         return Verdict(kernel, claim, tool.name, "", "not installed", 0.0, f"install {tool.package}")
     begun = time.perf_counter()
@@ -60,26 +42,17 @@ def verdict(kernel: str, claim: str, tool: Tool, judge: Callable[[], tuple[Resul
 
 @dataclass(frozen=True)
 class Tool:
-    """An independent program.
+    """An independent program."""
 
-    Parameters
-    ----------
-    name : str
-        As a reader knows it: "Gappa".
-    commands : tuple of str
-        The programs that it needs on the PATH.
-    package : str
-        Debian's packages or PyPI's that bring it.
-    version : callable
-        ``version()`` returns the version of the installed program.
-    modules : tuple of str, optional
-        The modules of Python that it needs.
-    """
-
+    #: As a reader knows it: "Gappa"
     name: str
+    #: The programs that it needs on the PATH
     commands: tuple[str, ...]
+    #: Debian's packages or PyPI's that bring it
     package: str
+    #: ``version()`` returns the version of the installed program
     version: Callable[[], str]
+    #: The modules of Python that it needs
     modules: tuple[str, ...] = ()
 
     def installed(self) -> bool:

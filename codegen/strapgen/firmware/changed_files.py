@@ -19,11 +19,6 @@ def refuse_changed(folder: Path, files: Mapping[str, str], force: bool = False) 
     """Refuse to write over what a user has written or changed; `force` allows it.
 
     That is a CMakeLists.txt or a main.c that differs, and any other file that strapgen has not generated.
-
-    Raises
-    ------
-    InputError
-        If there is one.
     """
     for name, text in () if force else files.items():
         path = folder / name

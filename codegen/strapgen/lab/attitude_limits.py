@@ -38,18 +38,7 @@ def require_proper(backend: Backend, states: Any, time: Array) -> None:
 def require_finite(backend: Backend, states: Any, time: Array) -> None:
     """Refuse a run whose states are beyond the range of its back end.
 
-    Parameters
-    ----------
-    backend : Backend
-        The back end of the run.
-    states : array, (N, state shape)
-    time : array, (N,)
-        Time of each state in s.
-
-    Raises
-    ------
-    InputError
-        If a state is not finite; the message has the time of the first one, and the cause.
+    `states` has shape (N, state shape). `time` (N,): time of each state in s.
     """
     broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
     if broken.any():

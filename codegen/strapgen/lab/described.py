@@ -9,17 +9,11 @@ from strapgen import applications
 
 
 class DescribedAlgorithms(NamedTuple):
-    """What runs algorithms of a kind: the functions take what the commands ``simulate`` and ``compare`` read.
+    """What runs algorithms of a kind: the functions take what the commands ``simulate`` and ``compare`` read."""
 
-    Parameters
-    ----------
-    covers : callable
-        Tells whether a name stands for one.
-    simulate, compare : callable
-        Run one, and deliver the result.
-    """
-
+    #: Tells whether a name stands for one
     covers: Callable[[object], bool]
+    #: Run one, and deliver the result
     simulate: Callable[..., None]
     compare: Callable[..., None]
 

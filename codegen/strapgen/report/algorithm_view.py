@@ -26,24 +26,17 @@ TARGET_TITLES = {
 
 @dataclass(frozen=True)
 class SignalRow:
-    """A row of the table of inputs and outputs.
+    """A row of the table of inputs and outputs."""
 
-    Parameters
-    ----------
-    direction : str
-        "in" or "out".
-    name, shape, unit, frame, meaning : str
-        In words.
-    format, range, bound : str
-        Of fixed point; "" where there is none.
-    """
-
+    #: "in" or "out"
     direction: str
+    #: In words
     name: str
     shape: str
     unit: str
     frame: str
     meaning: str
+    #: Of fixed point; "" where there is none
     format: str = ""
     range: str = ""
     bound: str = ""
@@ -51,43 +44,19 @@ class SignalRow:
 
 @dataclass(frozen=True)
 class CodeFile:
-    """A file of code.
-
-    Parameters
-    ----------
-    name, text : str
-    language : str
-        "python" or "c", which the page colours.
-    """
+    """A file of code."""
 
     name: str
     text: str
+    #: "python" or "c", which the page colours
     language: str
 
 
 @dataclass(frozen=True)
 class AlgorithmView:
-    """What the page shows of one algorithm.
+    """What the page shows of one algorithm."""
 
-    Parameters
-    ----------
-    name, title, source, operations, order : str
-        The kernel in words; `order` is "" for what is no step.
-    notes : tuple of str
-    signals : tuple of SignalRow
-    formulas : tuple of FormulaRow
-    values : tuple of (str, str, str, str)
-        Name, format, range and error bound of every value on the way in fixed point.
-    no_fixed : str
-        Why there is no fixed point.
-    code : dict of str to tuple of CodeFile
-        By the title of the target.
-    evidence : dict of str to str
-        A result by claim; empty where the tools have not run on this very code.
-    refused : dict of str to str
-        What back ends say that do not hold the run.
-    """
-
+    #: The kernel in words; `order` is "" for what is no step
     name: str
     title: str
     source: str
@@ -96,22 +65,20 @@ class AlgorithmView:
     notes: tuple[str, ...]
     signals: tuple[SignalRow, ...]
     formulas: tuple[FormulaRow, ...]
+    #: Name, format, range and error bound of every value on the way in fixed point
     values: tuple[tuple[str, str, str, str], ...]
+    #: Why there is no fixed point
     no_fixed: str
+    #: By the title of the target
     code: dict[str, tuple[CodeFile, ...]]
+    #: A result by claim; empty where the tools have not run on this very code
     evidence: dict[str, str]
+    #: What back ends say that do not hold the run
     refused: dict[str, str]
 
 
 def view(known: AlgorithmDossier, evidence: EvidencePage | None) -> AlgorithmView:
-    """Return what the page shows of an algorithm.
-
-    Parameters
-    ----------
-    known : AlgorithmDossier
-    evidence : EvidencePage or None
-        What tools said of generated code; results are taken over where the digest is that of the code shown.
-    """
+    """Return what the page shows of an algorithm."""
     kernel, order = known.kernel, known.kernel.order
     return AlgorithmView(
         known.choice.kernel,

@@ -19,31 +19,19 @@ MOST_RECORDS = 250
 
 @dataclass(frozen=True)
 class Conditions:
-    """A motion, the sampling rate of the gyro, and the duration of the runs.
+    """A motion, the sampling rate of the gyro, and the duration of the runs."""
 
-    Parameters
-    ----------
-    motion : str, optional
-        Name of a motion, or the file of a user's.
-    settings : mapping of str to str, optional
-        Its parameters, as the command line states them.
-    sample_hz, duration : str, optional
-        Samples a second in Hz, and the length of the runs in s; an algorithm runs as many whole steps as that holds.
-    """
-
+    #: Name of a motion, or the file of a user's
     motion: str = "coning"
+    #: Its parameters, as the command line states them
     settings: Mapping[str, str] = field(default_factory=lambda: dict(GENERAL))
+    #: Samples a second in Hz, and the length of the runs in s; an algorithm runs as many whole steps as that
+    #: holds
     sample_hz: str = "100"
     duration: str = "20"
 
     def profile(self) -> Motion:
-        """Return the motion, checked with its numbers.
-
-        Raises
-        ------
-        InputError
-            If the motion, its parameters, the rate or the duration cannot be used.
-        """
+        """Return the motion, checked with its numbers."""
         checks.number("sample_hz", self.sample_hz, positive=True)
         checks.number("duration", self.duration, positive=True)
         return any_motion(self.motion, self.duration, self.settings)
@@ -62,13 +50,6 @@ class Conditions:
     def schedule(self, choice: Choice) -> Schedule:
         """Return the step of an algorithm, and how many of them it runs.
 
-        Raises
-        ------
-        InputError
-            If the duration holds no step.
-
-        Examples
-        --------
         >>> from strapgen.catalogue import choose
         >>> Conditions(duration="10").schedule(choose("euler", "rk4", 2)).options
         '--step 1/50 --duration 10'
@@ -86,20 +67,13 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Schedule:
-    """The steps of a run.
+    """The steps of a run."""
 
-    Parameters
-    ----------
-    step : Fraction
-        In s.
-    steps : int
-        How many there are, a multiple of `every`.
-    every : int
-        Steps from one record to the next.
-    """
-
+    #: In s
     step: Fraction
+    #: How many there are, a multiple of `every`
     steps: int
+    #: Steps from one record to the next
     every: int
 
     @property

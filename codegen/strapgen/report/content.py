@@ -29,78 +29,49 @@ _SOURCES = "; "
 
 @dataclass(frozen=True)
 class PageCell:
-    """A cell of a table.
-
-    Parameters
-    ----------
-    text : str
-    value : float, str or None
-        What the table is sorted by; None sorts last.
-    link : str, optional
-        Place on the page that the text leads to.
-    mark : str, optional
-        "good", "bad" or "note" where the cell stands out.
-    small : str, optional
-        Text in a smaller type below.
-    """
+    """A cell of a table."""
 
     text: str
+    #: What the table is sorted by; None sorts last
     value: float | str | None = None
+    #: Place on the page that the text leads to
     link: str = ""
+    #: "good", "bad" or "note" where the cell stands out
     mark: str = ""
+    #: Text in a smaller type below
     small: str = ""
 
 
 @dataclass(frozen=True)
 class ThesisTable:
-    """A table of the thesis, as the page shows it.
-
-    Parameters
-    ----------
-    number : int
-    title, caption : str
-    rows : tuple of (str, str, tuple of PageCell)
-        Algorithm, what it ran on, and a cell for each order.
-    notes : tuple of str
-    """
+    """A table of the thesis, as the page shows it."""
 
     number: int
     title: str
     caption: str
+    #: Algorithm, what it ran on, and a cell for each order
     rows: tuple[tuple[str, str, tuple[PageCell, ...]], ...]
     notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Content:
-    """What a page is made of.
+    """What a page is made of."""
 
-    Parameters
-    ----------
-    title, command : str
-        Heading of the page, and the command that writes it.
-    conditions : Conditions
-        Those of the runs.
-    backends : tuple of str
-    algorithms : tuple of AlgorithmDossier
-    tables : tuple of TableEntry
-        The tables of the thesis; empty where no algorithm stands in them.
-    standings : tuple of Standing
-        What algorithms cost and how they drift; empty where the page has no attitude step.
-    methods : tuple of str
-        The methods of `standings`, as `frontier` takes them.
-    evidence : EvidencePage or None
-        What tools said of generated code.
-    """
-
+    #: Heading of the page, and the command that writes it
     title: str
     command: str
+    #: Those of the runs
     conditions: Conditions
     backends: tuple[str, ...]
     algorithms: tuple[AlgorithmDossier, ...]
+    #: The tables of the thesis; empty where no algorithm stands in them
     tables: tuple[TableEntry, ...]
+    #: What algorithms cost and how they drift; empty where the page has no attitude step
     standings: tuple[Standing, ...]
+    #: The methods of `standings`, as `frontier` takes them
     methods: tuple[str, ...]
+    #: What tools said of generated code
     evidence: EvidencePage | None
 
     @cached_property

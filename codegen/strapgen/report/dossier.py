@@ -37,64 +37,40 @@ SHOWN = ("numpy", "c", "c-float", "c-fixed")
 
 @dataclass(frozen=True)
 class StepRuns:
-    """What runs of an attitude step say.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    backend : Backend
-        What ran.
-    profile : Motion
-        The motion.
-    run : Run
-        Scale, skew and drift along the motion, in double.
-    comparison : Comparisons
-        Back ends beside exact arithmetic on the same increments.
-    refused : dict of str to str
-        What back ends say whose numbers do not hold the run, by their names.
-    settings : Settings
-        Those of back ends in fixed point.
-    ladder : Convergence
-        Its errors on a ladder of steps, with the order that they show.
-    """
+    """What runs of an attitude step say."""
 
     schedule: Schedule
+    #: What ran
     backend: Backend
     profile: Motion
+    #: Scale, skew and drift along the motion, in double
     run: Run
+    #: Back ends beside exact arithmetic on the same increments
     comparison: Comparisons
+    #: What back ends say whose numbers do not hold the run, by their names
     refused: dict[str, str]
+    #: Those of back ends in fixed point
     settings: Settings
+    #: Its errors on a ladder of steps, with the order that they show
     ladder: Convergence
 
 
 @dataclass(frozen=True)
 class AlgorithmDossier:
-    """What is known of one kernel.
-
-    Parameters
-    ----------
-    choice : Choice
-    kernel : Kernel
-        Its exact formulas.
-    program : Program
-        Its straight-line code.
-    sources : dict of str to Sources
-        Its code by target; without those in fixed point where these need ranges that a user must state.
-    fixed : FixedProgram or None
-        Its formats and bounds in fixed point.
-    no_fixed : str
-        Why there is none; "" where there is.
-    runs : StepRuns or None
-        None for a kernel that is no attitude step.
-    """
+    """What is known of one kernel."""
 
     choice: Choice
+    #: Its exact formulas
     kernel: Kernel
+    #: Its straight-line code
     program: Program
+    #: Its code by target; without those in fixed point where these need ranges that a user must state
     sources: dict[str, Sources]
+    #: Its formats and bounds in fixed point
     fixed: FixedProgram | None
+    #: Why there is none; "" where there is
     no_fixed: str
+    #: None for a kernel that is no attitude step
     runs: StepRuns | None
 
 
@@ -106,28 +82,9 @@ def dossier(
 ) -> AlgorithmDossier:
     """Gather what is known of an algorithm, and run it if it is an attitude step.
 
-    Parameters
-    ----------
-    choice : Choice
-    conditions : Conditions, optional
-        The motion, the sampling rate and the duration.
-    settings : Settings, optional
-        Word, largest increment and rounding of fixed point; by default 32 bits and 1/8 rad. Runs choose their formats
-        for their own increments, with the same rounding.
-    backends : sequence of str, optional
-        Keys of `strapgen.BACKENDS` that are compared.
+    `settings`: word, largest increment and rounding of fixed point; by default 32 bits and 1/8 rad. Runs choose
+    their formats for their own increments, with the same rounding.
 
-    Returns
-    -------
-    AlgorithmDossier
-
-    Raises
-    ------
-    InputError
-        If the kernel holds unknowns, a name or a number is not allowed, or the attitude in double is not finite.
-
-    Examples
-    --------
     >>> from strapgen.catalogue import choose
     >>> known = dossier(choose("euler-product"))
     >>> known.program.operations["multiply"], known.runs is None

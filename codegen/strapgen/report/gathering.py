@@ -20,19 +20,6 @@ from strapgen.thesis.thesis_tables import TableEntry
 def compared(choices: Sequence[Choice], names: Sequence[str] = (frontier.EVERY,)) -> list[Candidate]:
     """Return algorithms to compare with some choices, and after them those of the choices that have a name.
 
-    Parameters
-    ----------
-    choices : sequence of Choice
-    names : sequence of str, optional
-        As for `frontier.candidates`; by default all methods of the catalogue.
-
-    Returns
-    -------
-    list of Candidate
-        None where no choice is a step of increments.
-
-    Examples
-    --------
     >>> from strapgen.catalogue import choose
     >>> [one.name for one in compared([choose("dcm", "rk4", 3)], ["magnus4:2"])]
     ['magnus4:2', 'rk4:3']
@@ -46,8 +33,6 @@ def compared(choices: Sequence[Choice], names: Sequence[str] = (frontier.EVERY,)
 def named(several: Sequence[Candidate], names: Sequence[str]) -> tuple[str, ...]:
     """Return the names by which `frontier.candidates` returns algorithms: those stated, and what these leave out.
 
-    Examples
-    --------
     >>> named(frontier.candidates(["magnus4:2", "rk4:3"]), ["magnus4:2"])
     ('magnus4:2', 'rk4:3')
     """
@@ -56,13 +41,7 @@ def named(several: Sequence[Candidate], names: Sequence[str]) -> tuple[str, ...]
 
 
 def candidate(choice: Choice) -> Candidate | None:
-    """Return the method of an attitude step with its samples, or the Python file of a user's step.
-
-    Returns
-    -------
-    Candidate or None
-        None for a kernel that is no step of increments, and for a method that a file describes.
-    """
+    """Return the method of an attitude step with its samples, or the Python file of a user's step."""
     if choice.increments is None:
         return None
     method = choice.method
@@ -80,8 +59,6 @@ def candidate(choice: Choice) -> Candidate | None:
 def in_tables(choice: Choice) -> bool:
     """Return whether the tables of the thesis have an algorithm.
 
-    Examples
-    --------
     >>> from strapgen.catalogue import choose
     >>> in_tables(choose("dcm", "rk4", 2)), in_tables(choose("dcm", "rk3", 2))
     (True, False)
@@ -92,14 +69,7 @@ def in_tables(choice: Choice) -> bool:
 
 
 def tables(choices: Iterable[Choice], backends: tuple[str, ...]) -> list[TableEntry]:
-    """Return the tables of the thesis where one of some choices stands in them; else nothing.
-
-    Parameters
-    ----------
-    choices : iterable of Choice
-    backends : tuple of str
-        Keys of `strapgen.BACKENDS` on which the tables run.
-    """
+    """Return the tables of the thesis where one of some choices stands in them; else nothing."""
     if not any(map(in_tables, choices)):
         return []
     for _ in thesis_tables.build_all(backends):
@@ -118,14 +88,7 @@ class DossierCase:
 
 
 def dossiers(cases: Sequence[DossierCase], jobs: int | None = None) -> Iterator[AlgorithmDossier]:
-    """Yield the dossiers of algorithms, in the order in which they come.
-
-    Parameters
-    ----------
-    cases : sequence of DossierCase
-    jobs : int, optional
-        Number of processes; by default one for each processor.
-    """
+    """Yield the dossiers of algorithms, in the order in which they come."""
     numbered = {str(place): case for place, case in enumerate(cases)}
     for _, known in side_by_side(_gathered, numbered, jobs):
         yield known
@@ -138,20 +101,7 @@ def _gathered(case: DossierCase) -> AlgorithmDossier:
 def standings(
     several: Sequence[Candidate], conditions: Conditions, jobs: int | None = None
 ) -> Iterator[Standing]:
-    """Run algorithms on the motion of some conditions, and yield what each costs and how it drifts.
-
-    Parameters
-    ----------
-    several : sequence of Candidate
-    conditions : Conditions
-    jobs : int, optional
-        Number of processes; by default one for each processor.
-
-    Yields
-    ------
-    Standing
-        In the order in which they come.
-    """
+    """Run algorithms on the motion of some conditions, and yield what each costs and how it drifts."""
     yield from frontier.frontier(
         several, conditions.sample_hz, conditions.duration, jobs=jobs, motions=motions(conditions)
     )

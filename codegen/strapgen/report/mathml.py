@@ -37,30 +37,17 @@ _INFIX = ("<math><mo>", '<math><mo form="infix">')
 
 @dataclass(frozen=True)
 class FormulaRow:
-    """A row of an align environment.
+    """A row of an align environment."""
 
-    Parameters
-    ----------
-    left : str
-        Its left side as MathML, with the relation.
-    parts : tuple of str
-        Its right side, in pieces of MathML between which a line may end.
-    """
-
+    #: Its left side as MathML, with the relation
     left: str
+    #: Its right side, in pieces of MathML between which a line may end
     parts: tuple[str, ...]
 
 
 def equations(latex: str) -> list[FormulaRow]:
     r"""Return the rows of an align environment.
 
-    Parameters
-    ----------
-    latex : str
-        As `strapgen.results.display.formulas.as_latex` returns it; where a page ended there, a row goes on.
-
-    Examples
-    --------
     >>> (row,) = equations("\\begin{align*}\ny &= a + b\n\\end{align*}")
     >>> row.parts
     ('<math><mi>a</mi></math>', '<math><mo form="infix">+</mo><mi>b</mi></math>')
@@ -79,13 +66,6 @@ def equations(latex: str) -> list[FormulaRow]:
 def mathml(latex: str) -> str:
     r"""Return a formula as MathML in the line.
 
-    Parameters
-    ----------
-    latex : str
-        Commands that are not known stand under their names.
-
-    Examples
-    --------
     >>> mathml(r"\tfrac{1}{2} x^{2}")
     '<math><mfrac><mn>1</mn><mn>2</mn></mfrac><msup><mi>x</mi><mn>2</mn></msup></math>'
     """

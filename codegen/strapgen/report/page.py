@@ -31,16 +31,7 @@ def _environment() -> jinja2.Environment:
 
 
 def report_page(content: Content, versions: Mapping[str, str], digest: str) -> str:
-    """Return a page as HTML.
-
-    Parameters
-    ----------
-    content : Content
-    versions : mapping of str to str
-        Versions of strapgen and of what its output depends on, by name.
-    digest : str
-        Hash of everything that determines generated code.
-    """
+    """Return a page as HTML."""
     sections = {
         **({"steps": "Attitude steps", "drift": "Drift over time"} if content.steps else {}),
         **({"convergence": "Convergence", "backends": "Back ends compared"} if content.steps else {}),
@@ -77,8 +68,6 @@ def embedded(data: Any) -> str:
 
     A number that JSON does not have becomes null; no tag can begin in it.
 
-    Examples
-    --------
     >>> print(embedded({"a": "</script>", "b": float("nan")}))
     {"a":"\u003c/script>","b":null}
     """

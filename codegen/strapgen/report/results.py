@@ -29,17 +29,11 @@ _JSON = "--format json"
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command prints as JSON.
+    """What a command prints as JSON."""
 
-    Parameters
-    ----------
-    command : str
-        The command line.
-    data : object
-        Plain JSON data. The lists of files that `generate` writes are empty, since nothing is written.
-    """
-
+    #: The command line
     command: str
+    #: Plain JSON data. The lists of files that `generate` writes are empty, since nothing is written
     data: Any
 
     def as_dict(self) -> dict[str, Any]:
@@ -54,14 +48,7 @@ def arguments(known: AlgorithmDossier) -> str:
 
 
 def of_algorithm(known: AlgorithmDossier, conditions: Conditions) -> dict[str, CommandResult]:
-    """Return the results of one algorithm by the names of the commands; `generate` is that of fixed point.
-
-    Parameters
-    ----------
-    known : AlgorithmDossier
-    conditions : Conditions
-        Those of its runs.
-    """
+    """Return the results of one algorithm by the names of the commands; `generate` is that of fixed point."""
     formulas = formulas_report(known.kernel, known.program, "operations")
     derive = f"strapgen derive {arguments(known)} --show operations {_JSON}"
     results = {"derive": CommandResult(derive, formulas.data())}
@@ -116,15 +103,7 @@ def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> Command
 def of_frontier(
     standings: Sequence[Standing], methods: Sequence[str], conditions: Conditions
 ) -> CommandResult:
-    """Return what algorithms cost and how they drift as the result of `frontier`.
-
-    Parameters
-    ----------
-    standings : sequence of Standing
-    methods : sequence of str
-        What the option of that name states.
-    conditions : Conditions
-    """
+    """Return what algorithms cost and how they drift as the result of `frontier`."""
     words = f"--sample-hz {conditions.sample_hz} --duration {conditions.duration}"
     names = shlex.quote(",".join(methods))
     command = f"strapgen frontier --method {names} {conditions.options} {words} {_JSON}"

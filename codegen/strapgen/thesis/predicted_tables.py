@@ -19,35 +19,23 @@ from strapgen.thesis.thesis_tables import DURATION, INTERVAL, STEP, drift_deg
 
 @dataclass(frozen=True)
 class PredictedEntry:
-    """One figure of a table.
-
-    Parameters
-    ----------
-    table : int
-    algorithm : str
-    order : int
-        Order of the integration.
-    drift_deg, normalised : float
-        Predicted drift in degrees, and its ratio to that of the direction cosine matrix, as in the table.
-    simulated_deg, simulated : float
-        The same two numbers from a run in numpy.
-    thesis : str
-        The ratio as the thesis prints it.
-    agrees : bool
-        Whether `normalised` has the printed digits.
-    scan, repairs : str or None, tuple of str
-        As for `TableEntry`.
-    """
+    """One figure of a table."""
 
     table: int
     algorithm: str
+    #: Order of the integration
     order: int
+    #: Predicted drift in degrees, and its ratio to that of the direction cosine matrix, as in the table
     drift_deg: float
     normalised: float
+    #: The same two numbers from a run in numpy
     simulated_deg: float
     simulated: float
+    #: The ratio as the thesis prints it
     thesis: str
+    #: Whether `normalised` has the printed digits
     agrees: bool
+    #: As for `TableEntry`
     scan: str | None = None
     repairs: tuple[str, ...] = ()
 
@@ -71,16 +59,7 @@ class PredictedEntry:
 
 
 def predicted(tables: Sequence[Table] = TABLES) -> Iterator[PredictedEntry]:
-    """Predict tables from two powers of the error rate, and compare them with the simulation.
-
-    Parameters
-    ----------
-    tables : sequence of Table, optional
-
-    Yields
-    ------
-    PredictedEntry
-    """
+    """Predict tables from two powers of the error rate, and compare them with the simulation."""
     for table in tables:
         profile = motion(table.motion, **table.settings)
         drifts, runs = {}, {}

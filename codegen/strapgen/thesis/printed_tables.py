@@ -13,23 +13,15 @@ ORDERS = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Repair:
-    """A figure of the thesis that is not what its scan reads.
+    """A figure of the thesis that is not what its scan reads."""
 
-    Parameters
-    ----------
-    figure : str
-        What is read in its place.
-    scan : str
-        What the scan reads; a question mark stands for an illegible exponent.
-    reason : str
-        Why the figure is what it is, as a sentence.
-    algorithm, order : str, int
-        Its place in the table; "" and 0 for what the whole table rests on, its motion.
-    """
-
+    #: What is read in its place
     figure: str
+    #: What the scan reads; a question mark stands for an illegible exponent
     scan: str
+    #: Why the figure is what it is, as a sentence
     reason: str
+    #: Its place in the table; "" and 0 for what the whole table rests on, its motion
     algorithm: str = ""
     order: int = 0
 
@@ -41,36 +33,23 @@ class Repair:
 
 @dataclass(frozen=True)
 class Table:
-    """One of the thesis's tables.
-
-    Parameters
-    ----------
-    number : int
-        Its number.
-    title : str
-        Motion of the table in words.
-    motion, settings : str, dict
-        The motion and its parameters.
-    mean : bool
-        Whether the drift is the mean over the axes, or that of the worst axis.
-    printed : dict
-        The printed figures by algorithm and order, corrected where the transcription says so.
-    base : str
-        Printed drift of the first-order direction cosine matrix in degrees; "" if there is none.
-    by_order : bool
-        Whether a figure is the ratio to the direction cosine matrix of the same order, or of first order.
-    repairs : tuple of Repair
-        Figures of the table, and of its motion, that are not what the scan reads.
-    """
+    """One of the thesis's tables."""
 
     number: int
+    #: Motion of the table in words
     title: str
+    #: The motion and its parameters
     motion: str
     settings: dict[str, int]
+    #: Whether the drift is the mean over the axes, or that of the worst axis
     mean: bool
+    #: The printed figures by algorithm and order, corrected where the transcription says so
     printed: dict[str, tuple[str, str, str]]
+    #: Printed drift of the first-order direction cosine matrix in degrees; "" if there is none
     base: str = ""
+    #: Whether a figure is the ratio to the direction cosine matrix of the same order, or of first order
     by_order: bool = False
+    #: Figures of the table, and of its motion, that are not what the scan reads
     repairs: tuple[Repair, ...] = ()
 
     def repair(self, algorithm: str, order: int) -> Repair | None:
@@ -203,8 +182,6 @@ def agrees(value: float, printed: str) -> bool:
     does one less than a unit above it. The entries .75e-6 and .225e-5 are sixteenths of the printed .12e-4 and .36e-4
     and only as exact as those.
 
-    Examples
-    --------
     >>> agrees(1.87e-5, ".19e-4"), agrees(7.16e-3, ".71e-2"), agrees(7.3e-3, ".71e-2")
     (True, True, False)
     >>> agrees(7.439e-7, ".75e-6")

@@ -14,12 +14,7 @@ _WIDTH = 100
 
 
 def statements_text(statements: Sequence[Statement]) -> str:
-    """Return statements as text: what is said, what runs measure, and the verdict.
-
-    Parameters
-    ----------
-    statements : sequence of Statement
-    """
+    """Return statements as text: what is said, what runs measure, and the verdict."""
     lines: list[str] = []
     for each in statements:
         verdict = each.verdict if each.confirmed else f"{each.verdict} (the runs do not bear this out)"

@@ -41,25 +41,6 @@ def thesis_tables_image(entries: Sequence[TableEntry], path: str | Path) -> byte
 
     A bar is the figure that the thesis prints; beside it stands a mark for each back end, filled where it has the
     thesis's digits.
-
-    Parameters
-    ----------
-    entries : sequence of TableEntry
-        Of one table or of several.
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
     """
     return _image(
         [

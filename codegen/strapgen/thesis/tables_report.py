@@ -27,12 +27,6 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
     """Return one table as text: for each algorithm the thesis's line, then one for each back end.
 
     Where the thesis's figures are repaired, a line below has what the scan reads.
-
-    Parameters
-    ----------
-    table : Table
-    entries : sequence of TableEntry
-        Those of this table, for all algorithms and orders.
     """
     backends = list(dict.fromkeys(entry.backend for entry in entries))
     label = Column(align="<", least=max([7, *map(len, backends)]))

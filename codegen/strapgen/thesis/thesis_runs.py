@@ -27,24 +27,9 @@ def thesis_run(
 ) -> Run:
     """Run one of the thesis's motions for 180 s.
 
-    Parameters
-    ----------
-    algorithm : str
-        "dcm" or "euler".
-    order : int
-        Order of the Runge-Kutta method, 1 to 4.
-    name : str, optional
-        "sinusoidal" or "coning", or the axes of a constant rate, for instance "xyz".
-    rate : float, optional
-        Every parameter of the motion in deg/s.
-    every : float, optional
-        Time from one orthonormalization to the next in s; None for never. Records are as far apart, or 5 s.
-    step : str, optional
-        In s.
-
-    Returns
-    -------
-    Run
+    `name`: "sinusoidal" or "coning", or the axes of a constant rate, for instance "xyz". `rate`: every
+    parameter of the motion in deg/s. `every`: time from one orthonormalization to the next in s; None for
+    never. Records are as far apart, or 5 s. `step`: in s.
     """
     keys = _KEYS.get(name, name)
     profile = motion(name if name in _KEYS else "constant", **{f"{key}_deg_s": rate for key in keys})

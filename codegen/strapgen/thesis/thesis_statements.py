@@ -29,28 +29,18 @@ _QUANTUM = 0.007
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement of the thesis, and what runs say of it.
-
-    Parameters
-    ----------
-    number : int
-    said : str
-        The statement in few words.
-    run : str
-        What the runs measure, with the numbers in it.
-    verdict : str
-        Whether it holds.
-    confirmed : bool
-        Whether the numbers bear out the verdict.
-    numbers : dict of str to float
-        The numbers by name.
-    """
+    """A statement of the thesis, and what runs say of it."""
 
     number: int
+    #: The statement in few words
     said: str
+    #: What the runs measure, with the numbers in it
     run: str
+    #: Whether it holds
     verdict: str
+    #: Whether the numbers bear out the verdict
     confirmed: bool
+    #: The numbers by name
     numbers: Numbers
 
     def as_dict(self) -> dict[str, Any]:
@@ -59,13 +49,7 @@ class Statement:
 
 
 def statements() -> Iterator[Statement]:
-    """Run every statement of the thesis's fifth chapter that its tables do not have.
-
-    Yields
-    ------
-    Statement
-        With 180 s in steps of 1/8 s, orthonormalized every 5 s unless it says otherwise.
-    """
+    """Run every statement of the thesis's fifth chapter that its tables do not have."""
     for number, (said, template, verdict, measure) in enumerate(_STATEMENTS, 1):
         numbers, confirmed = measure()
         yield Statement(number, said, template.format(**numbers), verdict, bool(confirmed), numbers)

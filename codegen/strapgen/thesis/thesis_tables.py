@@ -30,43 +30,28 @@ INTERVAL = Fraction(5)
 
 @dataclass(frozen=True)
 class TableEntry:
-    """One figure of a table.
-
-    Parameters
-    ----------
-    table : int
-    backend, algorithm : str
-    order : int
-        Order of the integration.
-    drift_deg : float
-        Drift in degrees.
-    normalised : float
-        Drift over that of the direction cosine matrix, of first order or (table 3) of the same order.
-    thesis : str
-        The figure in the thesis's print.
-    agrees : bool
-        Whether `normalised`, rounded or truncated, has the printed digits.
-    note : str or None
-        Remark on the entry.
-    roundoff_dominates : bool
-        Whether the drift differs from that of the run in double by more than half of it.
-    scan : str or None
-        What the scan of the thesis reads in place of `thesis`; None where it reads that.
-    repairs : tuple of str
-        What was repaired of the thesis for this entry, its figure or its motion, and why.
-    """
+    """One figure of a table."""
 
     table: int
     backend: str
     algorithm: str
+    #: Order of the integration
     order: int
+    #: Drift in degrees
     drift_deg: float
+    #: Drift over that of the direction cosine matrix, of first order or (table 3) of the same order
     normalised: float
+    #: The figure in the thesis's print
     thesis: str
+    #: Whether `normalised`, rounded or truncated, has the printed digits
     agrees: bool
+    #: Remark on the entry
     note: str | None = None
+    #: Whether the drift differs from that of the run in double by more than half of it
     roundoff_dominates: bool = False
+    #: What the scan of the thesis reads in place of `thesis`; None where it reads that
     scan: str | None = None
+    #: What was repaired of the thesis for this entry, its figure or its motion, and why
     repairs: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -80,15 +65,7 @@ def drift_deg(table: Table, run: Run) -> float:
 
 
 def table_settings(table: Table, backend_name: str, settings: Settings | None) -> Settings | None:
-    """Return the settings of fixed point for a table's increments; None for a back end in floating point.
-
-    Parameters
-    ----------
-    table : Table
-    backend_name : str
-    settings : Settings or None
-        Settings beside the largest increment.
-    """
+    """Return the settings of fixed point for a table's increments; None for a back end in floating point."""
     if not BACKENDS[backend_name].fixed:
         return None
     profile = motion(table.motion, **table.settings)
@@ -100,18 +77,8 @@ def entries(
 ) -> Iterator[TableEntry]:
     """Run every case of a table on one back end.
 
-    Parameters
-    ----------
-    table : Table
-    backend_name : str
-    settings : Settings, optional
-        Settings of fixed point beside the largest increment, which is the table's own.
-    interval : Fraction, optional
-        Time from one orthonormalization to the next in s; each is recorded.
-
-    Yields
-    ------
-    TableEntry
+    `settings`: settings of fixed point beside the largest increment, which is the table's own. `interval`: time
+    from one orthonormalization to the next in s; each is recorded.
     """
     chosen = table_settings(table, backend_name, settings)
     profile = motion(table.motion, **table.settings)
@@ -168,18 +135,6 @@ def build_all(
 
     Where the tables' increments lead to different formats in fixed point, a kernel has several sources of one name, and
     a back end as many calls.
-
-    Parameters
-    ----------
-    backends : tuple of str, optional
-    settings : Settings, optional
-        As for `entries`.
-    tables : sequence of Table, optional
-
-    Yields
-    ------
-    str
-        Name of each kernel when it is generated.
     """
     for name in backends:
         sources: list[Sources] = []
@@ -199,21 +154,7 @@ def run_tables(
     tables: Sequence[Table] = TABLES,
     interval: Fraction = INTERVAL,
 ) -> Iterator[TableEntry]:
-    """Run tables on several back ends, table by table.
-
-    Parameters
-    ----------
-    backends : tuple of str, optional
-    settings : Settings, optional
-        As for `entries`.
-    tables : sequence of Table, optional
-    interval : Fraction, optional
-        As for `entries`.
-
-    Yields
-    ------
-    TableEntry
-    """
+    """Run tables on several back ends, table by table."""
     for table in tables:
         for name in backends:
             yield from entries(table, name, settings, interval)

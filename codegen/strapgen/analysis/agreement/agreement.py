@@ -26,48 +26,31 @@ from strapgen.run import exact
 
 @dataclass(frozen=True)
 class StepAgreement:
-    """Predicted and simulated drift for one step length.
-
-    Parameters
-    ----------
-    step_s : float
-    times : list of float
-        In s.
-    simulated, predicted : list of list of float
-        Drift on x, y, z at each time, in rad.
-    drift : float
-        Largest simulated drift, in rad.
-    difference : float
-        Largest difference of predicted and simulated drift, in rad.
-    """
+    """Predicted and simulated drift for one step length."""
 
     step_s: float
+    #: In s
     times: list[float]
+    #: Drift on x, y, z at each time, in rad
     simulated: list[list[float]]
     predicted: list[list[float]]
+    #: Largest simulated drift, in rad
     drift: float
+    #: Largest difference of predicted and simulated drift, in rad
     difference: float
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Predicted and simulated drift for a sequence of step lengths.
-
-    Parameters
-    ----------
-    kernel, motion : str
-    terms : int
-        Number of powers of the step in the prediction.
-    order : int or None
-        The first power of the error rate; None if there is no error.
-    rungs : tuple of StepAgreement
-        One for each step length, from the longest to the shortest.
-    """
+    """Predicted and simulated drift for a sequence of step lengths."""
 
     kernel: str
     motion: str
+    #: Number of powers of the step in the prediction
     terms: int
+    #: The first power of the error rate; None if there is no error
     order: int | None
+    #: One for each step length, from the longest to the shortest
     rungs: tuple[StepAgreement, ...]
 
     @property
@@ -89,29 +72,8 @@ def agreement(
 ) -> Agreement:
     """Compare predicted with simulated drift.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that takes increments and is linear in its state.
-    motion : Motion
-    steps : sequence of number
-        Steps in s; each divides the longest one, and that divides the duration.
-    duration : number
-        In s.
-    terms : int, optional
-        Number of powers of the step in the prediction; the difference is proportional to the next power.
+    `steps`: steps in s; each divides the longest one, and that divides the duration. `duration`: in s.
 
-    Returns
-    -------
-    Agreement
-
-    Raises
-    ------
-    InputError
-        If the algorithm has no closed form of a run, or a number is not allowed.
-
-    Examples
-    --------
     >>> from strapgen import catalogue
     >>> from strapgen.lab.motions.motions import motion
     >>> turn = motion("constant", y_rad_s=1)

@@ -14,28 +14,7 @@ if TYPE_CHECKING:
 
 
 def agreement_image(agreements: Sequence[Agreement], title: str, path: str | Path) -> bytes:
-    """Return predicted against simulated drift: over time at the longest step, and their difference against the step.
-
-    Parameters
-    ----------
-    agreements : sequence of Agreement
-        Of one run, predicted by one term, two, and so on.
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return predicted against simulated drift: over time at the longest step, and their difference by step length."""
     figure, (left, right) = figures.pyplot().subplots(1, 2, figsize=(11.5, 4.8), layout="constrained")
     _draw_over_time(left, agreements[-1].rungs[0])
     _draw_against_step(right, agreements)

@@ -20,26 +20,17 @@ from strapgen.lab.motions.motion_files import is_file
 
 @dataclass(frozen=True)
 class ErrorAnalysis:
-    """The errors of an algorithm on a motion.
+    """The errors of an algorithm on a motion."""
 
-    Parameters
-    ----------
-    step : ErrorSeries
-        Errors of one step.
-    growth : Growth
-        Change of length and determinant in a step.
-    run : RunDrift or None
-        Drift of a run; None for a general motion, or for the reason in `no_run`.
-    constant : ConstantRate or None
-        Closed form of the errors at a constant rate.
-    no_run : str
-        The reason why there is no closed form of a run; "" if there is one.
-    """
-
+    #: Errors of one step
     step: ErrorSeries
+    #: Change of length and determinant in a step
     growth: Growth
+    #: Drift of a run; None for a general motion, or for the reason in `no_run`
     run: RunDrift | None
+    #: Closed form of the errors at a constant rate
     constant: ConstantRate | None
+    #: The reason why there is no closed form of a run; "" if there is one
     no_run: str = ""
 
     __repr__ = short_repr
@@ -80,26 +71,7 @@ def _texts(errors: Mapping[str, Sequence[sp.Expr]]) -> dict[str, list[str]]:
 
 
 def analyse(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorAnalysis:
-    """Derive the series, the growth and the drift of an algorithm on a motion.
-
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step.
-    motion : str, optional
-        "general", or a motion of the catalogue.
-    terms : int, optional
-        Number of terms that are not zero.
-
-    Returns
-    -------
-    ErrorAnalysis
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed, or the step has no series.
-    """
+    """Derive the series, the growth and the drift of an algorithm on a motion."""
     step = series(choice, motion, terms)
     run, why = None, ""
     if step.unknowns:

@@ -29,51 +29,31 @@ WORK = 544.0
 
 @dataclass(frozen=True)
 class OverviewRow:
-    """The errors and the operations of one algorithm.
-
-    Parameters
-    ----------
-    kernel : str
-    increments : int
-    order : int or None
-        Order of the step on a general motion.
-    operations : int
-        Operations of a step, of all kinds.
-    constant_power, constant : int, Expr or None
-        At a constant rate the angle in rad lost in a step is ``constant x^constant_power`` with x = |w| h; None if no
-        angle is lost.
-    coning_power, coning : int, Expr or None
-        On coning the secular drift rate is the vector (0, b + g, a) times ``coning h^coning_power``; None if there is
-        no drift.
-    general : str
-        Leading term of the drift of a step on a general motion.
-    contractive : str
-        Angles of a step, in rad, at which no state grows.
-    """
+    """The errors and the operations of one algorithm."""
 
     kernel: str
     increments: int
+    #: Order of the step on a general motion
     order: int | None
+    #: Operations of a step, of all kinds
     operations: int
+    #: At a constant rate the angle in rad lost in a step is ``constant x^constant_power`` with x = |w| h; None
+    #: if no angle is lost
     constant_power: int | None
     constant: sp.Expr | None
+    #: On coning the secular drift rate is the vector (0, b + g, a) times ``coning h^coning_power``; None if
+    #: there is no drift
     coning_power: int | None
     coning: sp.Expr | None
+    #: Leading term of the drift of a step on a general motion
     general: str
+    #: Angles of a step, in rad, at which no state grows
     contractive: str
 
     def coning_rate(self, step: float = STEP_S) -> float | None:
         """Return the leading secular drift rate in rad/s on the motion of table 5 of the thesis, for a step in s.
 
-        Parameters
-        ----------
-        step : float, optional
-            In s.
-
-        Returns
-        -------
-        float or None
-            None if there is no drift.
+        `step`: in s.
         """
         if self.coning is None or self.coning_power is None:
             return None
@@ -125,18 +105,7 @@ def methods() -> list[str]:
 def choices(
     algorithms: Sequence[str] = tuple(catalogue.ALGORITHMS), names: Iterable[str] | None = None
 ) -> list[Choice]:
-    """Return every algorithm with every method, on as many increments as its order needs.
-
-    Parameters
-    ----------
-    algorithms : sequence of str, optional
-    names : iterable of str, optional
-        Methods; by default those of `methods`.
-
-    Returns
-    -------
-    list of Choice
-    """
+    """Return every algorithm with every method, on as many increments as its order needs."""
     return [
         catalogue.choose(algorithm, name, catalogue.enough(name))
         for algorithm in algorithms
@@ -147,17 +116,6 @@ def choices(
 def overview(chosen: Iterable[Choice]) -> Iterator[OverviewRow]:
     """Derive the rows of a comparison.
 
-    Parameters
-    ----------
-    chosen : iterable of Choice
-        Attitude steps that are linear in their state.
-
-    Yields
-    ------
-    OverviewRow
-
-    Examples
-    --------
     >>> (row,) = overview([catalogue.choose("dcm", "rk2", 1)])
     >>> row.order, row.constant_power, row.constant, row.general
     (2, 3, -1/6, '-1/6 |w0|^2 w0 + 1/12 w0 x w1')

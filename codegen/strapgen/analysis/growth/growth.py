@@ -35,22 +35,15 @@ _DIGITS = 60
 
 @dataclass(frozen=True)
 class Growth:
-    """The change in one step of a length and of a determinant that should both stay 1.
-
-    Parameters
-    ----------
-    kernel, motion : str
-    length, determinant : dict of int to Expr
-        The first terms that are not zero, by power of the step length, of the length of a state of four parameters
-        (None for other states) and of the determinant of the direction cosine matrix.
-    invariant : dict of str to dict
-        For a general rate the terms of "length" and "determinant" in scalar products.
-    """
+    """The change in one step of a length and of a determinant that should both stay 1."""
 
     kernel: str
     motion: str
+    #: The first terms that are not zero, by power of the step length, of the length of a state of four
+    #: parameters (None for other states) and of the determinant of the direction cosine matrix
     length: dict[int, sp.Expr] | None
     determinant: dict[int, sp.Expr]
+    #: For a general rate the terms of "length" and "determinant" in scalar products
     invariant: dict[str, dict[int, Polynomial]]
 
     __repr__ = short_repr
@@ -76,26 +69,6 @@ class Growth:
 def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     """Derive the change of the length of the state and of the determinant of the matrix in one step.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step.
-    motion : str, optional
-        "general", or a motion of the catalogue.
-    terms : int, optional
-        Number of terms that are not zero.
-
-    Returns
-    -------
-    Growth
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed, or the step has no series.
-
-    Examples
-    --------
     >>> from strapgen import catalogue
     >>> found = growth(catalogue.choose("dcm", "rk4"), "constant", terms=1)
     >>> sp.factor(found.determinant[6])
@@ -173,23 +146,6 @@ def _of_file(general: Growth, motion: str, terms: int, top: int) -> Growth:
 def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
     """Return the intervals of the angle x = |w| h in rad for which a step at a constant rate lets no state grow.
 
-    Parameters
-    ----------
-    found : ConstantRate
-
-    Returns
-    -------
-    list of (float, float or None) or None
-        Intervals on which the stretch is at most 1, without the single point 0; None stands for an open end. The result
-        is None if the step preserves the length exactly.
-
-    Raises
-    ------
-    InputError
-        If the growth is no polynomial of the angle.
-
-    Examples
-    --------
     >>> from strapgen import catalogue
     >>> from strapgen.analysis.series.constant_rate import constant_rate
     >>> contraction(constant_rate(catalogue.choose("dcm", "rk4")))
@@ -227,19 +183,12 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
 
 @dataclass(frozen=True)
 class Stability:
-    """The change of the length of a state in a step at a constant rate.
-
-    Parameters
-    ----------
-    kernel : str
-    stretch_squared : Expr
-        Square of the factor by which the state grows across the axis, a function of the angle x of the step.
-    contractive : list of (float, float or None) or None
-        The intervals from `contraction`.
-    """
+    """The change of the length of a state in a step at a constant rate."""
 
     kernel: str
+    #: Square of the factor by which the state grows across the axis, a function of the angle x of the step
     stretch_squared: sp.Expr
+    #: The intervals from `contraction`
     contractive: list[tuple[float, float | None]] | None
 
     __repr__ = short_repr
@@ -251,14 +200,7 @@ class Stability:
     def stretch(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factor for angles in rad, an array of any shape.
 
-        Parameters
-        ----------
-        angles : array, (...)
-            Angles of the step in rad.
-
-        Returns
-        -------
-        array, (...)
+        `angles`: angles of the step in rad.
         """
         import numpy as np
 
@@ -278,22 +220,6 @@ class Stability:
 def stability(choice: Choice) -> Stability:
     """Derive the change of the length of a state in a step at a constant rate.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that is linear in its state.
-
-    Returns
-    -------
-    Stability
-
-    Raises
-    ------
-    InputError
-        If the step is not linear in its state, or its growth is no polynomial of the angle.
-
-    Examples
-    --------
     >>> from strapgen import catalogue
     >>> stability(catalogue.choose("euler", "rk3")).as_dict()["contractive"]
     [(0.0, 3.4641016151377544)]

@@ -15,27 +15,7 @@ if TYPE_CHECKING:
 
 
 def stability_image(stabilities: Sequence[Stability], title: str, path: str | Path) -> bytes:
-    """Return the growth of a state at a constant rate against the angle of a step; below, where the step contracts.
-
-    Parameters
-    ----------
-    stabilities : sequence of Stability
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return the growth of a state at a constant rate against the angle of a step; below, where the step contracts."""
     ends = [end for one in stabilities for pair in one.contractive or () for end in pair if end is not None]
     reach = 1.15 * max([*ends, 2.0])
     below = 0.28 * len(stabilities)

@@ -26,30 +26,20 @@ Terms = Mapping[int, Sequence[sp.Expr]]
 
 @dataclass(frozen=True)
 class Ratio:
-    """The ratio of the errors of two algorithms.
+    """The ratio of the errors of two algorithms."""
 
-    Parameters
-    ----------
-    first, second : str
-        The kernels.
-    motion : str
-    quantity : str
-        The compared quantity and its unit.
-    symbol : Symbol
-        The variable of both series.
-    terms : tuple of dict
-        The terms of both, by power of the symbol.
-    ratio : dict of int to Expr or None
-        The first terms of the quotient by power of the symbol; None if one of the two has no error, or their drifts
-        are not parallel.
-    """
-
+    #: The kernels
     first: str
     second: str
     motion: str
+    #: The compared quantity and its unit
     quantity: str
+    #: The variable of both series
     symbol: sp.Symbol
+    #: The terms of both, by power of the symbol
     terms: tuple[Terms, Terms]
+    #: The first terms of the quotient by power of the symbol; None if one of the two has no error, or their
+    #: drifts are not parallel
     ratio: dict[int, sp.Expr] | None
 
     @property
@@ -86,27 +76,6 @@ def _sum(row: Mapping[int, sp.Expr], symbol: sp.Symbol) -> str:
 def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 2) -> Ratio:
     """Compare the errors of two algorithms on a motion.
 
-    Parameters
-    ----------
-    first, second : Choice
-        Attitude steps.
-    motion : str, optional
-        "constant" compares the angles lost in a step, as functions of the angle x = |w| h; "coning" the secular drift
-        rates; a motion about a fixed axis the drifts after the time t; "general" the drifts of a step.
-    terms : int, optional
-        Number of terms of each series.
-
-    Returns
-    -------
-    Ratio
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed, or a step has no series.
-
-    Examples
-    --------
     >>> found = versus(catalogue.choose("euler", "rk1"), catalogue.choose("dcm", "rk1"), "constant")
     >>> found.ratio
     {0: 1/4, 2: 9/80}
@@ -145,20 +114,6 @@ def _whole(secular: Mapping[int, sp.Matrix], bounded: Mapping[int, sp.Matrix]) -
 def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] | None:
     """Return the first terms of the quotient of two series of parallel vectors.
 
-    Parameters
-    ----------
-    first, second : mapping of int to sequence of Expr
-        Coefficients by power; missing powers below the last one are zero.
-    terms : int, optional
-        Number of terms of the quotient that are not zero.
-
-    Returns
-    -------
-    dict of int to Expr or None
-        Coefficients by power; None if a series is empty or the vectors are not parallel.
-
-    Examples
-    --------
     >>> quotient({3: (sp.Rational(1, 12),)}, {3: (sp.Rational(1, 3),)})
     {0: 1/4}
     """
@@ -216,17 +171,11 @@ def _reduced(upper: sp.Expr, lower: sp.Expr) -> sp.Expr:
 
 @dataclass(frozen=True)
 class Claim:
-    """A ratio that the thesis states, with its derived value.
+    """A ratio that the thesis states, with its derived value."""
 
-    Parameters
-    ----------
-    statement : str
-        What is compared.
-    ratio : dict of int to Expr
-        Its first terms by power of the angle x = |w| h of a step.
-    """
-
+    #: What is compared
     statement: str
+    #: Its first terms by power of the angle x = |w| h of a step
     ratio: dict[int, sp.Expr]
 
     def as_dict(self) -> dict[str, Any]:
@@ -237,13 +186,6 @@ class Claim:
 def claims() -> list[Claim]:
     """Derive the ratios at a constant rate that section 5 of the thesis takes from its tables.
 
-    Returns
-    -------
-    list of Claim
-        Each has its leading term and the next one in x^2, where x = |w| h.
-
-    Examples
-    --------
     >>> claims()[0].ratio
     {0: 1/4, 2: 9/80}
     """

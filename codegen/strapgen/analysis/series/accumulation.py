@@ -27,37 +27,20 @@ from strapgen.lab.step_series import one_step
 
 @dataclass(frozen=True)
 class RunDrift:
-    """The drift of a run that begins at time 0.
-
-    Parameters
-    ----------
-    kernel, motion : str
-    secular : dict of int to Matrix, 3 x 1
-        Drift rate in rad/s, reference axes: coefficients by power of the step length.
-    bounded : dict of int to Matrix, 3 x 1
-        Oscillating part of the drift in rad as a function of the time t, zero at time 0; to first order in the error.
-    growth : dict of int to Expr
-        Rate in 1/s at which the logarithm of the scale across the drift grows, by power of the step length.
-    """
+    """The drift of a run that begins at time 0."""
 
     kernel: str
     motion: str
+    #: Drift rate in rad/s, reference axes: coefficients by power of the step length
     secular: dict[int, sp.Matrix]
+    #: Oscillating part of the drift in rad as a function of the time t, zero at time 0; to first order in the
+    #: error
     bounded: dict[int, sp.Matrix]
+    #: Rate in 1/s at which the logarithm of the scale across the drift grows, by power of the step length
     growth: dict[int, sp.Expr]
 
     def drift(self, time: sp.Expr = TIME) -> list[sp.Expr]:
-        """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms.
-
-        Parameters
-        ----------
-        time : Expr, optional
-            By default the symbol t.
-
-        Returns
-        -------
-        list of Expr
-        """
+        """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms."""
         total = sp.zeros(3, 1)
         for power, row in self.secular.items():
             total += time * row * STEP**power
@@ -84,26 +67,6 @@ class RunDrift:
 def accumulate(choice: Choice, motion: str, terms: int = 2) -> RunDrift:
     """Derive the drift of a run on a motion of the catalogue.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that is linear in its state.
-    motion : str
-    terms : int, optional
-        Number of terms of the growing and of the bounded drift. The search covers twice as many powers of the error
-        rate, since every other one may be zero.
-
-    Returns
-    -------
-    RunDrift
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed, or the algorithm has no closed form of a run.
-
-    Examples
-    --------
     >>> from strapgen import catalogue
     >>> run = accumulate(catalogue.choose("dcm", "rk2"), "coning", terms=1)
     >>> sp.factor(run.secular[2][1])
@@ -269,16 +232,7 @@ def _integrated(rates: sp.Matrix, error: ErrorRate) -> tuple[sp.Matrix, sp.Matri
 def antiderivative(matrix: sp.Matrix, error: ErrorRate) -> sp.Matrix:
     """Return the integral from time 0 to t of a term of the error rate of a motion about a fixed axis.
 
-    Parameters
-    ----------
-    matrix : Matrix, 3 x 3
-        The term in 1/s, a function of the time t.
-    error : ErrorRate
-        The error rate to which it belongs.
-
-    Returns
-    -------
-    Matrix, 3 x 3
+    `matrix`: the term in 1/s, a function of the time t.
     """
     if error.motion == "polynomial":
         variables = (TIME, *parameters(error.motion))

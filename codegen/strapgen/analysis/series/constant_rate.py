@@ -35,30 +35,20 @@ STEPS = sp.Symbol("N", positive=True, integer=True)
 
 @dataclass(frozen=True)
 class ConstantRate:
-    """The effect of one step at a constant rate, as functions of the angle x of the step.
-
-    Parameters
-    ----------
-    kernel : str
-    cosine, sine : Expr
-        Approximations of cos x and sin x by the method; for Euler and Cayley-Klein parameters, of cos(x/2) and
-        sin(x/2).
-    stretch_squared : Expr
-        Square of the factor by which the state grows across the axis.
-    parameters : bool
-        Whether the state consists of Euler or Cayley-Klein parameters, so that the matrix is quadratic in it.
-    along : Expr
-        Factor along the axis, 1 for a rotation.
-    lowest : int
-        The lowest power of an error that does not come from the rounding of published coefficients.
-    """
+    """The effect of one step at a constant rate, as functions of the angle x of the step."""
 
     kernel: str
+    #: Approximations of cos x and sin x by the method; for Euler and Cayley-Klein parameters, of cos(x/2) and
+    #: sin(x/2)
     cosine: sp.Expr
     sine: sp.Expr
+    #: Square of the factor by which the state grows across the axis
     stretch_squared: sp.Expr
+    #: Whether the state consists of Euler or Cayley-Klein parameters, so that the matrix is quadratic in it
     parameters: bool
+    #: Factor along the axis, 1 for a rotation
     along: sp.Expr
+    #: The lowest power of an error that does not come from the rounding of published coefficients
     lowest: int = 0
 
     @property
@@ -78,18 +68,8 @@ class ConstantRate:
     def series(self, terms: int = 2) -> dict[int, sp.Rational]:
         """Return the first terms of the angle lost in powers of x.
 
-        Parameters
-        ----------
-        terms : int, optional
-            Number of terms that are not zero.
+        Returns: coefficients by power of x, in rad.
 
-        Returns
-        -------
-        dict of int to Rational
-            Coefficients by power of x, in rad.
-
-        Examples
-        --------
         >>> constant_rate(catalogue.choose("dcm", "rk1")).series(3)
         {3: 1/3, 5: -1/5, 7: 1/7}
         """
@@ -166,22 +146,6 @@ def _slope(series: Powers) -> Powers:
 def constant_rate(choice: Choice) -> ConstantRate:
     """Derive the effect of one step at a constant rate.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that is linear in its state.
-
-    Returns
-    -------
-    ConstantRate
-
-    Raises
-    ------
-    InputError
-        If the step is not linear in its state.
-
-    Examples
-    --------
     >>> constant_rate(catalogue.choose("dcm", "rk1")).angle_lost
     x - atan(x)
     >>> constant_rate(catalogue.choose("euler", "rk2")).stretch_squared
@@ -210,17 +174,11 @@ def constant_rate(choice: Choice) -> ConstantRate:
 
 @dataclass(frozen=True)
 class _StepResult:
-    """A state and its direction cosine matrix after a step by the angle x about z, in lowest terms.
-
-    Parameters
-    ----------
-    state, matrix : list of Expr
-    squares : tuple of Expr
-        The sum of the squares of the state's elements, and that of the first column of the matrix.
-    """
+    """A state and its direction cosine matrix after a step by the angle x about z, in lowest terms."""
 
     state: list[sp.Expr]
     matrix: list[sp.Expr]
+    #: The sum of the squares of the state's elements, and that of the first column of the matrix
     squares: tuple[sp.Expr, sp.Expr]
 
     def part(self, scalar: int) -> tuple[sp.Expr, sp.Expr, sp.Expr, bool, sp.Expr]:
@@ -298,27 +256,6 @@ def errors_after(
 ) -> Prediction:
     """Return the exact errors of a run at a constant rate, from powers of one step.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that is linear in its state.
-    motion : Motion
-        A constant motion.
-    step, duration, orthonormalize, record : number
-        As for `simulation.simulate`, with the orthonormalization of the algorithm. Without `record` there are results
-        at the beginning and the end alone.
-
-    Returns
-    -------
-    Prediction
-
-    Raises
-    ------
-    InputError
-        If the step is not linear in its state, or a time is not allowed.
-
-    Examples
-    --------
     >>> from strapgen.lab.motions.motions import motion
     >>> found = errors_after(catalogue.choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180)
     >>> round(float(found.scale[-1][0]), 4), round(float(found.drift[-1][1]), 6)

@@ -32,30 +32,20 @@ _Matrix = list[list[Powers]]
 
 @dataclass(frozen=True)
 class ErrorRate:
-    """The rate that an algorithm in effect adds to the angular rate of a motion.
-
-    Parameters
-    ----------
-    kernel, motion : str
-    axis : Matrix, 3 x 1
-        Rate of the rotating frame in rad/s, reference axes; for a motion about a fixed axis, the rate at time t.
-    steady : bool
-        True if the error rate is constant in the rotating frame (constant rate and coning); otherwise it is a function
-        of the time t, about a fixed axis.
-    matrices : dict of int to Matrix, 3 x 3
-        Coefficients by power of the step length, in 1/s; for a steady motion in the axes of time 0.
-    ring : PolyRing or None
-        Ring of the coefficients of a steady motion.
-    raw : tuple of tuple of Powers
-        For a steady motion the sum of the skew matrix of `axis` and the error rate, times the step, in that ring.
-    """
+    """The rate that an algorithm in effect adds to the angular rate of a motion."""
 
     kernel: str
     motion: str
+    #: Rate of the rotating frame in rad/s, reference axes; for a motion about a fixed axis, the rate at time t
     axis: sp.Matrix
+    #: True if the error rate is constant in the rotating frame (constant rate and coning); otherwise it is a
+    #: function of the time t, about a fixed axis
     steady: bool
+    #: Coefficients by power of the step length, in 1/s; for a steady motion in the axes of time 0
     matrices: dict[int, sp.Matrix]
+    #: Ring of the coefficients of a steady motion
     ring: Any = None
+    #: For a steady motion the sum of the skew matrix of `axis` and the error rate, times the step, in that ring
     raw: tuple[tuple[Powers, ...], ...] = ()
 
     @property
@@ -67,26 +57,6 @@ class ErrorRate:
 def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     """Derive the error rate of a step on a motion.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that is linear in its state.
-    motion : str
-        A motion of the catalogue.
-    terms : int, optional
-        Number of powers of the step length, counted from the first one that is not zero.
-
-    Returns
-    -------
-    ErrorRate
-
-    Raises
-    ------
-    InputError
-        If the step is not linear in its state, does not commute with rotations of its inputs, or has no series.
-
-    Examples
-    --------
     >>> from strapgen import catalogue
     >>> found = error_rate(catalogue.choose("dcm", "rk1", 1), "sinusoidal")
     >>> found.order, found.matrices[1][0, 0]

@@ -20,19 +20,13 @@ from strapgen.kernel.polynomials import Polynomial
 
 @dataclass(frozen=True)
 class Invariants:
-    """The drift and the symmetric part of an error matrix at one power of the step.
+    """The drift and the symmetric part of an error matrix at one power of the step."""
 
-    Parameters
-    ----------
-    drift : Coefficients
-        Coefficients of the vectors i and of the cross products (i, j), where i is the i-th derivative of the rate; each
-        a polynomial in scalar products.
-    symmetric : Coefficients
-        Coefficients of the unit matrix (), and of the symmetrized products a b' + b a': those of i and j as (i, j),
-        those of i and j x k as (i, j, k).
-    """
-
+    #: Coefficients of the vectors i and of the cross products (i, j), where i is the i-th derivative of the
+    #: rate; each a polynomial in scalar products
     drift: Coefficients
+    #: Coefficients of the unit matrix (), and of the symmetrized products a b' + b a': those of i and j as (i,
+    #: j), those of i and j x k as (i, j, k)
     symmetric: Coefficients
 
 
@@ -41,23 +35,8 @@ def invariants(
 ) -> Invariants:
     """Return an error matrix in vector-invariant form.
 
-    Parameters
-    ----------
-    frame : Frame
-    matrix : sequence of ring element
-        Row by row, in the coordinates of the frame; over the rational numbers or a field of roots. In such a field
-        each power of the generator is decomposed separately.
-    shown : callable, optional
-        Rounds a rational coefficient; coefficients that become zero are omitted.
-
-    Returns
-    -------
-    Invariants
-
-    Raises
-    ------
-    NotCovariantError
-        If the matrix does not commute with rotations of the vectors.
+    `matrix`: row by row, in the coordinates of the frame; over the rational numbers or a field of roots. In
+    such a field each power of the generator is decomposed separately.
     """
     domain = matrix[0].ring.domain
     if domain == sp.QQ:
@@ -154,11 +133,7 @@ def matrix(parts: Invariants, vectors: Sequence[Sequence[Any]]) -> list[Any]:
 def scalar(frame: Frame, element: Any) -> Polynomial:
     """Return a scalar as a polynomial in scalar products.
 
-    Parameters
-    ----------
-    frame : Frame
-    element : ring element
-        The scalar in the coordinates of the frame, over the rational numbers or a field of roots.
+    `element`: the scalar in the coordinates of the frame, over the rational numbers or a field of roots.
     """
     domain = element.ring.domain
     if domain == sp.QQ:
@@ -173,16 +148,7 @@ def scalar(frame: Frame, element: Any) -> Polynomial:
 def vector(frame: Frame, elements: Sequence[Any]) -> Coefficients:
     """Return a vector as a sum of vectors and cross products.
 
-    Parameters
-    ----------
-    frame : Frame
-    elements : sequence of ring element
-        The vector in the coordinates of the frame, over the rational numbers or a field of roots.
-
-    Raises
-    ------
-    NotCovariantError
-        If it does not commute with rotations of the vectors of the frame.
+    `elements`: the vector in the coordinates of the frame, over the rational numbers or a field of roots.
     """
     domain = elements[0].ring.domain
     if domain == sp.QQ:

@@ -28,28 +28,18 @@ CONSTANT = sp.symbols("w_x w_y w_z")
 
 @dataclass(frozen=True)
 class MotionRate:
-    """The rate of a motion in a ring.
-
-    Parameters
-    ----------
-    ring : PolyRing
-    derivatives : list of list of ring element
-        The rate and its derivatives at the beginning of a step.
-    expression : callable
-        ``expression(element)`` returns a ring element as an expression in the motion's parameters and the time.
-    reduced : callable
-        ``reduced(element)`` returns a ring element in which squares of sines are replaced by cosines.
-    expanded : callable
-        ``expanded(element)`` returns what `expression` does without factoring it, which takes long.
-    changes : mapping of ring element to ring element
-        Time derivatives of the generators of the ring that change with time.
-    """
+    """The rate of a motion in a ring."""
 
     ring: Any
+    #: The rate and its derivatives at the beginning of a step
     derivatives: list[list[Any]]
+    #: ``expression(element)`` returns a ring element as an expression in the motion's parameters and the time
     expression: Callable[[Any], sp.Expr]
+    #: ``reduced(element)`` returns a ring element in which squares of sines are replaced by cosines
     reduced: Callable[[Any], Any]
+    #: ``expanded(element)`` returns what `expression` does without factoring it, which takes long
     expanded: Callable[[Any], sp.Expr]
+    #: Time derivatives of the generators of the ring that change with time
     changes: Mapping[Any, Any]
 
     def derivative(self, element: Any) -> Any:
@@ -60,33 +50,13 @@ class MotionRate:
 
 
 def require(motion: str) -> None:
-    """Refuse what is neither a general motion, nor one of the catalogue, nor a file of a user.
-
-    Raises
-    ------
-    InputError
-        If it is none of these.
-    """
+    """Refuse what is neither a general motion, nor one of the catalogue, nor a file of a user."""
     if not is_file(motion):
         checks.choice("motion", motion, ("general", *catalogue.MOTIONS), "a Python file")
 
 
 def of_file(motion: str, count: int) -> Callable[[sp.Expr], sp.Expr]:
-    """Return a function that replaces the derivatives of a general rate by those of a user's expressions.
-
-    Parameters
-    ----------
-    motion : str
-        A Python file with a rate in SymPy.
-    count : int
-        Number of derivatives, counting the rate itself.
-
-    Returns
-    -------
-    callable
-        ``inserted(expression)`` takes an expression in ``w0_x``, ``w0_y``, ... and returns one in the time t. It is not
-        simplified, which may take for ever; 0 is told by its value at two times.
-    """
+    """Return a function that replaces the derivatives of a general rate by those of a user's expressions."""
     from strapgen.lab.motions.users_motions import rate_expressions  # numpy checks what a file says
 
     vector = sp.Matrix(list(rate_expressions(motion)))
@@ -118,20 +88,7 @@ def model(motion: str) -> MotionModel:
 
 
 def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
-    """Return the rate of a motion and its derivatives at time t.
-
-    Parameters
-    ----------
-    motion : str
-    count : int
-        Number of derivatives, counting the rate itself.
-    domain : Domain, optional
-        Field of the numbers.
-
-    Returns
-    -------
-    MotionRate
-    """
+    """Return the rate of a motion and its derivatives at time t."""
     if motion == "polynomial":
         return _polynomial(count, domain)
     symbols = parameters(motion)
@@ -170,20 +127,7 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
 
 
 def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
-    """Return the rate of a motion and its derivatives at time 0, where no sines and cosines are left.
-
-    Parameters
-    ----------
-    motion : str
-    count : int
-        Number of derivatives, counting the rate itself.
-    domain : Domain, optional
-        Field of the numbers.
-
-    Returns
-    -------
-    MotionRate
-    """
+    """Return the rate of a motion and its derivatives at time 0, where no sines and cosines are left."""
     symbols = parameters(motion)
     ring, *_ = sp.ring(symbols, domain)
     vector = MOTIONS[motion].rate(TIME, *symbols)

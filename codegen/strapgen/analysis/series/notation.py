@@ -18,22 +18,12 @@ _DECIMAL = 10**16
 
 @dataclass(frozen=True)
 class Notation:
-    """Patterns in which invariants are written.
+    """Patterns in which invariants are written."""
 
-    Parameters
-    ----------
-    vector : callable
-        Writes a vector by its number; by default a derivative of the rate.
-    length, dot, cross, triple, symmetric, unit, power : str
-        Patterns: of the length, the scalar, the cross and the triple product of vectors, of the symmetrized product of
-        two vectors, of the unit matrix, and of a power.
-    space : str
-        What stands between factors.
-    number : callable
-        Writes a number above 0.
-    """
-
+    #: Writes a vector by its number; by default a derivative of the rate
     vector: Callable[[int], str]
+    #: Patterns: of the length, the scalar, the cross and the triple product of vectors, of the symmetrized
+    #: product of two vectors, of the unit matrix, and of a power
     length: str
     dot: str
     cross: str
@@ -41,7 +31,9 @@ class Notation:
     symmetric: str
     unit: str
     power: str
+    #: Writes a number above 0
     number: Callable[[sp.Expr], str]
+    #: What stands between factors
     space: str = " "
 
 
@@ -77,16 +69,6 @@ LATEX = Notation(
 def with_forces(notation: Notation, rates: int, force: Callable[[int], str] = "f{}".format) -> Notation:
     """Return a notation whose vectors from a number on are derivatives of the specific force.
 
-    Parameters
-    ----------
-    notation : Notation
-    rates : int
-        Number of the derivatives of the rate, counting the rate itself.
-    force : callable, optional
-        Writes a derivative of the force by its number.
-
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> covariant_text({(0, 3): {(): Fraction(1, 2)}}, notation=with_forces(TEXT, 2))
     '1/2 w0 x f1'
@@ -97,8 +79,6 @@ def with_forces(notation: Notation, rates: int, force: Callable[[int], str] = "f
 def scalar_text(polynomial: Polynomial, notation: Notation = TEXT) -> str:
     """Return a polynomial in scalar products as text.
 
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> scalar_text({((0, 0), (0, 0)): Fraction(1, 4), ((0, 2),): Fraction(-1)})
     '-(w0 . w2) + 1/4 |w0|^4'
@@ -109,15 +89,8 @@ def scalar_text(polynomial: Polynomial, notation: Notation = TEXT) -> str:
 def covariant_text(coefficients: Coefficients, symmetric: bool = False, notation: Notation = TEXT) -> str:
     """Return a vector or a symmetric matrix as text, its terms in a fixed order.
 
-    Parameters
-    ----------
-    coefficients : Coefficients
-    symmetric : bool, optional
-        Whether it is a matrix: then S(a, b) is a b' + b a', and 1 the unit matrix.
-    notation : Notation, optional
+    `symmetric`: whether it is a matrix: then S(a, b) is a b' + b a', and 1 the unit matrix.
 
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> covariant_text({(0,): {((0, 0),): Fraction(1, 6)}, (0, 1): {(): Fraction(-1, 12)}})
     '1/6 |w0|^2 w0 - 1/12 w0 x w1'
@@ -174,8 +147,6 @@ def _products(monomial: Sequence[tuple[int, ...]], notation: Notation) -> list[s
 def intervals_text(intervals: Sequence[tuple[float, float | None]] | None) -> str:
     """Return intervals as text.
 
-    Examples
-    --------
     >>> intervals_text([(0.0, 2.8284271)]), intervals_text([]), intervals_text(None)
     ('0 to 2.828', 'nowhere', 'kept')
     """

@@ -20,26 +20,6 @@ def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
     leaves the skew part of P: scale and skew vanish, and the drift does not change (B.4). To second order the nearest
     rotation changes the drift by -(K Y + Y K)/2, where K and Y are the skew and symmetric parts of P (B.14).
 
-    Parameters
-    ----------
-    scheme : str
-        A kernel that orthonormalizes direction cosine matrices.
-    order : int, optional
-        The last power.
-
-    Returns
-    -------
-    dict of int to Matrix, 3 x 3
-        F_1, F_2, ... in the elements of `ERROR`.
-
-    Raises
-    ------
-    InputError
-        If the kernel is no such scheme or has no series. The scheme of the nearest rotation has none; to their orders,
-        dcm-orthonormalize-first-order and dcm-orthonormalize-second-order agree with it.
-
-    Examples
-    --------
     >>> (effect("dcm-orthonormalize")[1] - (ERROR - ERROR.T) / 2).expand().is_zero_matrix
     True
     """

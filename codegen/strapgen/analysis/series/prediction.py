@@ -29,20 +29,13 @@ Transfer = Callable[[Fraction, Fraction], Matrix]
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted errors of a run in many digits, reference axes.
+    """Predicted errors of a run in many digits, reference axes."""
 
-    Parameters
-    ----------
-    times : list of mpf
-        In s, the first one 0.
-    errors : list of list of mpf
-        Error matrices, row by row.
-    scale, skew, drift : list of list of mpf
-        Their parts on x, y, z; scale dimensionless, skew and drift in rad.
-    """
-
+    #: In s, the first one 0
     times: list[Any]
+    #: Error matrices, row by row
     errors: list[list[Any]]
+    #: Their parts on x, y, z; scale dimensionless, skew and drift in rad
     scale: list[list[Any]]
     skew: list[list[Any]]
     drift: list[list[Any]]
@@ -72,27 +65,6 @@ def predict(
     The computed attitude is the closed form of a motion at the sum of the true rate and the error rate. It therefore
     includes products of errors, which matter at low orders, and the effect of orthonormalization.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that is linear in its state.
-    motion : Motion
-    step, duration, orthonormalize, record : number
-        As for `simulation.simulate`. Without `record` there are results at the beginning and the end alone.
-    terms : int, optional
-        Number of powers of the step, counted from the first one.
-
-    Returns
-    -------
-    Prediction
-
-    Raises
-    ------
-    InputError
-        If the algorithm has no closed form of a run, or a time is not allowed.
-
-    Examples
-    --------
     >>> from strapgen import choose, motion
     >>> prediction = predict(choose("dcm", "rk1"), motion("constant", y_deg_s=10), "1/8", 180, 5)
     >>> round(float(mpmath.degrees(prediction.drift[-1][1])), 3)
@@ -103,18 +75,7 @@ def predict(
 
 
 def transfers_of(rates: ErrorRate, motion: Motion) -> Callable[[Fraction], Transfer]:
-    """Return the growth of the error by an error rate, for steps of any length, as `follow` takes it.
-
-    Parameters
-    ----------
-    rates : ErrorRate
-    motion : Motion
-        The motion of the error rate, with its parameters.
-
-    Returns
-    -------
-    callable
-    """
+    """Return the growth of the error by an error rate, for steps of any length, as `follow` takes it."""
     compiled = _compiled(rates)
 
     def transfer(h: Fraction) -> Transfer:
@@ -137,24 +98,8 @@ def follow(
 ) -> Prediction:
     """Return the errors of a run from the growth of its error between orthonormalizations.
 
-    Parameters
-    ----------
-    choice : Choice
-    motion : Motion
-    transfer : callable
-        ``transfer(step)`` returns a function of two times in s, ``(begin, end)``, which returns the factor that the
-        computed matrix times the transposed true one gains between them.
-    step, duration, orthonormalize, record : number
-        As for `predict`.
-
-    Returns
-    -------
-    Prediction
-
-    Raises
-    ------
-    InputError
-        If a time is not allowed.
+    `transfer`: ``transfer(step)`` returns a function of two times in s, ``(begin, end)``, which returns the
+    factor that the computed matrix times the transposed true one gains between them.
     """
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)

@@ -195,18 +195,7 @@ def shares(kernel: Kernel, terms: int) -> list[list[sp.Expr]]:
 
 
 def errors(kernel: Kernel, ring: Any, motion: Sequence[Any], top: int) -> dict[str, list[Powers]]:
-    """Return the errors of the velocity and position change up to a power of the step.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    ring : PolyRing
-        Ring of the coefficients, over the field of the kernel.
-    motion : sequence of two sequences
-        The rate and its derivatives, and the specific force and its derivatives, at the beginning of the step.
-    top : int
-        The last power of the series.
-    """
+    """Return the errors of the velocity and position change up to a power of the step."""
     rate, force = motion
     values: dict[str, Any] = {}
     for signal, vectors in zip(kernel.inputs, (rate, force), strict=True):
@@ -257,16 +246,7 @@ def domain(kernel: Kernel) -> Any:
 
 
 def coefficients(kernel: Kernel, top: int, terms: int | None = None) -> dict[str, dict[int, Coefficients]]:
-    """Return the errors for any smooth motion by part and power, in vector-invariant form.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    top : int
-        The last power of the step, and the number of derivatives of the rate; those of the force follow.
-    terms : int, optional
-        Number of terms of each part; by default all.
-    """
+    """Return the errors for any smooth motion by part and power, in vector-invariant form."""
     frame = Frame(2 * top)
     ring = frame.ring.clone(domain=domain(kernel))
     vectors = [[element.set_ring(ring) for element in vector] for vector in frame.vectors]

@@ -39,13 +39,7 @@ def tableau_data(tableau: Tableau) -> dict[str, Any]:
 
 
 def tableau_text(data: Mapping[str, Any]) -> str:
-    """Return a tableau as text: as books print it, or as a list of its coefficients where that would be too wide.
-
-    Parameters
-    ----------
-    data : mapping
-        What `tableau_data` returns.
-    """
+    """Return a tableau as text: as books print it, or as a list of its coefficients where that would be too wide."""
     facts = {
         "stages": data["stages"],
         "classical order": data["order"],
@@ -71,14 +65,7 @@ def tableau_text(data: Mapping[str, Any]) -> str:
 
 
 def tableau_report(data: Mapping[str, Any], tableau: Tableau) -> Report:
-    """Return a tableau as a report, whose table has a row for each stage, then those of the weights.
-
-    Parameters
-    ----------
-    data : mapping
-        What `tableau_data` returns for the tableau.
-    tableau : Tableau
-    """
+    """Return a tableau as a report, whose table has a row for each stage, then those of the weights."""
 
     def table() -> TextTable:
         stages = data["stages"]

@@ -32,25 +32,6 @@ _PRODUCTS = 2
 def conditions(attitude_step: Step, demand: Demand, more: int = 0) -> list[Equation]:
     """Return the conditions of an order, and of some orders beyond it.
 
-    Parameters
-    ----------
-    attitude_step : Step
-    demand : Demand
-    more : int, optional
-        Number of further powers of the step.
-
-    Returns
-    -------
-    list of Equation
-        Of the order that is the power of the step; each is a coefficient of the error.
-
-    Raises
-    ------
-    InputError
-        If the step has no series.
-
-    Examples
-    --------
     >>> from strapgen import choose
     >>> step = one_step.step(choose("euler", "rk2"))
     >>> for equation in conditions(step, Demand("general", 2), more=1):

@@ -16,32 +16,15 @@ MOST_GENERAL, MOST_OF_VELOCITY, MOST_SECOND = 8, 6, 16
 
 @dataclass(frozen=True)
 class Demand:
-    """A motion and the order that a step is to have on it.
+    """A motion and the order that a step is to have on it."""
 
-    Parameters
-    ----------
-    motion : str
-        One of `OF_ATTITUDE` or `OF_VELOCITY`.
-    order : int
-        The last power of the step at which its error has to vanish.
-    """
-
+    #: One of `OF_ATTITUDE` or `OF_VELOCITY`
     motion: str
+    #: The last power of the step at which its error has to vanish
     order: int
 
     def require(self, velocity: bool) -> None:
-        """Check the motion and the order.
-
-        Parameters
-        ----------
-        velocity : bool
-            Whether the step is one of velocity and position.
-
-        Raises
-        ------
-        InputError
-            If conditions are not stated on the motion, or not up to the order.
-        """
+        """Check the motion and the order."""
         what = "step of velocity and position" if velocity else "attitude step"
         checks.choice(f"motion of the {what}", self.motion, OF_VELOCITY if velocity else OF_ATTITUDE)
         most = MOST_OF_VELOCITY if velocity else MOST_GENERAL

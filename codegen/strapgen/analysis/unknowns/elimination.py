@@ -56,23 +56,6 @@ class _ImpossibleError(Exception):
 def solve(equations: Sequence[Equation], unknowns: Sequence[sp.Symbol]) -> PolynomialSolution:
     """Return all real solutions of polynomial equations as families.
 
-    Parameters
-    ----------
-    equations : sequence of Equation
-    unknowns : sequence of Symbol
-        Where there is a choice, the last ones are expressed by the first ones.
-
-    Returns
-    -------
-    PolynomialSolution
-
-    Raises
-    ------
-    InputError
-        If the system is beyond the limits of this module.
-
-    Examples
-    --------
     >>> x, y = sp.symbols("x y", real=True)
     >>> line, circle = Equation("line", 1, x + y - 1), Equation("circle", 2, x**2 + y**2 - 1)
     >>> [family.values for family in solve([line], [x, y]).families]
@@ -189,13 +172,7 @@ class _CaseSearch:
         return [factor.monic() for factor, _ in polynomial.factor_list()[1]]
 
     def simplified(self, case: _Case) -> _Case:
-        """Return a case without what is known not to be zero, and without equations that hold.
-
-        Raises
-        ------
-        _ImpossibleError
-            If an equation cannot hold.
-        """
+        """Return a case without what is known not to be zero, and without equations that hold."""
         shortest: dict[Any, tuple[str, Any]] = {}
         for label, polynomial in case.equations:
             if not polynomial:

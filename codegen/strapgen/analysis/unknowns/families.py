@@ -137,8 +137,6 @@ def simple(expression: sp.Expr) -> sp.Expr:
 def shown(polynomial: sp.Expr) -> str:
     """Return a polynomial as text with whole numbers, up to a factor.
 
-    Examples
-    --------
     >>> shown(sp.Symbol("c") - sp.Rational(2, 3))
     '3*c - 2'
     """
@@ -149,13 +147,7 @@ def shown(polynomial: sp.Expr) -> str:
 
 
 def member(family: Family, what: str, parameters: Mapping[str, Any]) -> dict[str, sp.Expr]:
-    """Return the values of all unknowns of a family that parameters fix.
-
-    Raises
-    ------
-    InputError
-        If a parameter is none of the family's, or the family excludes its value.
-    """
+    """Return the values of all unknowns of a family that parameters fix."""
     chosen = unknown_values.read(what, tuple(symbol.name for symbol in family.free), parameters)
     for excluded in family.nonzero:
         if sp.expand(excluded.subs(chosen)) == 0:

@@ -20,14 +20,7 @@ _TITLES = {
 
 
 def families_report(unknown: UnknownTableau, solutions: dict[str, PolynomialSolution]) -> Report:
-    """Return the families of a tableau with unknowns as a report.
-
-    Parameters
-    ----------
-    unknown : UnknownTableau
-    solutions : dict of str to PolynomialSolution
-        For each of `unknown_tableau.EQUATIONS`.
-    """
+    """Return the families of a tableau with unknowns as a report."""
     leading = [unknown.leading(family) for family in solutions["general"].families]
 
     def latex() -> str:

@@ -193,8 +193,6 @@ def read(path: str | Path) -> UnknownTableau:
 def from_data(data: Mapping[str, Any]) -> UnknownTableau:
     """Return the tableau with unknowns of a file's content; errors are those of `read`.
 
-    Examples
-    --------
     >>> unknown = from_data({
     ...     "name": "two stages", "source": "this example", "order": 2, "unknowns": ["c", "b"],
     ...     "nodes": ["0", "c"], "matrix": [[], ["c"]], "weights": ["1 - b", "b"],

@@ -18,13 +18,7 @@ _MOST_CONDITIONS, _MOST_FAMILIES = 12, 4
 
 
 def conditions_latex(conditions: Sequence[Equation]) -> str:
-    """Return conditions as one align environment, a polynomial that is 0 in each line.
-
-    Parameters
-    ----------
-    conditions : sequence of Equation
-        The first ones are shown, and how many follow.
-    """
+    """Return conditions as one align environment, a polynomial that is 0 in each line."""
     rows = [("0", expression_latex(each.value)) for each in conditions[:_MOST_CONDITIONS]]
     if len(conditions) > _MOST_CONDITIONS:
         rows.append((rf"\text{{and {len(conditions) - _MOST_CONDITIONS} more: }} 0", r"\dots"))

@@ -72,14 +72,7 @@ def condition_lines(conditions: Sequence[Equation]) -> Iterator[str]:
 
 
 def solved_report(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None = None) -> Report:
-    """Return the conditions on a step's unknowns and their solution as a report.
-
-    Parameters
-    ----------
-    solved : SolvedStep
-    chosen : mapping of str to Expr, optional
-        The values of the unknowns of one member of a family.
-    """
+    """Return the conditions on a step's unknowns and their solution as a report."""
 
     def data() -> dict[str, Any]:
         return _solved_data(solved) | ({} if chosen is None else {"chosen": _texts(chosen)})

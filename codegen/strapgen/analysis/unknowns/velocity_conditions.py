@@ -33,28 +33,6 @@ _PRODUCTS = 2
 def conditions(kernel: Kernel, demand: Demand, more: int = 0) -> list[Equation]:
     """Return the conditions of an order, and of some orders beyond it.
 
-    Parameters
-    ----------
-    kernel : Kernel
-        A step of velocity and position.
-    demand : Demand
-        With "general" both changes have to be of the order on any smooth motion, with "velocity" or "position" the one.
-    more : int, optional
-        Number of further powers of the step.
-
-    Returns
-    -------
-    list of Equation
-        Of the order that is the power of the step; each is a coefficient of an error. The position is divided by the
-        length of the step.
-
-    Raises
-    ------
-    InputError
-        If the step has no series, or not the change that is demanded.
-
-    Examples
-    --------
     >>> from strapgen import choose, derive
     >>> step = derive(choose("velocity-position", "magnus2", 1))
     >>> for equation in conditions(step, Demand("velocity", 2), more=1):

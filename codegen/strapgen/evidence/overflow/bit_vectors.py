@@ -26,18 +26,7 @@ class Bits:
 
 
 class BitVectorFunction:
-    """A C function without loops, executed on bit vectors.
-
-    Parameters
-    ----------
-    function : c_ast.FuncDef
-    model : Model
-
-    Attributes
-    ----------
-    safe : list of z3.BoolRef
-        What must hold so that no operation is undefined and no conversion is left to the compiler.
-    """
+    """A C function without loops, executed on bit vectors."""
 
     def __init__(self, function: c_ast.FuncDef, model: Model) -> None:
         self._function, self._model = function, model
@@ -165,17 +154,8 @@ class BitVectorFunction:
 def shifts_down(function: c_ast.FuncDef, model: Model, places: Iterable[int]) -> bool:
     """Return whether a function of ``x`` and ``n`` is proved to return x / 2^n, rounded down.
 
-    Parameters
-    ----------
-    function : c_ast.FuncDef
-    model : Model
-    places : iterable of int
-        The n for which it is called.
-
-    Returns
-    -------
-    bool
-        True if for every x whose quotient the result's type holds, that is what returns, by defined operations alone.
+    Returns: true if for every x whose quotient the result's type holds, that is what returns, by defined
+    operations alone.
     """
     return all(_shifts_down(BitVectorFunction(function, model), n) for n in places)
 

@@ -25,18 +25,11 @@ class IntegerType:
 
 @dataclass(frozen=True)
 class Model:
-    """What a processor's C leaves to it.
-
-    Parameters
-    ----------
-    int_bits, long_bits : int
-        The bits of int and long.
-    frama_c : str
-        What Frama-C calls the model.
-    """
+    """What a processor's C leaves to it."""
 
     int_bits: int
     long_bits: int
+    #: What Frama-C calls the model
     frama_c: str
 
     @property

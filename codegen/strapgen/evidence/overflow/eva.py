@@ -36,19 +36,7 @@ TOOL = Tool("Frama-C Eva", ("frama-c",), "frama-c-base", _version)
 
 
 def prove(subject: Subject, folder: Path) -> list[Verdict]:
-    """Have Eva look for overflow, for any other undefined behaviour and for outputs out of their ranges.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        For the harness; the C is written beside it.
-
-    Returns
-    -------
-    list of Verdict
-        One for each machine model; none for words of 64 bits, for whose products Eva has no integers.
-    """
+    """Have Eva look for overflow, for any other undefined behaviour and for outputs out of their ranges."""
     if subject.fixed.word == 64:
         return []
     write(subject.sources, folder)
@@ -68,8 +56,6 @@ def write(sources: Sources, folder: Path) -> None:
 def harness(sources: Sources) -> str:
     """Return a C program that calls a kernel once with any words, and asserts the range of every output.
 
-    Examples
-    --------
     >>> from strapgen.catalogue import Choice
     >>> from strapgen.evidence.subjects import Subject
     >>> print(harness(Subject(Choice("euler-normalize")).sources).partition("int main")[2])

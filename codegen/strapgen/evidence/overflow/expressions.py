@@ -17,15 +17,9 @@ from strapgen.evidence.overflow.unknowns import Fact, Number, Prover, Variable
 
 @dataclass(frozen=True)
 class Obligation:
-    """What must hold for the C to do what it says, and does not follow.
+    """What must hold for the C to do what it says, and does not follow."""
 
-    Parameters
-    ----------
-    place : str
-        The function, and the value or the statement in it.
-    text : str
-    """
-
+    #: The function, and the value or the statement in it
     place: str
     text: str
 
@@ -33,14 +27,7 @@ class Obligation:
 class ExpressionFormulas:
     """Evaluates the expressions of one function.
 
-    Parameters
-    ----------
-    model : Model
-    prover : Prover
-    calls : callable
-        ``calls(name, arguments)`` returns the result of a function of the file.
-    obligations : list of Obligation
-        What cannot be proved is added.
+    `calls`: ``calls(name, arguments)`` returns the result of a function of the file.
     """
 
     def __init__(

@@ -13,26 +13,7 @@ from strapgen.evidence.overflow.unknowns import Fact, Number, Prover, Variable
 
 
 class KernelStatements:
-    """The C function of a kernel, statement by statement.
-
-    Parameters
-    ----------
-    functions : mapping of str to c_ast.FuncDef
-    name : str
-        Of the function.
-    model : Model
-    ranges : mapping of str to (int, int)
-        Ranges that the generator states, by value and by element of an output. They are proved, or not used.
-    nearest : bool
-        Whether roots are rounded to the nearest.
-    effort : int
-        See `Prover`.
-
-    Attributes
-    ----------
-    places : set of int
-        By how many places ``_fit`` and ``_shr`` shift.
-    """
+    """The C function of a kernel, statement by statement."""
 
     def __init__(
         self,

@@ -31,17 +31,7 @@ _EXTENSIONS = (
 
 
 class ParsedSource:
-    """A C source file as a syntax tree.
-
-    Parameters
-    ----------
-    files : mapping of str to str
-        The source and the headers that it includes, by file name; `stdint.h` is not needed.
-    source : str
-        Name of the source file.
-    defined : sequence of str, optional
-        Macros that a compiler or a tool defines, as "__FRAMAC__".
-    """
+    """A C source file as a syntax tree."""
 
     def __init__(self, files: Mapping[str, str], source: str, defined: Sequence[str] = ()) -> None:
         self._files, self._source, self._defined = files, source, defined

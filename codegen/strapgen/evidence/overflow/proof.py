@@ -19,15 +19,7 @@ _EFFORTS = (100_000, 1_000_000, 4_000_000)
 
 
 class Proof:
-    """The proof that the C of a kernel computes its integers without overflow, and in their ranges.
-
-    Parameters
-    ----------
-    subject : Subject
-    files : mapping of str to str
-        The C, by file name.
-    model : Model
-    """
+    """The proof that the C of a kernel computes its integers without overflow, and in their ranges."""
 
     def __init__(self, subject: Subject, files: Mapping[str, str], model: Model) -> None:
         self._subject, self._files, self._model = subject, files, model

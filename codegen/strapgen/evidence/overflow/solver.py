@@ -19,19 +19,7 @@ TOOL = Tool("z3", ("cc",), "z3-solver and pycparser from PyPI", _version, ("z3",
 
 
 def prove(subject: Subject, folder: Path) -> list[Verdict]:
-    """Have z3 prove that no operation of a kernel overflows and that every output lies in its stated range.
-
-    Parameters
-    ----------
-    subject : Subject
-    folder : Path
-        The C is written there.
-
-    Returns
-    -------
-    list of Verdict
-        One for each model of a processor.
-    """
+    """Have z3 prove that no operation of a kernel overflows and that every output lies in its stated range."""
     for name, text in subject.sources.step_files.items():
         (folder / name).write_text(text)
     return [

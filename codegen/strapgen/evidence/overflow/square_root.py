@@ -18,19 +18,6 @@ def is_root(function: c_ast.FuncDef, model: Model, nearest: bool) -> bool:
     2^(k+1) with P^2 <= square < (P + 2^(k+1))^2; the variables hold ``root = 2^(k+1) P``, ``rest = square - P^2`` and
     ``bit = 4^k``. The body of the loop is executed on formulas for every k, which shows that this stays so, and that no
     step leaves the type. After the last bit ``root`` is P.
-
-    Parameters
-    ----------
-    function : c_ast.FuncDef
-        With the parameter ``square`` and the variables ``rest``, ``root``, ``bit`` and a loop.
-    model : Model
-    nearest : bool
-        Whether the root is rounded to the nearest; otherwise it is rounded down.
-
-    Returns
-    -------
-    bool
-        True if it holds for every square that the type of the parameter holds, from 0.
     """
     *before, loop = _up_to_loop(function.body.block_items)
     after = function.body.block_items[len(before) + 1 :]

@@ -33,20 +33,13 @@ class Fact:
 
 @dataclass(eq=False)
 class Variable:
-    """An integer unknown: an input, or a result that is rounded or chosen.
-
-    Parameters
-    ----------
-    name : str
-    low, high : int
-        Its interval, as far as it is proved.
-    path : tuple of Fact, optional
-        The conditions of the branch in which it was computed: the interval and the facts hold where they do.
-    """
+    """An integer unknown: an input, or a result that is rounded or chosen."""
 
     name: str
+    #: Its interval, as far as it is proved
     low: int
     high: int
+    #: The conditions of the branch in which it was computed: the interval and the facts hold where they do
     path: tuple[Fact, ...] = ()
 
     def __post_init__(self) -> None:
@@ -62,22 +55,14 @@ class Variable:
 
 @dataclass(frozen=True)
 class Number:
-    """The value of an expression.
-
-    Parameters
-    ----------
-    kind : IntegerType
-    low, high : int
-    real : z3.ArithRef or int
-        Its formula.
-    variables : frozenset of Variable
-        Those of the formula.
-    """
+    """The value of an expression."""
 
     kind: IntegerType
     low: int
     high: int
+    #: Its formula
     real: Any
+    #: Those of the formula
     variables: frozenset[Variable] = frozenset()
 
     @classmethod
@@ -119,10 +104,7 @@ _MOST_VARIABLES = 40
 class Prover:
     """Decides formulas by z3, from few facts at first and from more as long as they do not do.
 
-    Parameters
-    ----------
-    effort : int
-        What one attempt may take, in z3's own count, so that the outcome does not depend on the machine.
+    `effort`: what one attempt may take, in z3's own count, so that the outcome does not depend on the machine.
     """
 
     def __init__(self, effort: int) -> None:

@@ -22,18 +22,7 @@ _NOTHING = 1e-5
 
 
 def convention_of(step: ForeignStep, declared: Directions) -> tuple[Convention | None, Directions]:
-    """Return the convention that fits a function, the declared one first; None if none does.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    declared : Directions
-        What is seen in the declared convention.
-
-    Returns
-    -------
-    Convention or None, Directions
-    """
+    """Return the convention that fits a function, the declared one first; None if none does."""
     if fits(declared.steady):
         return step.convention, declared
     scalars = SCALARS if step.source.arguments.elements == 4 else SCALARS[:1]
@@ -62,14 +51,7 @@ def off(response: Directions) -> float:
 def sizes_in_words(response: Array) -> str:
     """Return in words by how much rotations come out too large that are about the right axes.
 
-    Parameters
-    ----------
-    response : array, (3, 3)
-        A rotation vector for each axis, in units of the rotation about it.
-
-    Returns
-    -------
-    str
+    `response` (3, 3): a rotation vector for each axis, in units of the rotation about it.
     """
     sizes = np.diag(response)
     if np.abs(response - np.diag(sizes)).max() > SIZE_WITHIN:
@@ -83,15 +65,7 @@ def sizes_in_words(response: Array) -> str:
 def in_words(step: ForeignStep, response: Array) -> str:
     """Return in words how rotations about the axes come out.
 
-    Parameters
-    ----------
-    step : ForeignStep
-    response : array, (3, 3)
-        A rotation vector for each axis, in units of the rotation about it.
-
-    Returns
-    -------
-    str
+    `response` (3, 3): a rotation vector for each axis, in units of the rotation about it.
     """
     if not np.isfinite(response).all():
         return "a small rotation gives no attitude near the one before it"

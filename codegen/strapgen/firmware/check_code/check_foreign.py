@@ -57,54 +57,35 @@ _MOST_SHOWN = 4
 
 @dataclass(frozen=True)
 class SeenCoefficient:
-    """The coefficient of the cross product of two samples, older times newer.
+    """The coefficient of the cross product of two samples, older times newer."""
 
-    Parameters
-    ----------
-    older, newer : int
-        Samples of a call have the numbers from 0, those before it are negative.
-    seen, wanted : float
-        That of the function, and that of the published correction whose pattern is nearest.
-    """
-
+    #: Samples of a call have the numbers from 0, those before it are negative
     older: int
     newer: int
+    #: That of the function, and that of the published correction whose pattern is nearest
     seen: float
     wanted: float
 
 
 @dataclass(frozen=True)
 class ForeignOutcome:
-    """What the check of a user's function has shown.
-
-    Parameters
-    ----------
-    file : str
-    findings : tuple of Finding
-    order : float or None
-        Observed order.
-    drift_deg_h : float or None
-        Magnitude of the drift on the cone in deg/h.
-    closed_form_deg_h : float or None
-        The one that a published coning correction on the same samples leaves, in closed form.
-    cause : str or None
-        The likely cause of what fails; None if nothing does, or the cause is not known.
-    drift_by_axis_deg_h : tuple of float or None
-        The drift about x, y and z of the reference axes in deg/h; its length is the magnitude.
-    coefficients : tuple of SeenCoefficient
-        Those of cross products that are seen or wanted; none where samples are rates at instants.
-    coefficient_ratio : float or None
-        What they correct of the drift on coning to leading order, 1 if they are right.
-    """
+    """What the check of a user's function has shown."""
 
     file: str
     findings: tuple[Finding, ...]
+    #: Observed order
     order: float | None
+    #: Magnitude of the drift on the cone in deg/h
     drift_deg_h: float | None
+    #: The one that a published coning correction on the same samples leaves, in closed form
     closed_form_deg_h: float | None
+    #: The likely cause of what fails; None if nothing does, or the cause is not known
     cause: str | None
+    #: The drift about x, y and z of the reference axes in deg/h; its length is the magnitude
     drift_by_axis_deg_h: tuple[float, ...] | None = None
+    #: Those of cross products that are seen or wanted; none where samples are rates at instants
     coefficients: tuple[SeenCoefficient, ...] = ()
+    #: What they correct of the drift on coning to leading order, 1 if they are right
     coefficient_ratio: float | None = None
 
     @property
@@ -114,21 +95,7 @@ class ForeignOutcome:
 
 
 def check_foreign(step: ForeignStep) -> ForeignOutcome:
-    """Check a user's function.
-
-    Parameters
-    ----------
-    step : ForeignStep
-
-    Returns
-    -------
-    ForeignOutcome
-
-    Raises
-    ------
-    InputError
-        If a choice does not fit the function.
-    """
+    """Check a user's function."""
     return _Check(step).outcome()
 
 

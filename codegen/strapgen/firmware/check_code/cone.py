@@ -22,12 +22,7 @@ HALF_ANGLE, FREQUENCY, SAMPLING, SAMPLES = math.radians(1), 20 * math.pi, Fracti
 
 
 def cone() -> Motion:
-    """Return a coning motion whose axis stands still.
-
-    Returns
-    -------
-    Motion
-    """
+    """Return a coning motion whose axis stands still."""
     a, g = FREQUENCY * math.sin(HALF_ANGLE), -2 * FREQUENCY * math.sin(HALF_ANGLE / 2) ** 2
     return motion("coning", a_rad_s=a, b_rad_s=FREQUENCY, g_rad_s=g)
 
@@ -35,17 +30,8 @@ def cone() -> Motion:
 def closed_form_deg_h(standard: Design) -> float:
     """Return the drift on the cone that a coning correction leaves, to second order in the half-angle.
 
-    Parameters
-    ----------
-    standard : Design
+    Returns: computed minus true, in deg/h.
 
-    Returns
-    -------
-    float
-        Computed minus true, in deg/h.
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.coning_coefficients import design
     >>> [round(closed_form_deg_h(design(1, previous)), 3) for previous in (0, 1)]
     [-127.339, -9.784]
@@ -56,36 +42,15 @@ def closed_form_deg_h(standard: Design) -> float:
 
 
 def published_step(method: str, standard: Design) -> catalogue.Choice:
-    """Return the step of Euler parameters with a published correction.
-
-    Parameters
-    ----------
-    method : str
-        A method of the catalogue.
-    standard : Design
-        Says how many samples it takes.
-
-    Returns
-    -------
-    Choice
-    """
+    """Return the step of Euler parameters with a published correction."""
     return catalogue.choose("euler", method, standard.samples, previous=standard.previous)
 
 
 def drift_deg_h(drift: Array, duration: Fraction) -> Array:
     """Return the largest drift of a run, over its duration.
 
-    Parameters
-    ----------
-    drift : array, (N, 3)
-        In rad, reference axes.
-    duration : Fraction
-        In s.
-
-    Returns
-    -------
-    array, (3,)
-        In deg/h about x, y and z; its length is the largest.
+    `drift` (N, 3): in rad, reference axes. `duration`: in s. Returns (3,): in deg/h about x, y and z; its
+    length is the largest.
     """
     largest = drift[np.linalg.norm(drift, axis=1).argmax()]
     rates: Array = np.degrees(largest) / float(duration) * 3600
@@ -93,17 +58,7 @@ def drift_deg_h(drift: Array, duration: Fraction) -> Array:
 
 
 def generated_drifts(standard: Design) -> dict[str, float]:
-    """Return the drift in deg/h that generated steps of published corrections leave, by their methods.
-
-    Parameters
-    ----------
-    standard : Design
-        Says how many samples they take.
-
-    Returns
-    -------
-    dict of str to float
-    """
+    """Return the drift in deg/h that generated steps of published corrections leave, by their methods."""
     length, duration = SAMPLING * standard.samples, seconds(standard.samples)
     drifts = {}
     for form in FORMS:

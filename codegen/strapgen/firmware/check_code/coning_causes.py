@@ -38,15 +38,6 @@ def standard_design(products: Products) -> Design:
     It has the samples of a call, and from before the call as many as the function is seen to use rightly, but for one
     sample a call at least one, without which nothing can be corrected. A function that turns by every sample on its own
     with the correction of one sample is measured by that.
-
-    Parameters
-    ----------
-    products : Products
-        The coefficients of the function.
-
-    Returns
-    -------
-    Design
     """
     samples = products.samples
     if not corrects_coning(products):
@@ -59,30 +50,12 @@ def standard_design(products: Products) -> Design:
 
 
 def plain_design(samples: int) -> Design:
-    """Return the published correction on the samples of a call, for one sample that with one from before it.
-
-    Parameters
-    ----------
-    samples : int
-
-    Returns
-    -------
-    Design
-    """
+    """Return the published correction on the samples of a call, for one sample that with one from before it."""
     return design(samples, 1 if samples == 1 else 0)
 
 
 def seen_design(products: Products) -> Design:
-    """Return the correction that a function is seen to have, as a design with the samples that are looked at.
-
-    Parameters
-    ----------
-    products : Products
-
-    Returns
-    -------
-    Design
-    """
+    """Return the correction that a function is seen to have, as a design with the samples that are looked at."""
     previous = -min(older for older, _ in products.finally_)
     table = {
         (older + previous, newer + previous): Fraction(c).limit_denominator(_DENOMINATOR)
@@ -92,17 +65,7 @@ def seen_design(products: Products) -> Design:
 
 
 def wanted(products: Products) -> Table:
-    """Return the coefficients of the published correction whose pattern is nearest to that of a function.
-
-    Parameters
-    ----------
-    products : Products
-
-    Returns
-    -------
-    dict
-        A coefficient for each pair of the function.
-    """
+    """Return the coefficients of the published correction whose pattern is nearest to that of a function."""
     pairs, seen = list(products.at_once), products.at_once
     tables = [
         ({pair: ideal.get(pair, 0.0) for pair in pairs}, base) for ideal, base in _ideals(products.samples)
@@ -118,30 +81,12 @@ def wanted(products: Products) -> Table:
 
 
 def ratio(products: Products) -> float:
-    """Return the coefficients by what annuls the drift on coning to leading order, 1 where they are right.
-
-    Parameters
-    ----------
-    products : Products
-
-    Returns
-    -------
-    float
-    """
+    """Return the coefficients by what annuls the drift on coning to leading order, 1 where they are right."""
     return _moment(products.finally_) / _needed(products.samples)
 
 
 def tolerance(products: Products) -> float:
-    """Return the largest departure of `ratio` from 1 that is no fault, rounding included.
-
-    Parameters
-    ----------
-    products : Products
-
-    Returns
-    -------
-    float
-    """
+    """Return the largest departure of `ratio` from 1 that is no fault, rounding included."""
     distances = sum(newer - older for older, newer in products.finally_)
     return _RATIO_WITHIN + products.noise * distances / _needed(products.samples)
 
@@ -171,17 +116,6 @@ def cause(products: Products) -> str | None:
 
     A cause is named where all coefficients are those of the fault; other ones are told by their size.
 
-    Parameters
-    ----------
-    products : Products
-
-    Returns
-    -------
-    str or None
-        None if they correct it.
-
-    Examples
-    --------
     One sample a call and one from before it: 1/12 is right.
 
     >>> tables = [{(-3, 0): 0.0, (-2, 0): 0.0, (-1, 0): c} for c in (1 / 12, 0.0, -1 / 12, 1 / 6)]

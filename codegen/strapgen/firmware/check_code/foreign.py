@@ -37,41 +37,20 @@ _DECLARATION = (
 
 @dataclass(frozen=True)
 class ForeignRun:
-    """What came of a run.
+    """What came of a run."""
 
-    Parameters
-    ----------
-    outputs : array, (N, elements)
-        The result of every call, in the order of the function's elements; no rows if the run stopped.
-    stopped : str
-        The reason why the run came to no end; "" if it did.
-    writes_beyond, changes_inputs : bool
-        Whether the function wrote beside its arrays, or into arguments that are no result.
-    """
-
+    #: (N, elements): the result of every call, in the order of the function's elements; no rows if the run
+    #: stopped
     outputs: NDArray[np.float64]
+    #: The reason why the run came to no end; "" if it did
     stopped: str = ""
+    #: Whether the function wrote beside its arrays, or into arguments that are no result
     writes_beyond: bool = False
     changes_inputs: bool = False
 
 
 def compile_foreign(source: ForeignSource) -> Path:
-    """Compile a user's function.
-
-    Parameters
-    ----------
-    source : ForeignSource
-
-    Returns
-    -------
-    Path
-        The compiled module; it is in the cache by all that the preprocessor reads.
-
-    Raises
-    ------
-    CompilerError
-        If there is no compiler, or the file or the call of the function does not compile: the first error.
-    """
+    """Compile a user's function."""
     bridge, of = bridge_text(source), compiler.COMPILERS["C++"] if source.is_cpp else compiler.C
     with drafts.temporary_folder() as folder:
         text = folder / f"bridge{of.ending}"
@@ -94,24 +73,9 @@ def compile_foreign(source: ForeignSource) -> Path:
 def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
     """Call a compiled function once for each row, in a process of its own.
 
-    Parameters
-    ----------
-    module : Path
-        Of `compile_foreign`.
-    identity : array_like, (elements,)
-        The state that a run begins with.
-    rows : array_like, (N, 3 + numbers)
-        For each call whether a run begins, the sampling interval in s, the duration of the call in s, and the numbers
-        of its arguments, the previous samples before those of the call.
-
-    Returns
-    -------
-    ForeignRun
-
-    Raises
-    ------
-    CompilerError
-        If the module cannot be loaded, since a function that it calls is defined nowhere.
+    `identity` (elements,): the state that a run begins with. `rows` (N, 3 + numbers): for each call whether a
+    run begins, the sampling interval in s, the duration of the call in s, and the numbers of its arguments, the
+    previous samples before those of the call.
     """
     values = np.ascontiguousarray(rows, np.float64)
     start = np.ascontiguousarray(identity, np.float64)

@@ -38,8 +38,6 @@ _ALLOWED = "state[4] or state[3][3], increments[K][3] or rates[K][3], previous[P
 def is_foreign(path: str | Path) -> bool:
     """Return whether the name of a file is one of C or C++.
 
-    Examples
-    --------
     >>> is_foreign("integrator.c"), is_foreign("integrator.C++"), is_foreign("euler"), is_foreign("integrator.h")
     (True, True, False, False)
     """
@@ -48,23 +46,15 @@ def is_foreign(path: str | Path) -> bool:
 
 @dataclass(frozen=True)
 class ForeignArgument:
-    """One argument of a user's function, or the place where it leaves its result.
+    """One argument of a user's function, or the place where it leaves its result."""
 
-    Parameters
-    ----------
-    name : str
-        What it is: one of the names of this module, or the name of memory.
-    shape : tuple of int
-        Empty for one number.
-    type : str
-        The type of memory, which the function keeps from call to call; "" for numbers.
-    reference : str
-        "*" or "&" for memory that is passed as a pointer or as a reference.
-    """
-
+    #: What it is: one of the names of this module, or the name of memory
     name: str
+    #: Empty for one number
     shape: tuple[int, ...] = ()
+    #: The type of memory, which the function keeps from call to call; "" for numbers
     type: str = ""
+    #: "*" or "&" for memory that is passed as a pointer or as a reference
     reference: str = ""
 
     @property
@@ -75,17 +65,11 @@ class ForeignArgument:
 
 @dataclass(frozen=True)
 class ForeignArguments:
-    """The arguments of a user's function.
+    """The arguments of a user's function."""
 
-    Parameters
-    ----------
-    parameters : tuple of ForeignArgument
-        In their order in C.
-    result : ForeignArgument
-        The attitude after a call: an argument, or what is read after the call, such as a field of memory.
-    """
-
+    #: In their order in C
     parameters: tuple[ForeignArgument, ...]
+    #: The attitude after a call: an argument, or what is read after the call, such as a field of memory
     result: ForeignArgument
 
     def named(self, *names: str) -> ForeignArgument | None:
@@ -129,22 +113,6 @@ class ForeignArguments:
 def read_arguments(text: str) -> ForeignArguments:
     """Read the arguments of a function.
 
-    Parameters
-    ----------
-    text : str
-        As the examples at the top of this module. With ``<-`` in place of the arrow the result comes first.
-
-    Returns
-    -------
-    ForeignArguments
-
-    Raises
-    ------
-    InputError
-        If a part cannot be read, is missing or stands twice, or a shape is none that an attitude or samples have.
-
-    Examples
-    --------
     >>> arguments = read_arguments("state[4], increments[2][3] -> next[4]")
     >>> [argument.name for argument in arguments.parameters], arguments.count, arguments.elements
     (['state', 'increments', 'next'], 2, 4)

@@ -73,25 +73,16 @@ __attribute__((visibility("default"))) int strapgen_foreign_run(
 
 @dataclass(frozen=True)
 class ForeignSource:
-    """A function in a user's file.
+    """A function in a user's file."""
 
-    Parameters
-    ----------
-    file : Path
-        The file in C or C++.
-    function : str
-        Name of the function.
-    arguments : ForeignArguments
-    init : str
-        Name of the function that begins a run; "" if there is none.
-    precision : str
-        "double" or "float".
-    """
-
+    #: The file in C or C++
     file: Path
+    #: Name of the function
     function: str
     arguments: ForeignArguments
+    #: Name of the function that begins a run; "" if there is none
     init: str = ""
+    #: "double" or "float"
     precision: str = "double"
 
     def __post_init__(self) -> None:
@@ -113,12 +104,7 @@ class ForeignSource:
 
 
 def bridge_text(source: ForeignSource) -> str:
-    """Return the text that includes a user's file and calls its function.
-
-    Parameters
-    ----------
-    source : ForeignSource
-    """
+    """Return the text that includes a user's file and calls its function."""
     arguments = source.arguments
     arrays = [argument for argument in arguments.parameters if argument.shape]
     memory = arguments.memory
@@ -211,12 +197,7 @@ def _after(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[s
 
 
 def definitions(file: Path) -> dict[str, str]:
-    """Return the functions that a file defines, each with the text of its parameters; "" for none.
-
-    Parameters
-    ----------
-    file : Path
-    """
+    """Return the functions that a file defines, each with the text of its parameters; "" for none."""
     text = re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(errors="replace"), flags=re.DOTALL)
     pattern = r"^[A-Za-z_][\w\s*&:<>]*?[\s*&]([A-Za-z_]\w*)\s*\(((?:[^;{}()]|\([^;{}()]*\))*)\)\s*\{"
     functions = {

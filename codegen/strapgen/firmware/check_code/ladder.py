@@ -99,14 +99,7 @@ def _error(step: ForeignStep, relative: Array, profile: Motion, length: Fraction
 def linear_rates(segment: Segment) -> Array:
     """Return the attitudes of a rate that is linear between instants, corrected for coning, relative to the first.
 
-    Parameters
-    ----------
-    segment : Segment
-        Rates at the ends of the intervals, times the interval.
-
-    Returns
-    -------
-    array, (1 + N, 3, 3)
+    Returns (1 + N, 3, 3).
     """
     count, samples, _ = segment.increments.shape
     ends = segment.increments.reshape(-1, 3)
@@ -121,20 +114,7 @@ def linear_rates(segment: Segment) -> Array:
 
 
 def ladder(step: ForeignStep, runs: tuple[SegmentRun, ...], standard: Design) -> Convergence:
-    """Return the errors of a function on the ladder, beside the order of theory.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    runs : tuple of SegmentRun
-        Of `ladder_segments`.
-    standard : Design
-        The published correction that the function is measured by.
-
-    Returns
-    -------
-    Convergence
-    """
+    """Return the errors of a function on the ladder, beside the order of theory."""
     rungs = []
     for (length, calls), run in zip(_rungs(step), runs, strict=True):
         error = _error(step, run.relative, _general(), length)
@@ -150,18 +130,7 @@ def _floor(step: ForeignStep, calls: int) -> float:
 
 
 def order_on_ladder(step: ForeignStep, seen: Convergence) -> tuple[Finding, float | None]:
-    """Return the finding on the order by the slope on the ladder, and the order.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    seen : Convergence
-        Of `ladder`.
-
-    Returns
-    -------
-    Finding, float or None
-    """
+    """Return the finding on the order by the slope on the ladder, and the order."""
     needed = _LINEAR_ORDER if step.takes == ENDS else seen.predicted
     assert needed is not None
     words = (
@@ -190,19 +159,6 @@ def order_in_float(
 
     It rests on what the probes have proved; beside it the error at the longest step is held to that of published
     steps, as far as rounding shows it.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    seen : Convergence
-        Of `ladder`.
-    standard : Design
-    proved : int
-        The order by the coefficients and by the rotation, 3 if both are right.
-
-    Returns
-    -------
-    Finding, float
     """
     (length, calls), error = _rungs(step)[0], seen.rungs[0].error_rad
     assert error is not None
@@ -237,22 +193,7 @@ def _published_error(step: ForeignStep, standard: Design, length: Fraction, call
 def drift_on_cones(
     step: ForeignStep, runs: tuple[SegmentRun, ...], standard: Design, measured: Design | None
 ) -> tuple[Finding, Array, float | None]:
-    """Return the finding on the drift on cones, the largest in deg/h about x, y, z, and its closed form.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    runs : tuple of SegmentRun
-        Of `drift_segments`.
-    standard : Design
-        The published correction that the function is measured by.
-    measured : Design or None
-        The correction that the function is seen to have; it counts where rounding hides what the run shows.
-
-    Returns
-    -------
-    Finding, array, float or None
-    """
+    """Return the finding on the drift on cones, the largest in deg/h about x, y, z, and its closed form."""
     length, duration = SAMPLING * step.samples, seconds(step.samples)
     drifts = {
         axis: turn @ _drift(step, turn.T @ run.relative @ turn, length, duration)

@@ -43,25 +43,17 @@ _SIGNS = list(product((1, -1), repeat=2))
 
 @dataclass(frozen=True)
 class Directions:
-    """How a function answers rotations about the axes.
+    """How a function answers rotations about the axes."""
 
-    Parameters
-    ----------
-    at_once, steady : array, (3, 3)
-        Rotation vector of the first call of a constant rate, and of one after many calls, in units of the rotation
-        about each axis: a column for each.
-    lag : float
-        Number of samples by which a rotation at a growing rate comes too late.
-    order_of_turns : float
-        Angle in rad between the attitude after a rotation about x and then one about y, and the true one.
-    other_order : float
-        The same for the attitude of the two rotations in the other order.
-    """
-
+    #: (3, 3): rotation vector of the first call of a constant rate, and of one after many calls, in units of
+    #: the rotation about each axis: a column for each
     at_once: Array
     steady: Array
+    #: Number of samples by which a rotation at a growing rate comes too late
     lag: float
+    #: Angle in rad between the attitude after a rotation about x and then one about y, and the true one
     order_of_turns: float
+    #: The same for the attitude of the two rotations in the other order
     other_order: float
 
 
@@ -89,18 +81,7 @@ def _slope(step: ForeignStep) -> float:
 
 
 def directions(step: ForeignStep, runs: Sequence[SegmentRun]) -> Directions:
-    """Return the answer to rotations about the axes.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    runs : sequence of SegmentRun
-        Of `direction_segments`.
-
-    Returns
-    -------
-    Directions
-    """
+    """Return the answer to rotations about the axes."""
     first = rotation_vectors(np.array([run.relative[1] for run in runs[:8]]))
     last = rotation_vectors(np.array([run.relative[-2].T @ run.relative[-1] for run in runs[:8]]))
     at_once, steady = ((turns[:6:2] - turns[1:6:2]).T / (2 * _TURN) for turns in (first, last))
@@ -117,28 +98,19 @@ def directions(step: ForeignStep, runs: Sequence[SegmentRun]) -> Directions:
 
 @dataclass(frozen=True)
 class Products:
-    """The coefficients of cross products, older times newer sample, beside the sum of samples and exact products.
+    """The coefficients of cross products, older times newer sample, beside the sum of samples and exact products."""
 
-    Parameters
-    ----------
-    samples : int
-        Samples of a call.
-    at_once, finally_ : dict
-        Coefficients after the call with the newer sample, and after more calls without rotation, means of the three
-        axes. Samples of the call have the numbers 0 to samples - 1, those before it are negative.
-    weights : tuple of float, optional
-        By how much of each sample of a call the attitude turns in the end; 1 for each is right.
-    by_axis : tuple of dict, optional
-        Coefficients in the end about x, y and z; none where they are alike.
-    noise : float, optional
-        What rounding and terms of fourth order may add to a coefficient.
-    """
-
+    #: Samples of a call
     samples: int
+    #: Coefficients after the call with the newer sample, and after more calls without rotation, means of the
+    #: three axes. Samples of the call have the numbers 0 to samples - 1, those before it are negative
     at_once: Table
     finally_: Table
+    #: By how much of each sample of a call the attitude turns in the end; 1 for each is right
     weights: tuple[float, ...] = ()
+    #: Coefficients in the end about x, y and z; none where they are alike
     by_axis: tuple[Table, ...] = ()
+    #: What rounding and terms of fourth order may add to a coefficient
     noise: float = 0.0
 
 
@@ -166,20 +138,7 @@ def product_segments(step: ForeignStep) -> list[Segment]:
 
 
 def products(step: ForeignStep, runs: Sequence[SegmentRun], *, exact: bool) -> Products:
-    """Return the coefficients of all products.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    runs : sequence of SegmentRun
-        Of `product_segments`.
-    exact : bool
-        Whether the function turns by a constant rate exactly. Otherwise its products have terms of fourth order too.
-
-    Returns
-    -------
-    Products
-    """
+    """Return the coefficients of all products."""
     samples, small = step.samples, _small(step)
     known = pairs(samples)
     shape = (len(known), len(_AXES), len(_SIGNS))

@@ -58,18 +58,8 @@ class _Explanation:
 def explanation(convention: Convention, states: Array, vectors: Array, errors: Array) -> str | None:
     """Return the cause of errors of rotations.
 
-    Parameters
-    ----------
-    convention : Convention
-    states : array, (N, 4) or (N, 9)
-        The states before the rotations.
-    vectors, errors : array, (N, 3)
-        The true rotation vectors, and the differences from these, in body axes.
-
-    Returns
-    -------
-    str or None
-        None if nothing explains the errors.
+    `states` (N, 4): the states before the rotations. `vectors, errors` (N, 3): the true rotation vectors, and
+    the differences from these, in body axes.
     """
     ranked = sorted(_explanations(convention, states, vectors, errors), key=lambda each: each.rest)
     best = ranked[0]

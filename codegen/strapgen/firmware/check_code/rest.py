@@ -27,23 +27,15 @@ _NOTHING = 1e-4
 
 @dataclass(frozen=True)
 class Rest:
-    """What a function does without rotation.
+    """What a function does without rotation."""
 
-    Parameters
-    ----------
-    moved : float
-        Largest change of an element of the state.
-    frame : array, (3,)
-        Rotation of a call, the same in reference axes at every attitude, in rad; 0 if there is none.
-    body : array, (3,)
-        The same in body axes.
-    strays : bool
-        Whether it turns otherwise than a frame that moves at a constant rate.
-    """
-
+    #: Largest change of an element of the state
     moved: float
+    #: (3,): rotation of a call, the same in reference axes at every attitude, in rad; 0 if there is none
     frame: Array
+    #: (3,): the same in body axes
     body: Array
+    #: Whether it turns otherwise than a frame that moves at a constant rate
     strays: bool
 
     def causes(self, seconds: float) -> list[str]:
@@ -65,18 +57,7 @@ def rest_segments(step: ForeignStep) -> list[Segment]:
 
 
 def rest(step: ForeignStep, runs: Sequence[SegmentRun]) -> Rest:
-    """Return what a function does without rotation.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    runs : sequence of SegmentRun
-        Of `rest_segments`.
-
-    Returns
-    -------
-    Rest
-    """
+    """Return what a function does without rotation."""
     states, none = runs[0].states, np.zeros(3)
     reference = states[0] if states.shape[1] != 3 else none  # of a rotation vector nothing is to be left
     moved = float(np.abs(states - reference).max())

@@ -28,21 +28,14 @@ _FORMULAS = ((lambda angle: 2 * math.atan(angle / 2), "2 atan(d/2)"), (math.atan
 
 @dataclass(frozen=True)
 class Rotation:
-    """What a function makes of a constant rate.
+    """What a function makes of a constant rate."""
 
-    Parameters
-    ----------
-    square, cube : float
-        Its error by the square and by the cube of the angle.
-    order : int
-        Order of the whole that it allows, 3 if it is enough for a published correction.
-    cause : str or None
-        Why it is not exact.
-    """
-
+    #: Its error by the square and by the cube of the angle
     square: float
     cube: float
+    #: Order of the whole that it allows, 3 if it is enough for a published correction
     order: int
+    #: Why it is not exact
     cause: str | None
 
     @property
@@ -85,20 +78,7 @@ def _large(step: ForeignStep) -> float:
 
 
 def rotation(step: ForeignStep, convention: Convention, runs: Sequence[SegmentRun]) -> Rotation:
-    """Return what a function makes of a constant rate.
-
-    Parameters
-    ----------
-    step : ForeignStep
-    convention : Convention
-        The one that it follows.
-    runs : sequence of SegmentRun
-        Of `rotation_segments`.
-
-    Returns
-    -------
-    Rotation
-    """
+    """Return what a function makes of a constant rate."""
     turns = rotation_vectors(np.array([run.relative[-2].T @ run.relative[-1] for run in runs]))
     angle = _large(step)
     least = _PART * angle

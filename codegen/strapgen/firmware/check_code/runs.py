@@ -48,17 +48,11 @@ _FLAT = 1e-3
 
 @dataclass(frozen=True)
 class Convention:
-    """How the elements of a user's attitude are read.
+    """How the elements of a user's attitude are read."""
 
-    Parameters
-    ----------
-    scalar : str
-        Where the scalar part of four elements stands, "last" or "first".
-    sense : str
-        "body-to-reference" or "reference-to-body".
-    """
-
+    #: Where the scalar part of four elements stands, "last" or "first"
     scalar: str = "last"
+    #: "body-to-reference" or "reference-to-body"
     sense: str = "body-to-reference"
 
     def __post_init__(self) -> None:
@@ -95,14 +89,7 @@ class Convention:
 def lengths(states: Array) -> Array:
     """Return the lengths of states (N, elements), 1 for a rotation: of Euler parameters, or of the mean row.
 
-    Parameters
-    ----------
-    states : array, (N, 4), (N, 9) or (N, 3)
-        Rotation vectors, which have three elements, are of no length.
-
-    Returns
-    -------
-    array, (N,)
+    `states` (N, 4): rotation vectors, which have three elements, are of no length. Returns (N,).
     """
     if states.shape[-1] == 3:
         return np.ones(len(states))
@@ -114,13 +101,7 @@ def lengths(states: Array) -> Array:
 def departure(states: Array) -> float:
     """Return the largest departure of C C' from the unit matrix, of the matrices C of states (N, elements).
 
-    Parameters
-    ----------
-    states : array, (N, 4), (N, 9) or (N, 3)
-
-    Returns
-    -------
-    float
+    `states` has shape (N, 4).
     """
     if states.shape[-1] != 9:
         return float(np.abs(lengths(states) ** 4 - 1).max())
@@ -141,36 +122,23 @@ def _nearest(matrices: Array) -> Array:
 
 @dataclass(frozen=True)
 class Segment:
-    """Increments of one run.
+    """Increments of one run."""
 
-    Parameters
-    ----------
-    increments : array, (N, K, 3)
-        Of N calls, in rad. A function that takes rates gets them divided by the time between samples.
-    settled : bool
-        Whether calls without rotation come first, which empty a memory of samples.
-    """
-
+    #: (N, K, 3): of N calls, in rad. A function that takes rates gets them divided by the time between samples
     increments: Array
+    #: Whether calls without rotation come first, which empty a memory of samples
     settled: bool = True
 
 
 @dataclass(frozen=True)
 class SegmentRun:
-    """What a function makes of a segment.
+    """What a function makes of a segment."""
 
-    Parameters
-    ----------
-    states : array, (N, elements)
-        The results of its calls.
-    matrices : array, (N, 3, 3)
-        The same as direction cosine matrices, body to reference.
-    relative : array, (1 + N, 3, 3)
-        The attitudes relative to the one before the first call.
-    """
-
+    #: (N, elements): the results of its calls
     states: Array
+    #: (N, 3, 3): the same as direction cosine matrices, body to reference
     matrices: Array
+    #: (1 + N, 3, 3): the attitudes relative to the one before the first call
     relative: Array
 
     @property
@@ -182,14 +150,8 @@ class SegmentRun:
     def unturned(self, frame: Array) -> SegmentRun:
         """Return the run as it would be in reference axes that stand still.
 
-        Parameters
-        ----------
-        frame : array, (3,)
-            Rotation vector in rad by which a call turns the attitude without rotation of the body, reference axes.
-
-        Returns
-        -------
-        SegmentRun
+        `frame` (3,): rotation vector in rad by which a call turns the attitude without rotation of the body,
+        reference axes.
         """
         counts = np.arange(len(self.relative))[:, None]
         back = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(counts), 3, 3)), -counts * frame)
@@ -199,17 +161,8 @@ class SegmentRun:
 def rotation_vectors(matrices: Array) -> Array:
     """Return the rotation vectors of rotations.
 
-    Parameters
-    ----------
-    matrices : array, (..., 3, 3)
+    `matrices` has shape (..., 3, 3). Returns (..., 3): in rad.
 
-    Returns
-    -------
-    array, (..., 3)
-        In rad.
-
-    Examples
-    --------
     >>> rotation_vectors(evaluator("dcm-update")(np.eye(3), np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
     array([0., 0., 2.])
     """
@@ -222,22 +175,14 @@ def rotation_vectors(matrices: Array) -> Array:
 
 @dataclass(frozen=True)
 class ForeignStep:
-    """A user's function that is compiled, and how it is fed.
-
-    Parameters
-    ----------
-    source : ForeignSource
-    convention : Convention
-    takes : str
-        "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or
-        "rates-at-ends", which are those at the end of each.
-    interval : Fraction
-        Time between samples in s.
-    """
+    """A user's function that is compiled, and how it is fed."""
 
     source: ForeignSource
     convention: Convention = Convention()
+    #: "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or "rates-
+    #: at-ends", which are those at the end of each
     takes: str = "increments"
+    #: Time between samples in s
     interval: Fraction = INTERVAL
     module: Path = field(init=False)
 
@@ -274,18 +219,7 @@ class ForeignStep:
         return -(-REMEMBERED // self.samples)
 
     def run(self, segments: Sequence[Segment], convention: Convention | None = None) -> ForeignSegments:
-        """Run segments one after the other in one process.
-
-        Parameters
-        ----------
-        segments : sequence of Segment
-        convention : Convention, optional
-            Another one than that of the step.
-
-        Returns
-        -------
-        ForeignSegments
-        """
+        """Run segments one after the other in one process."""
         read = convention or self.convention
         arguments = self.source.arguments
         rows = np.concatenate([self._rows(segment) for segment in segments])
@@ -326,19 +260,12 @@ class ForeignStep:
 
 @dataclass(frozen=True)
 class ForeignSegments:
-    """What came of segments.
+    """What came of segments."""
 
-    Parameters
-    ----------
-    runs : tuple of SegmentRun
-        One for each segment; empty if the function came to no end.
-    stopped : str
-        The reason for that; "" if there is none.
-    writes_beyond, changes_inputs : bool
-        As of `ForeignRun`.
-    """
-
+    #: One for each segment; empty if the function came to no end
     runs: tuple[SegmentRun, ...]
+    #: The reason for that; "" if there is none
     stopped: str
+    #: As of `ForeignRun`
     writes_beyond: bool
     changes_inputs: bool

@@ -30,23 +30,7 @@ LARGEST = Fraction(1, 458)
 def project_files(
     choice: Choice, target: str, settings: Settings | None = None, naming: Naming = UNNAMED
 ) -> dict[str, str]:
-    """Return the files that build and test the C of a kernel, without those of the kernel itself.
-
-    Parameters
-    ----------
-    choice : Choice
-    target : str
-        "c", "c-float" or "c-fixed".
-    settings : Settings or None
-        Settings of fixed point.
-    naming : Naming, optional
-        The name of the function, if the user chooses it.
-
-    Returns
-    -------
-    dict of str to str
-        Text by path: CMakeLists.txt, main.c, a test of vectors, and the functions that the main program compares with.
-    """
+    """Return the files that build and test the C of a kernel, without those of the kernel itself."""
     table = vectors_of_choice(choice, target, settings, naming=naming)
     sources = table.sources
     command = f"strapgen generate {naming.of(pipeline.program(choice)).arguments} --target {target}"
@@ -117,8 +101,6 @@ def stated_step(settings: Settings) -> Fraction:
 def decimal(value: Fraction, digits: int = 2) -> str:
     """Return a number rounded down to few digits, as a C literal in double.
 
-    Examples
-    --------
     >>> decimal(Fraction(1, 3)), decimal(Fraction(1, 100), 15), decimal(Fraction(40))
     ('0.33', '0.01', '40.0')
     """

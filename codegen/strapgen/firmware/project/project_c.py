@@ -22,46 +22,22 @@ MOTION = "motion"
 
 @dataclass(frozen=True)
 class MotionRun:
-    """The run of a main program on coning: the rate is ``rate (sin(rate t), 1, cos(rate t))`` in rad/s.
+    """The run of a main program on coning: the rate is ``rate (sin(rate t), 1, cos(rate t))`` in rad/s."""
 
-    Parameters
-    ----------
-    rate, step : str
-        In rad/s, and the step in s, as decimals.
-    steps : int
-    conversion : str
-        The function in double that converts a state to a direction cosine matrix; "" where the state is one.
-    fast, slow : int
-        In two speeds: fast cycles in a slow cycle, slow cycles in a navigation cycle. A step is then a slow cycle, and
-        `steps` counts navigation cycles.
-    """
-
+    #: In rad/s, and the step in s, as decimals
     rate: str
     step: str
     steps: int
+    #: The function in double that converts a state to a direction cosine matrix; "" where the state is one
     conversion: str = ""
+    #: In two speeds: fast cycles in a slow cycle, slow cycles in a navigation cycle. A step is then a slow
+    #: cycle, and `steps` counts navigation cycles
     fast: int = 1
     slow: int = 1
 
 
 def cmake(sources: Sources, command: str, motion: Sequence[str], tests: Sequence[str]) -> str:
-    """Return the text of CMakeLists.txt.
-
-    Parameters
-    ----------
-    sources : Sources
-        What the library consists of; it is named after the function.
-    command : str
-        The command that generates the project.
-    motion : sequence of str
-        Sources that the main program needs beside it.
-    tests : sequence of str
-        Names of the tests, without the ending of their files.
-
-    Returns
-    -------
-    str
-    """
+    """Return the text of CMakeLists.txt."""
     name, files = sources.function.name, sources.step_files
     return render(
         "project_c/CMakeLists.txt.j2",

@@ -40,19 +40,7 @@ _PARTS = (8, 32, 128, 512)
 def project_files(
     algorithm: str, sculling: int = 2, target: str = "c", settings: Settings | None = None
 ) -> dict[str, str]:
-    """Return the files that build and test an algorithm in two speeds, without those of the algorithm itself.
-
-    Parameters
-    ----------
-    algorithm, sculling, target, settings
-        As for `systems.two_speed_sources.sources`.
-
-    Returns
-    -------
-    dict of str to str
-        Text by path: CMakeLists.txt, main.c, vectors of every loop and of a run of all loops with their tests, and the
-        functions that the main program compares with.
-    """
+    """Return the files that build and test an algorithm in two speeds, without those of the algorithm itself."""
     whole = two_speed_sources.sources(algorithm, sculling, target, settings)
     loops = two_speed_sources.loops(algorithm, sculling, target, settings)
     system = two_speed_sources.description(algorithm, sculling).system
@@ -124,9 +112,7 @@ def _runner(whole: Sources, parts: LoopSources) -> Loops:
             if loop.fixed is not None
         )
         return Loops(LoopSources(models, parts.system), ModelEvaluator)
-    programs = tuple(
-        sources_of_program(pipeline.program(Choice(loop.kernel)), "exact") for loop in loops
-    )
+    programs = tuple(sources_of_program(pipeline.program(Choice(loop.kernel)), "exact") for loop in loops)
     return Loops(LoopSources(programs, parts.system), lambda sources: ProgramEvaluator(sources, whole.target))
 
 

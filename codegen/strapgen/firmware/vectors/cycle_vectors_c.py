@@ -18,57 +18,33 @@ Rows = Sequence[Sequence[Any]]
 
 @dataclass(frozen=True)
 class CycleTable:
-    """A run of whole navigation cycles from zero rotation.
+    """A run of whole navigation cycles from zero rotation."""
 
-    Parameters
-    ----------
-    whole : Sources
-        All loops in C.
-    loops : tuple of Sources
-        The fast, slow and navigation loop in C.
-    wires : Wiring
-    command : str
-        The command that generates the run.
-    fast, slow, navigation : int
-        Fast cycles in a slow cycle, slow cycles in a navigation cycle, and navigation cycles.
-    initial : sequence
-        The attitude at the start.
-    samples : mapping of str to rows
-        The samples of every cycle, by the names of the loops' inputs.
-    attitudes : rows
-        The attitude after every slow cycle, and after the navigation cycle that ends with it.
-    changes : rows
-        The change of velocity over every navigation cycle.
-    refused : sequence
-        A sample of the fast loop that it must refuse; empty in floating point.
-    """
-
+    #: All loops in C
     whole: Sources
+    #: The fast, slow and navigation loop in C
     loops: tuple[Sources, ...]
     wires: Wiring
+    #: The command that generates the run
     command: str
+    #: Fast cycles in a slow cycle, slow cycles in a navigation cycle, and navigation cycles
     fast: int
     slow: int
     navigation: int
+    #: The attitude at the start
     initial: Sequence[Any]
+    #: The samples of every cycle, by the names of the loops' inputs
     samples: Mapping[str, Rows]
+    #: The attitude after every slow cycle, and after the navigation cycle that ends with it
     attitudes: Rows
+    #: The change of velocity over every navigation cycle
     changes: Rows
+    #: A sample of the fast loop that it must refuse; empty in floating point
     refused: Sequence[Any]
 
 
 def cycle_files(table: CycleTable) -> dict[str, str]:
-    """Print the run as test vectors.
-
-    Parameters
-    ----------
-    table : CycleTable
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name: the header, and the test.
-    """
+    """Print the run as test vectors."""
     name, numbers, wires = table.whole.function.name, numbers_of(table.loops[0]), table.wires
     state = wires.memory_named(table.loops[1].function.inputs[0].name)
     (change,) = wires.results[2]

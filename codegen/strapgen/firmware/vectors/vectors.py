@@ -76,24 +76,6 @@ def vectors_of_choice(
 ) -> VectorTable:
     """Return test vectors of a chosen kernel for a target in C; other parameters are those of `call_vectors`.
 
-    Parameters
-    ----------
-    choice : Choice
-    target : str
-        "c", "c-float" or "c-fixed".
-    settings : Settings, optional
-        Settings of fixed point.
-    count, seed : int, optional
-    naming : Naming, optional
-        The name of the function, if the user chooses it.
-
-    Raises
-    ------
-    InputError
-        If the target is not in C, or the settings do not go with it.
-
-    Examples
-    --------
     >>> from strapgen.catalogue import choose
     >>> table = vectors_of_choice(choose("euler-product"), "c-fixed", count=1)
     >>> table.rows[0].status, table.rows[0].outputs
@@ -114,32 +96,7 @@ def vectors_of_choice(
 def call_vectors(
     sources: Sources, reference: Sources, command: str, count: int = COUNT, seed: int = SEED
 ) -> VectorTable:
-    """Return test vectors of a function.
-
-    Parameters
-    ----------
-    sources : Sources
-        The function in C.
-    reference : Sources
-        In fixed point its integer model, the same kernel and settings for the target "fixed-model"; in floating point
-        its program, see `kernel_sources.ProgramSources`.
-    command : str
-        The command that generates the vectors, for the head of the files.
-    count : int, optional
-        Number of vectors: corners first, then calls that are refused, then random ones. Those at which an angle jumps
-        by a turn are left out.
-    seed : int, optional
-        Seed of the random vectors.
-
-    Returns
-    -------
-    VectorTable
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed, or not enough vectors have finite results.
-    """
+    """Return test vectors of a function."""
     checks.count("count", count, largest=_MOST)
     checks.count("seed", seed, smallest=0)
     stream = random.Random(seed)  # its `random` is the same in every release of Python
@@ -180,20 +137,7 @@ def _fixed_rows(
 def model_call(
     model: ModelEvaluator, inputs: tuple[tuple[int, ...], ...], feedback: tuple[int, ...]
 ) -> CallVector:
-    """Return a call of the integer model as a vector; a refused call leaves outputs and error feedback alone.
-
-    Parameters
-    ----------
-    model : ModelEvaluator
-    inputs : tuple of tuple of int
-        The elements of every input.
-    feedback : tuple of int
-        Words of error feedback before the call.
-
-    Returns
-    -------
-    CallVector
-    """
+    """Return a call of the integer model as a vector; a refused call leaves outputs and error feedback alone."""
     arguments = [*map(list, inputs), *([list(feedback)] if feedback else [])]
     try:
         results = [tuple(map(int, result)) for result in model.generated(*arguments)]

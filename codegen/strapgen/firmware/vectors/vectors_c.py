@@ -17,47 +17,30 @@ from strapgen.targets.rendering import render
 
 @dataclass(frozen=True)
 class CallVector:
-    """A call of a function: what it takes, and what it must return.
+    """A call of a function: what it takes, and what it must return."""
 
-    Parameters
-    ----------
-    inputs : tuple of tuple
-        The elements of every input: integers in fixed point, floating-point numbers otherwise.
-    feedback : tuple of int
-        Words of error feedback before the call.
-    status : int
-        Error code; 0 where the call is accepted.
-    outputs : tuple of tuple
-        The elements of every output; zeros where the call is refused and leaves its outputs alone.
-    next_feedback : tuple of int
-        Words of error feedback after the call.
-    """
-
+    #: The elements of every input: integers in fixed point, floating-point numbers otherwise
     inputs: tuple[tuple[Any, ...], ...]
+    #: Words of error feedback before the call
     feedback: tuple[int, ...]
+    #: Error code; 0 where the call is accepted
     status: int
+    #: The elements of every output; zeros where the call is refused and leaves its outputs alone
     outputs: tuple[tuple[Any, ...], ...]
+    #: Words of error feedback after the call
     next_feedback: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class VectorTable:
-    """Test vectors of a function.
+    """Test vectors of a function."""
 
-    Parameters
-    ----------
-    sources : Sources
-        The function in C.
-    command : str
-        The command that generates the vectors.
-    rows : tuple of CallVector
-    tolerances : tuple of float
-        Largest difference of an element that is allowed, for each output: 0 where all bits must agree.
-    """
-
+    #: The function in C
     sources: Sources
+    #: The command that generates the vectors
     command: str
     rows: tuple[CallVector, ...]
+    #: Largest difference of an element that is allowed, for each output: 0 where all bits must agree
     tolerances: tuple[float, ...]
 
 
@@ -67,17 +50,7 @@ def file_names(name: str) -> tuple[str, str, str]:
 
 
 def table_files(table: VectorTable) -> dict[str, str]:
-    """Print test vectors.
-
-    Parameters
-    ----------
-    table : VectorTable
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name: the header, the test, the CSV.
-    """
+    """Print test vectors."""
     sources, numbers = table.sources, numbers_of(table.sources)
     name = sources.function.name
     feedback = () if sources.fixed is None else sources.fixed.residuals

@@ -44,35 +44,17 @@ _VALUES = {
 
 @dataclass(frozen=True)
 class HeaderCommand:
-    """A command that generates C, with the values that its header states.
+    """A command that generates C, with the values that its header states."""
 
-    Parameters
-    ----------
-    text : str
-        The command as the header has it.
-    name : str
-        A key of `COMMANDS`.
-    values : mapping of str to object
-        Values by parameter; those that are not stated have their defaults.
-    """
-
+    #: The command as the header has it
     text: str
+    #: A key of `COMMANDS`
     name: str
+    #: Values by parameter; those that are not stated have their defaults
     values: Mapping[str, Any]
 
     def request(self, algorithms: Iterable[str] = ()) -> Request:
-        """Return the request of a command that generates one function.
-
-        Parameters
-        ----------
-        algorithms : iterable of str
-            Users' algorithms that may run: the command line names them, not the header.
-
-        Raises
-        ------
-        InputError
-            If the command is another one, its options do not go together, or it names another user's algorithm.
-        """
+        """Return the request of a command that generates one function."""
         if self.name != "generate":
             raise InputError(f"'{self.text}' does not generate one function")
         _require_named(self.values["algorithm"], algorithms)
@@ -129,13 +111,7 @@ class HeaderCommand:
 
 
 def read(text: str) -> HeaderCommand:
-    """Read a command as data.
-
-    Raises
-    ------
-    InputError
-        If it is none that generates C, or has an option that does not say what is generated.
-    """
+    """Read a command as data."""
     try:
         words = shlex.split(text)
     except ValueError as error:

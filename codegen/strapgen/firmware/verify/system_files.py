@@ -21,13 +21,7 @@ if TYPE_CHECKING:
 def runner_of_file(
     file: Path, description: Description, algorithms: Iterable[str], run_differing: bool
 ) -> tuple[RunsSamples, Settings | None]:
-    """Return what runs a file as it stands, and the settings that its header states.
-
-    Raises
-    ------
-    InputError
-        If it is no file of the system that is compared, runs at another rate, or differs and may not run.
-    """
+    """Return what runs a file as it stands, and the settings that its header states."""
     from strapgen.firmware.verify import header_command
     from strapgen.firmware.verify.whole_verification import whole_header
     from strapgen.run.generated_files import command_of, text_of

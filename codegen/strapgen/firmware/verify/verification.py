@@ -39,29 +39,19 @@ CALLS, STEPS = 300, 300
 
 @dataclass(frozen=True)
 class Verification:
-    """What a generated file was found to be.
-
-    Parameters
-    ----------
-    file : Path
-    differences : tuple of str
-        What differs from the file that its command generates, a line of text each; empty if nothing does.
-    wrong : int
-        Calls that did not return what the reference returns: the integer model in fixed point.
-    calls : int
-        Calls in all.
-    max_ulp : float or None
-        Largest distance from arithmetic of 40 digits, in units in the last place of the output; None if the file was
-        not run.
-    bound_ulp : float or None
-        The certified bound of that distance; None where there is none.
-    """
+    """What a generated file was found to be."""
 
     file: Path
+    #: What differs from the file that its command generates, a line of text each; empty if nothing does
     differences: tuple[str, ...]
+    #: Calls that did not return what the reference returns: the integer model in fixed point
     wrong: int
+    #: Calls in all
     calls: int
+    #: Largest distance from arithmetic of 40 digits, in units in the last place of the output; None if the file
+    #: was not run
     max_ulp: float | None
+    #: The certified bound of that distance; None where there is none
     bound_ulp: float | None
 
     @property
@@ -83,13 +73,7 @@ class Verification:
 
 
 def paths_of(file: Path) -> tuple[Path, Path]:
-    """Return the header and the source of a generated function, given one of them.
-
-    Raises
-    ------
-    InputError
-        If one is not there, or strapgen did not generate it.
-    """
+    """Return the header and the source of a generated function, given one of them."""
     if file.suffix not in (".c", ".h"):
         raise InputError(f"{file} is no C file; a source or a header that strapgen generated is needed")
     pair = file.with_suffix(".h"), file.with_suffix(".c")
@@ -111,27 +95,8 @@ def verify(
 ) -> Verification:
     """Compare a file with what its command generates; compile and run it if nothing differs.
 
-    Parameters
-    ----------
-    file : Path
-        The source or the header of a generated function.
-    request : Request
-        What the command in its header asks for.
-    increments : array, (N, elements), optional
-        Increments of a run in rad, for a step; by default a cone near the largest increments.
-    run_differing : bool, optional
-        Whether a file that differs is compiled and run too, with all that was written into it.
-
-    Returns
-    -------
-    Verification
-
-    Raises
-    ------
-    CompilerError
-        If a file in step does not compile.
-    InputError
-        If the file is not the one that its command generates, or the run leaves its range.
+    `increments` (N, elements): increments of a run in rad, for a step; by default a cone near the largest
+    increments.
     """
     sources, here = _read(file, request)
     differences = tuple(_differences(file.parent, here, sources))
@@ -152,13 +117,7 @@ def verify(
 
 
 def file_backend(file: Path, request: Request, *, run_differing: bool = False) -> Backend:
-    """Return a file as a back end; parameters and errors are those of `verify`.
-
-    Raises
-    ------
-    InputError
-        If the file is no attitude step, or differs from what its command generates and may not run then.
-    """
+    """Return a file as a back end; parameters and errors are those of `verify`."""
     sources, here = _read(file, request)
     if sources.companions is None:
         raise InputError(f"{file} is the kernel {sources.kernel}, which is no attitude step")
@@ -208,16 +167,7 @@ def _differences(folder: Path, here: dict[str, str], sources: Sources) -> Iterat
 
 
 def differing_lines(path: Path, text: str, new: str, reason: str) -> Iterator[str]:
-    """Yield the lines of a file that differ from the generated ones.
-
-    Parameters
-    ----------
-    path : Path
-    text, new : str
-        The file as it stands, and as it is generated.
-    reason : str
-        Why they may differ.
-    """
+    """Yield the lines of a file that differ from the generated ones."""
     lines = text.splitlines(), new.splitlines()
     for kind, a, b, c, d in difflib.SequenceMatcher(None, *lines, autojunk=False).get_opcodes():
         if kind == "equal":

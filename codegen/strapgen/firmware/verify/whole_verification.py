@@ -20,23 +20,15 @@ _VERSION = re.compile(r'_VERSION "(.*)"')
 
 @dataclass(frozen=True)
 class WholeVerification:
-    """What the generated files of a whole were found to be.
+    """What the generated files of a whole were found to be."""
 
-    Parameters
-    ----------
-    header : Path
-        Header of the whole.
-    files : int
-        Number of files that were compared.
-    differences : tuple of str
-        What differs from generated files, a line of text each; empty if nothing does.
-    stages : tuple of Verification
-        The function of each stage, held to its contract.
-    """
-
+    #: Header of the whole
     header: Path
+    #: Number of files that were compared
     files: int
+    #: What differs from generated files, a line of text each; empty if nothing does
     differences: tuple[str, ...]
+    #: The function of each stage, held to its contract
     stages: tuple[Verification, ...]
 
     @property
@@ -46,13 +38,7 @@ class WholeVerification:
 
 
 def whole_header(place: Path) -> Path | None:
-    """Return the header of a whole: in a folder, or the named file; None for a file of another kind.
-
-    Raises
-    ------
-    InputError
-        If a folder holds none, or several.
-    """
+    """Return the header of a whole: in a folder, or the named file; None for a file of another kind."""
     if not place.is_dir():
         header = place.with_suffix(".h")
         return header if place.suffix in (".c", ".h") and _is_whole(header) else None
@@ -76,28 +62,7 @@ def _is_whole(header: Path) -> bool:
 def verify_whole(
     header: Path, sources: Sources, stages: Mapping[str, Request], *, run_differing: bool = False
 ) -> WholeVerification:
-    """Compare the files of a whole with generated ones, and hold its stages to their contracts.
-
-    Parameters
-    ----------
-    header : Path
-        Header of the whole.
-    sources : Sources
-        What its command generates.
-    stages : mapping of str to Request
-        What generates each stage, by the name of its header.
-    run_differing : bool, optional
-        Whether stages that differ are compiled and run too.
-
-    Returns
-    -------
-    WholeVerification
-
-    Raises
-    ------
-    CompilerError
-        If a stage in step does not compile.
-    """
+    """Compare the files of a whole with generated ones, and hold its stages to their contracts."""
     folder, generated = header.parent, sources.step_files
     here = _present(header, sources)
     expected = [*generated, *(present_runs(folder, sources))]
@@ -112,20 +77,7 @@ def verify_whole(
 
 
 def sources_of_files(header: Path, sources: Sources, *, run_differing: bool = False) -> Sources:
-    """Return the sources of a whole with the text of its files, which must be what their command generates.
-
-    Parameters
-    ----------
-    header, sources
-        As for `verify_whole`.
-    run_differing : bool, optional
-        Whether files that differ may run.
-
-    Raises
-    ------
-    InputError
-        If they differ and may not run then.
-    """
+    """Return the sources of a whole with the text of its files, which must be what their command generates."""
     here = _present(header, sources)
     expected = [*sources.step_files, *(present_runs(header.parent, sources))]
     difference = next(_differences(header, sources, here, expected), None)

@@ -38,17 +38,12 @@ _SMALL_ANGLE = 1 / 32
 
 @dataclass(frozen=True)
 class AngleHistory:
-    """The angle of a back end from the reference along a run.
+    """The angle of a back end from the reference along a run."""
 
-    Parameters
-    ----------
-    angles_rad : array, (1 + N,)
-        The angle after every step in rad, the first one before the run.
-    bounds_rad : tuple of (int, float)
-        Numbers of steps, and the certified bound of the angle after as many; empty where no useful bound is known.
-    """
-
+    #: (1 + N,): the angle after every step in rad, the first one before the run
     angles_rad: Array
+    #: Numbers of steps, and the certified bound of the angle after as many; empty where no useful bound is
+    #: known
     bounds_rad: tuple[tuple[int, float], ...]
 
 
@@ -244,17 +239,7 @@ def certified_angle(candidate: Backend, increments: Array, reference: Array) -> 
     angle of at most a, it changes their length by no more than a factor exp(a/2), and the drift vector is at most
     a s^4 exp(a).
 
-    Parameters
-    ----------
-    candidate : Backend
-    increments : array, (N, K, 3)
-    reference : array, (1 + N, state shape)
-        States of the exact run.
-
-    Returns
-    -------
-    float or None
-        In rad; None in floating point, and where no useful bound is known.
+    `increments` has shape (N, K, 3). `reference` (1 + N, state shape): states of the exact run.
     """
     return _angle_bound(candidate, increments, reference)(len(increments))
 

@@ -29,26 +29,6 @@ def comparison_image(kernels: Sequence[ComparedKernel], reference: str, path: st
     """Return the angle of back ends from a reference over time: a panel a kernel, a line a back end.
 
     Dotted, in the colour of its line, is the certified bound after as many steps.
-
-    Parameters
-    ----------
-    kernels : sequence of ComparedKernel
-    reference : str
-        What the angles are measured from.
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
     """
     columns = min(2, len(kernels))
     rows = -(-len(kernels) // columns)

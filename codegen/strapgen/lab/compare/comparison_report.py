@@ -30,22 +30,14 @@ _HEADERS = (
 
 @dataclass(frozen=True)
 class ComparedKernel:
-    """The back ends of one kernel, compared.
-
-    Parameters
-    ----------
-    kernel : str
-    title : str
-        The kernel and its run in words.
-    rows : sequence of Comparison
-        One for every back end.
-    step_s : float, optional
-        Length of a step in s, which a plot needs.
-    """
+    """The back ends of one kernel, compared."""
 
     kernel: str
+    #: The kernel and its run in words
     title: str
+    #: One for every back end
     rows: Sequence[Comparison]
+    #: Length of a step in s, which a plot needs
     step_s: float = 1.0
 
 
@@ -74,17 +66,7 @@ def _table(kernels: Sequence[ComparedKernel]) -> TextTable:
 
 
 def comparison_text(rows: Sequence[Comparison], title: str, reference: str, drift: str) -> str:
-    """Return comparisons as text: a row for every back end.
-
-    Parameters
-    ----------
-    rows : sequence of Comparison
-    title : str
-    reference : str
-        What the angles are measured from.
-    drift : str
-        What the drift is, as in "mean drift".
-    """
+    """Return comparisons as text: a row for every back end."""
     lines = [
         title,
         f"angle from {reference} in rad, difference of the state in units of the last place;",

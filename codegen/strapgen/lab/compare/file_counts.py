@@ -14,13 +14,7 @@ if TYPE_CHECKING:
 
 
 def counted(settings: Settings | None, files: Mapping[Path, Settings | None]) -> Settings | None:
-    """Return settings with the gyro whose counts the files take: all back ends then run on its counts.
-
-    Raises
-    ------
-    InputError
-        If the files, or the options of the command, state different gyros.
-    """
+    """Return settings with the gyro whose counts the files take: all back ends then run on its counts."""
     from strapgen.ir.fixed_settings import Settings
 
     gyros = {} if settings is None or settings.sensor is None else {settings.sensor: "the command"}

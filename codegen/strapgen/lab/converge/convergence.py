@@ -39,23 +39,15 @@ MOST_ERROR = 0.3
 
 @dataclass(frozen=True)
 class Rung:
-    """One step length of a ladder.
+    """One step length of a ladder."""
 
-    Parameters
-    ----------
-    step_s : float
-        Step in s.
-    error_rad : float or None
-        Largest error over the run; None where the run left the range of the back end's numbers.
-    slope : float or None
-        Slope between the previous rung and this one.
-    used : bool
-        Whether the observed order is fitted to it.
-    """
-
+    #: Step in s
     step_s: float
+    #: Largest error over the run; None where the run left the range of the back end's numbers
     error_rad: float | None
+    #: Slope between the previous rung and this one
     slope: float | None = None
+    #: Whether the observed order is fitted to it
     used: bool = False
 
 
@@ -129,27 +121,17 @@ class Convergence:
 
 @dataclass(frozen=True)
 class LadderCase:
-    """What a process needs to measure the order of an algorithm.
-
-    Parameters
-    ----------
-    choice : Choice
-    backend : str
-    motion : str
-        Name of a motion, or the file of one.
-    settings : dict of str to str
-        Its parameters.
-    steps : tuple of str
-        Steps in s.
-    duration : str
-        In s.
-    """
+    """What a process needs to measure the order of an algorithm."""
 
     choice: Choice
     backend: str
+    #: Name of a motion, or the file of one
     motion: str
+    #: Its parameters
     settings: Mapping[str, Any]
+    #: Steps in s
     steps: tuple[str, ...]
+    #: In s
     duration: str
 
     def moved(self, begin: Path, end: Path) -> LadderCase:
@@ -167,14 +149,7 @@ def measured(case: LadderCase) -> Convergence:
 def converge_all(
     cases: Sequence[LadderCase], jobs: int | None = None, cluster: Cluster | None = None
 ) -> Iterator[tuple[int, Convergence]]:
-    """Measure several algorithms side by side, and yield the place of each with its outcome when it is there.
-
-    Parameters
-    ----------
-    cases : sequence of LadderCase
-    jobs, cluster
-        As for `resumable.side_by_side`.
-    """
+    """Measure several algorithms side by side, and yield the place of each with its outcome when it is there."""
     files = None if cluster is None else Bundle.of({case.motion for case in cases if is_file(case.motion)})
     numbered = {str(place): case for place, case in enumerate(cases)}
     for name, outcome in side_by_side(measured, numbered, jobs, cluster, files):
@@ -251,8 +226,6 @@ def converge(
 def labels(outcomes: Sequence[Convergence]) -> list[str]:
     """Return a name for every outcome: that of its kernel, with options or a back end where the kernel has several.
 
-    Examples
-    --------
     >>> by_rk1, by_rk4 = (Convergence("mine", "exact", None, (), None, f"mine.py --method {m}") for m in ("rk1", "rk4"))
     >>> labels([by_rk1, by_rk4])
     ['mine, mine.py --method rk1', 'mine, mine.py --method rk4']
@@ -271,18 +244,8 @@ def fitted(
 ) -> Convergence:
     """Fit the slope to the finest rungs that show truncation.
 
-    Parameters
-    ----------
-    kernel, backend : str
-        Names of what was measured.
-    order : Order or None
-        Orders in theory.
-    rungs : sequence of (float, float or None, bool)
-        Step in s, error in rad, and whether the error shows truncation; from the longest step to the shortest.
-
-    Returns
-    -------
-    Convergence
+    `rungs`: step in s, error in rad, and whether the error shows truncation; from the longest step to the
+    shortest.
     """
     chosen = [k for k, (_, _, shows) in enumerate(rungs) if shows][-FITTED:]
     slopes: list[float | None] = [None]

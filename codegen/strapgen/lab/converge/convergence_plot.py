@@ -16,27 +16,7 @@ if TYPE_CHECKING:
 
 
 def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | Path) -> bytes:
-    """Return error against step, a line an algorithm, beside a line of the slope that theory says.
-
-    Parameters
-    ----------
-    outcomes : sequence of Convergence
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return error against step, a line an algorithm, beside a line of the slope that theory says."""
     figure, grid = figures.grid_of_axes(1, 1, (9.5, 5.6))
     axes = grid[0, 0]
     colours = figures.colours(len(outcomes), figures.LIGHTEST)

@@ -67,46 +67,20 @@ START = "start.c"
 
 
 def start_text(processor: Processor) -> str:
-    """Return C text with what a processor starts from, which calls ``start()``; ``stop()`` ends the emulator.
-
-    Parameters
-    ----------
-    processor : Processor
-        With an emulator.
-
-    Returns
-    -------
-    str
-    """
+    """Return C text with what a processor starts from, which calls ``start()``; ``stop()`` ends the emulator."""
     address, word = processor.stop
     start = _VECTORS if processor.start == "vectors" else _ENTRY
     return _START.format(start=start, address=address, word=word)
 
 
 def write_start(processor: Processor, folder: Path, rest: str, name: str = START) -> None:
-    """Write a source with `start_text`, and the layout of the memory beside it.
-
-    Parameters
-    ----------
-    processor : Processor
-    folder : Path
-    rest : str
-        C text that follows, with the function ``start``.
-    name : str, optional
-        Name of the source.
-    """
+    """Write a source with `start_text`, and the layout of the memory beside it."""
     (folder / name).write_text(start_text(processor) + rest)
     (folder / "layout.ld").write_text(_LAYOUT.format(code=processor.code, data=processor.data))
 
 
 def compiled(command: Sequence[str], folder: Path) -> None:
-    """Let a compiler run in a folder.
-
-    Raises
-    ------
-    CompilerError
-        If it fails.
-    """
+    """Let a compiler run in a folder."""
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise CompilerError(f"{command[0]} failed: {_first_error(done.stderr)}")

@@ -21,20 +21,6 @@ def code_size(sources: Sources) -> int | None:
     """Return the size in bytes of the code and constants of a compiled C source; None if it cannot be determined.
 
     The cache keeps it: to measure it takes a compilation of its own.
-
-    Parameters
-    ----------
-    sources : Sources
-        Sources of any target; those of Python have no object code.
-
-    Returns
-    -------
-    int or None
-
-    Raises
-    ------
-    CompilerError
-        If there is no C compiler.
     """
     if not any(name.endswith(".c") for name in sources.files):
         return None

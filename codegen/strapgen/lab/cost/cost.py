@@ -32,50 +32,27 @@ _PART = 3
 
 @dataclass(frozen=True)
 class Cost:
-    """What a kernel costs on a processor.
-
-    Parameters
-    ----------
-    kernel, cpu : str
-    instructions : int
-        Instructions of the object code.
-    executed : int or None
-        Instructions from the entry of the function to its return, for input inside its range; None without emulator.
-    multiplications : int
-        Those of the instructions that multiply.
-    code_bytes, constant_bytes : int
-    stack_bytes : int
-        Stack of the function and of the deepest of the file's own functions that it calls, in bytes.
-    compiler : str
-        Compiler and version.
-    """
+    """What a kernel costs on a processor."""
 
     kernel: str
     cpu: str
+    #: Instructions of the object code
     instructions: int
+    #: Instructions from the entry of the function to its return, for input inside its range; None without
+    #: emulator
     executed: int | None
+    #: Those of the instructions that multiply
     multiplications: int
     code_bytes: int
     constant_bytes: int
+    #: Stack of the function and of the deepest of the file's own functions that it calls, in bytes
     stack_bytes: int
+    #: Compiler and version
     compiler: str
 
 
 def processors(cross: str | None = None, cpus: Sequence[str] = ()) -> list[str]:
-    """Return the names of the processors that are asked for, or of all whose compiler is installed.
-
-    Parameters
-    ----------
-    cross : str, optional
-        A cross compiler; by default all.
-    cpus : sequence of str, optional
-        Names from `PROCESSORS`; by default all.
-
-    Raises
-    ------
-    InputError
-        If a processor is not known, another compiler compiles for it, or its compiler is not installed.
-    """
+    """Return the names of the processors that are asked for, or of all whose compiler is installed."""
     for cpu in cpus:
         checks.choice("cpu", cpu, PROCESSORS)
     if cross is not None:
@@ -92,26 +69,7 @@ def processors(cross: str | None = None, cpus: Sequence[str] = ()) -> list[str]:
 
 
 def cost(sources: Sources, cpu: str) -> Cost:
-    """Compile the files of a step for a processor and measure them.
-
-    Parameters
-    ----------
-    sources : Sources
-        Of a target in C.
-    cpu : str
-        A key of `PROCESSORS`.
-
-    Returns
-    -------
-    Cost
-
-    Raises
-    ------
-    InputError
-        If the sources are not in C.
-    CompilerError
-        If the cross compiler or the emulator fails.
-    """
+    """Compile the files of a step for a processor and measure them."""
     if not TARGETS[sources.target].compiled:
         raise InputError(f"sources for {sources.target} are not in C, which cost measures")
     processor = PROCESSORS[cpu]
@@ -142,17 +100,7 @@ def cost(sources: Sources, cpu: str) -> Cost:
 
 
 def catalogue_costs(cpus: Sequence[str]) -> Iterator[Cost]:
-    """Measure the standard catalogue in 32-bit fixed point, as it stands in ``generated/c_fixed``.
-
-    Parameters
-    ----------
-    cpus : sequence of str
-        Keys of `PROCESSORS`: `REFERENCE` for all kernels, any other for those of `EVERYWHERE`.
-
-    Yields
-    ------
-    Cost
-    """
+    """Measure the standard catalogue in 32-bit fixed point, as it stands in ``generated/c_fixed``."""
     for cpu in sorted(cpus, key=lambda name: name != REFERENCE):
         for choice in catalogue.standard():
             if cpu != REFERENCE and choice.kernel not in EVERYWHERE:

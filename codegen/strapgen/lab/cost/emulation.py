@@ -35,32 +35,7 @@ __attribute__((noinline, used)) void start(void)
 def executed(
     processor: Processor, flags: Sequence[str], binary: Path, function: str, declarations: str, call: str
 ) -> int | None:
-    """Return the number of instructions from the entry of a function to its return.
-
-    Parameters
-    ----------
-    processor : Processor
-    flags : sequence of str
-        Flags of the compiler, beside those of the processor.
-    binary : Path
-        The object code of the function; the headers of its source lie beside it.
-    function : str
-        Its name.
-    declarations : str
-        C text with what the call needs: the header, and arrays for arguments.
-    call : str
-        The call as a statement in C, which calls ``refuse()`` if the function returns an error.
-
-    Returns
-    -------
-    int or None
-        None if the processor has no emulator here.
-
-    Raises
-    ------
-    CompilerError
-        If the program cannot be linked, does not come back from the call, or comes back with an error.
-    """
+    """Return the number of instructions from the entry of a function to its return."""
     if not processor.emulator or shutil.which(processor.emulator[0]) is None:
         return None
     folder = binary.parent

@@ -8,30 +8,20 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor, and the programs that compile for it and run its code.
+    """A processor, and the programs that compile for it and run its code."""
 
-    Parameters
-    ----------
-    compiler : str
-        Cross compiler, of the family of gcc.
-    flags : tuple of str
-        Flags that choose the processor.
-    emulator : tuple of str
-        QEMU with a machine of this processor; empty if it has none.
-    code, data : int
-        Addresses of the machine's memory for code, from which it starts, and for data.
-    start : str
-        "vectors" if it starts from a table of vectors, "code" if at the first instruction.
-    stop : tuple of int
-        An address and a word: writing it there ends the emulator.
-    """
-
+    #: Cross compiler, of the family of gcc
     compiler: str
+    #: Flags that choose the processor
     flags: tuple[str, ...]
+    #: QEMU with a machine of this processor; empty if it has none
     emulator: tuple[str, ...] = ()
+    #: Addresses of the machine's memory for code, from which it starts, and for data
     code: int = 0
     data: int = 0
+    #: "vectors" if it starts from a table of vectors, "code" if at the first instruction
     start: Literal["vectors", "code"] = "vectors"
+    #: An address and a word: writing it there ends the emulator
     stop: tuple[int, int] = (0, 0)
 
     def tool(self, name: str) -> str:

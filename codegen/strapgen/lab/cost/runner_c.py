@@ -25,17 +25,11 @@ UNTOUCHED = 21845
 
 @dataclass(frozen=True)
 class CallRun:
-    """A run of a function on a processor.
+    """A run of a function on a processor."""
 
-    Parameters
-    ----------
-    sources : Sources
-        The function in C, in words of at most 32 bits.
-    rows : tuple of tuple of int
-        A motion: the elements of all inputs, call by call.
-    """
-
+    #: The function in C, in words of at most 32 bits
     sources: Sources
+    #: A motion: the elements of all inputs, call by call
     rows: tuple[tuple[int, ...], ...]
 
     @property
@@ -66,17 +60,7 @@ class CallRun:
 
 
 def run_files(run: CallRun) -> dict[str, str]:
-    """Print the program of a run.
-
-    Parameters
-    ----------
-    run : CallRun
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name: ``run_<name>.c``, and ``runner.h``, which is the same for every run.
-    """
+    """Print the program of a run."""
     sources, numbers = run.sources, numbers_of(run.sources)
     assert sources.fixed is not None
     name, function = sources.function.name, sources.function
@@ -113,23 +97,15 @@ def run_files(run: CallRun) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class LongRun:
-    """Many steps of an attitude on a processor.
+    """Many steps of an attitude on a processor."""
 
-    Parameters
-    ----------
-    sources : Sources
-        A step from increments, in words of at most 32 bits.
-    rows : tuple of tuple of int
-        A motion: the increments of every step of a pass, in units of the last place.
-    passes : int
-        How many times the motion is taken, one pass after the other.
-    noise : int
-        Largest change of an increment, drawn anew in every step.
-    """
-
+    #: A step from increments, in words of at most 32 bits
     sources: Sources
+    #: A motion: the increments of every step of a pass, in units of the last place
     rows: tuple[tuple[int, ...], ...]
+    #: How many times the motion is taken, one pass after the other
     passes: int
+    #: Largest change of an increment, drawn anew in every step
     noise: int
 
     @property
@@ -142,17 +118,7 @@ class LongRun:
 
 
 def long_run_files(run: LongRun) -> dict[str, str]:
-    """Print a program that takes many steps of an attitude and reports the state again and again.
-
-    Parameters
-    ----------
-    run : LongRun
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name: ``long_run_<name>.c`` and ``runner.h``.
-    """
+    """Print a program that takes many steps of an attitude and reports the state again and again."""
     sources = run.sources
     assert sources.fixed is not None
     numbers, name = numbers_of(sources), sources.function.name

@@ -38,26 +38,17 @@ __attribute__((noinline, used)) void start(void)
 
 @dataclass(frozen=True)
 class Runner:
-    """A processor on which a program with `main` can be run.
-
-    Parameters
-    ----------
-    name : str
-    compiler : tuple of str
-        The cross compiler and what chooses the processor.
-    emulator : tuple of str
-        The emulator and its options; the program follows.
-    tool, package : str
-        Name of the emulator, and Debian's packages that bring compiler and emulator.
-    bare : Processor or None
-        The processor without an operating system or library; None where the compiler brings both.
-    """
+    """A processor on which a program with `main` can be run."""
 
     name: str
+    #: The cross compiler and what chooses the processor
     compiler: tuple[str, ...]
+    #: The emulator and its options; the program follows
     emulator: tuple[str, ...]
+    #: Name of the emulator, and Debian's packages that bring compiler and emulator
     tool: str
     package: str
+    #: The processor without an operating system or library; None where the compiler brings both
     bare: Processor | None = None
 
     @property
@@ -70,24 +61,7 @@ class Runner:
         return f"{_version(self.emulator[0])}, {self.compiler[0]} {_version(self.compiler[0])}".strip(", ")
 
     def run(self, folder: Path, sources: Sequence[str]) -> str:
-        """Compile a program, run it and return what it reports.
-
-        Parameters
-        ----------
-        folder : Path
-            An empty folder for the program, and for ``run.sh``, which compiles and runs it again.
-        sources : sequence of str
-            The C files, one with `main`, as they are reached from the folder.
-
-        Returns
-        -------
-        str
-
-        Raises
-        ------
-        CompilerError
-            If it cannot be compiled, or does not end.
-        """
+        """Compile a program, run it and return what it reports."""
         flags, parts = list(_FLAGS), list(sources)
         if self.bare is not None:
             bare_metal.write_start(self.bare, folder, _BEGIN)

@@ -47,62 +47,39 @@ class SteadyAlgorithm(Protocol):
 
 @dataclass(frozen=True)
 class Errors:
-    """What a gyro adds to its increments, and the turn in which it does.
+    """What a gyro adds to its increments, and the turn in which it does."""
 
-    Parameters
-    ----------
-    pulse : float
-        Angle of a pulse in rad. The errors of the angles of two samples have nothing to do with each other.
-    noise : float
-        Standard deviation of each increment in rad.
-    turn : float
-        Angle in rad by which the body turns about z from sample to sample.
-    """
-
+    #: Angle of a pulse in rad. The errors of the angles of two samples have nothing to do with each other
     pulse: float
+    #: Standard deviation of each increment in rad
     noise: float
+    #: Angle in rad by which the body turns about z from sample to sample
     turn: float
 
 
 @dataclass(frozen=True)
 class SteadyRuns:
-    """Some runs of an algorithm in a steady turn, with random errors of their own.
+    """Some runs of an algorithm in a steady turn, with random errors of their own."""
 
-    Parameters
-    ----------
-    algorithm : Choice or SteadyAlgorithm
-        An attitude step.
-    errors : Errors
-    steps : int
-        Steps of each run.
-    runs : int
-        Number of runs.
-    seed : tuple of int
-        Where the random numbers begin.
-    backend : str
-        A key of `strapgen.run.backends.BACKENDS`.
-    """
-
+    #: An attitude step
     algorithm: Any
     errors: Errors
+    #: Steps of each run
     steps: int
+    #: Number of runs
     runs: int
+    #: Where the random numbers begin
     seed: tuple[int, ...] = (0,)
+    #: A key of `strapgen.run.backends.BACKENDS`
     backend: str = "numpy"
 
 
 @dataclass(frozen=True)
 class MeanSquare:
-    """The mean square of the angle at the end of random runs, in rad^2.
-
-    Parameters
-    ----------
-    runs : int
-    total, squares : float
-        Sum of the squared angles, and of their squares.
-    """
+    """The mean square of the angle at the end of random runs, in rad^2."""
 
     runs: int = 0
+    #: Sum of the squared angles, and of their squares
     total: float = 0.0
     squares: float = 0.0
 
@@ -110,8 +87,6 @@ class MeanSquare:
     def of(cls, parts: Iterable[MeanSquare]) -> MeanSquare:
         """Return the mean square of several parts together, whose order changes nothing.
 
-        Examples
-        --------
         >>> MeanSquare.of([MeanSquare(1, 0.1, 0.01), MeanSquare(1, 0.3, 0.09)]).mean
         0.2
         """
@@ -127,8 +102,6 @@ class MeanSquare:
     def interval(self) -> tuple[float, float]:
         """Return the 95 % interval of the mean, from the spread of the runs.
 
-        Examples
-        --------
         >>> low, high = MeanSquare(10_000, 10_000.0, 20_000.0).interval()
         >>> round(low, 4), round(high, 4)
         (0.9804, 1.0196)
@@ -139,15 +112,7 @@ class MeanSquare:
 
 
 def predicted(choice: Choice, errors: Errors, steps: int) -> float:
-    """Return the mean square of the angle after some steps in rad^2, from the closed forms.
-
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step.
-    errors : Errors
-    steps : int
-    """
+    """Return the mean square of the angle after some steps in rad^2, from the closed forms."""
     count = choice.increments_per_step
     total = _AXES * errors.noise**2 * steps * count
     if errors.pulse:
@@ -159,8 +124,6 @@ def predicted(choice: Choice, errors: Errors, steps: int) -> float:
 def cases(runs: SteadyRuns) -> dict[str, SteadyRuns]:
     """Return runs in parts of at most some hundred, by their names.
 
-    Examples
-    --------
     >>> [part.runs for part in cases(SteadyRuns(Choice("euler", "rk4", 2), Errors(0, 1e-6, 0), 10, 600)).values()]
     [250, 250, 100]
     """
@@ -179,20 +142,7 @@ def random_runs(
     jobs: int | None = None,
     cluster: Cluster | None = None,
 ) -> Iterator[MeanSquare]:
-    """Run, and yield the mean square of each part when it is there.
-
-    Parameters
-    ----------
-    runs : SteadyRuns
-    results : path, optional
-        File that keeps what is done: the study goes on from there.
-    jobs, cluster
-        As for `resumable.side_by_side`.
-
-    Yields
-    ------
-    MeanSquare
-    """
+    """Run, and yield the mean square of each part when it is there."""
     parts = cases(runs)
     if results is None:
         finished = side_by_side(mean_square, parts, jobs, cluster)

@@ -15,28 +15,18 @@ _HOUR = 3600
 
 @dataclass(frozen=True)
 class RandomStudy:
-    """The outcome of many runs.
-
-    Parameters
-    ----------
-    runs : SteadyRuns
-    outcome : MeanSquare
-        The squared angle at the end of the runs.
-    predicted : float
-        Its mean by the closed forms, in rad^2.
-    sample_hz : float
-        Sampling rate in Hz.
-    seconds : float or None
-        What the runs took; None if results of an earlier call are among them.
-    whole : int
-        Runs of a sweep for which the time is extrapolated.
-    """
+    """The outcome of many runs."""
 
     runs: SteadyRuns
+    #: The squared angle at the end of the runs
     outcome: MeanSquare
+    #: Its mean by the closed forms, in rad^2
     predicted: float
+    #: Sampling rate in Hz
     sample_hz: float
+    #: What the runs took; None if results of an earlier call are among them
     seconds: float | None
+    #: Runs of a sweep for which the time is extrapolated
     whole: int
 
     @property
@@ -74,12 +64,7 @@ class RandomStudy:
 
 
 def random_report(study: RandomStudy) -> Report:
-    """Return the drift of many runs as a report.
-
-    Parameters
-    ----------
-    study : RandomStudy
-    """
+    """Return the drift of many runs as a report."""
     return Report(lambda: _text(study), study.as_dict, lambda: _table(study))
 
 

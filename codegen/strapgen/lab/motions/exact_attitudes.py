@@ -30,13 +30,7 @@ _DOUBLE = 8 * 2.0**-52
 
 
 def step_of_increments(choice: Choice) -> Kernel:
-    """Return the kernel of a chosen attitude step.
-
-    Raises
-    ------
-    InputError, InputTypeError
-        If the step takes no increments, or `choice` is no choice.
-    """
+    """Return the kernel of a chosen attitude step."""
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
@@ -50,24 +44,8 @@ def exact_attitudes(
 ) -> Callable[[Fraction, int], Iterator[tuple[list[Any], list[Any]]]]:
     """Return a function that runs a step on a motion in many digits.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that takes increments.
-    motion : Motion
-        One of the catalogue in closed form, or of a user. A rate expression is integrated in 50 digits; what functions
-        of a file return has those of double, see `uncertainty`.
-
-    Returns
-    -------
-    callable
-        ``run(step, count)`` yields the computed and the true matrix, row by row, at time 0 and after every step. The
-        caller sets the precision of mpmath to `exact.DIGITS`.
-
-    Raises
-    ------
-    InputError
-        If the attitude of the motion has no closed form.
+    Returns: ``run(step, count)`` yields the computed and the true matrix, row by row, at time 0 and after every
+    step. The caller sets the precision of mpmath to `exact.DIGITS`.
     """
     backend = attitude_backend(choice, backend="exact")
     steps_of, truth = _in_digits(motion, backend)
@@ -87,13 +65,7 @@ def has_digits(motion: Motion) -> bool:
 def uncertainty(motion: Motion, length: Fraction, count: int) -> float:
     """Return the error in rad that a run of `exact_attitudes` may have from increments, attitude and rounding.
 
-    Parameters
-    ----------
-    motion : Motion
-    length : Fraction
-        Step in s.
-    count : int
-        Number of steps.
+    `length`: step in s.
     """
     rounding = 10.0 ** (10 - DIGITS)
     if isinstance(motion, UsersMotion):

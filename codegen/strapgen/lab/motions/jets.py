@@ -27,30 +27,16 @@ class UnboundedError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Jet:
-    """A Taylor polynomial.
+    """A Taylor polynomial."""
 
-    Parameters
-    ----------
-    value : mpf or mpi
-        The value itself, or all values over the interval.
-    coefficients : list
-        Taylor coefficients, or bounds of their magnitudes over the interval.
-    """
-
+    #: The value itself, or all values over the interval
     value: Any
+    #: Taylor coefficients, or bounds of their magnitudes over the interval
     coefficients: list[Any]
 
 
 class Jets:
-    """Arithmetic of Taylor polynomials.
-
-    Parameters
-    ----------
-    order : int
-        Their degree.
-    bounds : bool
-        Whether coefficients are bounds over an interval.
-    """
+    """Arithmetic of Taylor polynomials."""
 
     def __init__(self, order: int, bounds: bool) -> None:
         self.order, self.bounds = order, bounds

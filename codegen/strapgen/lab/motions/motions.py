@@ -48,22 +48,6 @@ _ENDINGS = {
 def keys(name: str) -> dict[str, dict[str, float]]:
     """Return, for every parameter of a motion, the keys that set it and the factor of each to SI units.
 
-    Parameters
-    ----------
-    name : str
-        Name of the motion.
-
-    Returns
-    -------
-    dict of str to dict of str to float
-
-    Raises
-    ------
-    InputError
-        If the motion is unknown.
-
-    Examples
-    --------
     >>> sorted(keys("sinusoidal")["b"])
     ['b_deg_s', 'b_rad_s']
     """
@@ -191,12 +175,7 @@ class Motion:
 class IntegratedMotion(Motion):
     """A motion whose increments are exact, and whose attitude is integrated.
 
-    Parameters
-    ----------
-    name : str
-        A key of `PROFILES`.
-    parameters : dict of str to float
-        Its parameters in SI units.
+    `parameters`: its parameters in SI units.
     """
 
     @cached_property

@@ -21,21 +21,7 @@ _ALLOWED = f"exact numbers, t, + - * /, whole powers, sqrt, {', '.join(FUNCTIONS
 def rate_of(name: str, function: Any) -> tuple[Any, ...]:
     """Return the three expressions that a user's function returns, as functions of one symbol.
 
-    Parameters
-    ----------
-    name : str
-        The file, for error messages.
-    function : callable
-        ``function(t)`` takes a symbol of SymPy and returns three expressions in it, in rad/s.
-
-    Returns
-    -------
-    tuple of Expr
-
-    Raises
-    ------
-    InputError
-        If it returns anything else.
+    `function`: ``function(t)`` takes a symbol of SymPy and returns three expressions in it, in rad/s.
     """
     import sympy as sp
 
@@ -70,13 +56,7 @@ def time_symbol() -> Any:
 
 
 def operations_of(name: str, rate: Sequence[Any]) -> tuple[list[Operation], list[int]]:
-    """Return the operations that evaluate expressions, and the numbers of those that are the results.
-
-    Raises
-    ------
-    InputError
-        If an expression holds something else than is allowed, or too much.
-    """
+    """Return the operations that evaluate expressions, and the numbers of those that are the results."""
     writer = _OperationWriter(name)
     return writer.operations, [writer.place(element) for element in rate]
 

@@ -34,34 +34,23 @@ MOST_PIECES = 50_000
 
 @dataclass(frozen=True)
 class Piece:
-    """An interval of time with the Taylor coefficients of what is integrated over it.
+    """An interval of time with the Taylor coefficients of what is integrated over it."""
 
-    Parameters
-    ----------
-    middle, half : mpf
-        Middle and half the length, in s.
-    rate : list of list of mpf
-        For each axis the Taylor coefficients of the rate about the middle.
-    angle : list of mpf
-        Integral of the rate from time 0 to the middle, in rad.
-    transition : list of list of list of mpf
-        For each element the Taylor coefficients of the attitude about the middle, from no rotation there.
-    attitude : list of list of mpf
-        Attitude at the middle.
-    angle_error, error : float
-        Bounds of the errors in rad of the integral and of the attitude, at both ends and between them.
-    may_grow : bool
-        Whether a piece of twice the length is likely to do.
-    """
-
+    #: Middle and half the length, in s
     middle: Any
     half: Any
+    #: For each axis the Taylor coefficients of the rate about the middle
     rate: list[list[Any]]
+    #: Integral of the rate from time 0 to the middle, in rad
     angle: list[Any]
+    #: For each element the Taylor coefficients of the attitude about the middle, from no rotation there
     transition: list[list[list[Any]]]
+    #: Attitude at the middle
     attitude: list[list[Any]]
+    #: Bounds of the errors in rad of the integral and of the attitude, at both ends and between them
     angle_error: float
     error: float
+    #: Whether a piece of twice the length is likely to do
     may_grow: bool
 
     def angle_at(self, time: Any) -> list[Any]:
@@ -85,13 +74,7 @@ class Piece:
 class Integrated:
     """The integral of a rate, and the attitude, from time 0 as far as they are needed, forwards and backwards.
 
-    Parameters
-    ----------
-    name : str
-        Of the motion, for error messages.
-    operations : list of Operation
-    places : list of int
-        The operations that are the three elements of the rate in rad/s.
+    `places`: the operations that are the three elements of the rate in rad/s.
     """
 
     def __init__(self, name: str, operations: list[Operation], places: list[int]) -> None:

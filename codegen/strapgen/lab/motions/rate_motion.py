@@ -25,23 +25,13 @@ Array = NDArray[np.float64]
 class RateMotion(Motion):
     """A motion of a rate expression.
 
-    Parameters
-    ----------
-    name : str
-        The file as it was named.
-    parameters : dict
-        Empty: the expressions have their numbers.
-    elements : tuple of Expr
-        The body rate in rad/s as expressions of `expressions.time_symbol`.
-
-    Examples
-    --------
     >>> from strapgen.lab.motions.rate_expressions import time_symbol
     >>> turn = RateMotion("turn", {}, (0 * time_symbol(), 0 * time_symbol(), time_symbol()))
     >>> turn.samples(Fraction(1), 0, 2)[:, 2], turn.error_bound(2.0) < 1e-25
     (array([0.5, 1.5]), True)
     """
 
+    #: The body rate in rad/s as expressions of `expressions.time_symbol`
     elements: tuple[Any, ...] = field(default=())
 
     @cached_property

@@ -58,27 +58,18 @@ class RateProfile(Protocol):
 class CosineSum:
     """A sum of cosines on each axis: amplitude cos(frequency t + phase).
 
-    Parameters
-    ----------
-    amplitudes : array, (3, K)
-        In rad/s for a rate.
-    frequencies : array, (3, K)
-        In rad/s, above 0.
-    phases : array, (3, K)
-        In rad.
-    substeps : int, optional
-        See `RateProfile`.
-
-    Examples
-    --------
     >>> wave = CosineSum(np.ones((3, 1)), np.full((3, 1), 2.0), np.zeros((3, 1)))
     >>> wave.rate(0.0), wave.angle(np.pi / 4)
     (array([1., 1., 1.]), array([0.5, 0.5, 0.5]))
     """
 
+    #: (3, K): in rad/s for a rate
     amplitudes: Array
+    #: (3, K): in rad/s, above 0
     frequencies: Array
+    #: (3, K): in rad
     phases: Array
+    #: See `RateProfile`
     substeps: int = _SUBSTEPS
 
     def rate(self, time: Any) -> Array:
@@ -106,14 +97,8 @@ class CosineSum:
     def filtered(self, cutoff: float) -> CosineSum:
         """Return the sum as a Butterworth filter of second order passes it on, long after it began.
 
-        Parameters
-        ----------
-        cutoff : float
-            Frequency in rad/s at which half of the power is lost: the filter is 1/(1 + sqrt(2) s/w + (s/w)^2).
-
-        Returns
-        -------
-        CosineSum
+        `cutoff`: frequency in rad/s at which half of the power is lost: the filter is 1/(1 + sqrt(2) s/w +
+        (s/w)^2).
         """
         s = 1j * self.frequencies / cutoff
         response = 1 / (1 + math.sqrt(2) * s + s * s)
@@ -124,14 +109,9 @@ class CosineSum:
 
 @dataclass(frozen=True)
 class ThroughGyro:
-    """A sum of cosines that a gyro of limited bandwidth measures.
+    """A sum of cosines that a gyro of limited bandwidth measures."""
 
-    Parameters
-    ----------
-    motion, measured : CosineSum
-        The body rate, and what the gyro passes on of it.
-    """
-
+    #: The body rate, and what the gyro passes on of it
     motion: CosineSum
     measured: CosineSum
 
@@ -151,30 +131,20 @@ class ThroughGyro:
 
 @dataclass(frozen=True)
 class Slews:
-    """Eight slews of 1.2 s about different axes, on top of a sum of cosines.
-
-    Parameters
-    ----------
-    background : CosineSum
-    axes : array, (8, 3)
-        Rate of each slew in rad/s.
-    starts : array, (8,)
-        Start of each slew in s: the middle of an onset by the hyperbolic tangent, the beginning of a ramp.
-    onset : float
-        Duration of an onset in s.
-    shape, integral : callable
-        The rate of an onset as a fraction of its final one, from the time x since its start in units of `onset`; and
-        the integral of that, less max(x, 0).
-    substeps : int
-        See `RateProfile`.
-    """
+    """Eight slews of 1.2 s about different axes, on top of a sum of cosines."""
 
     background: CosineSum
+    #: (8, 3): rate of each slew in rad/s
     axes: Array
+    #: (8,): start of each slew in s: the middle of an onset by the hyperbolic tangent, the beginning of a ramp
     starts: Array
+    #: Duration of an onset in s
     onset: float
+    #: The rate of an onset as a fraction of its final one, from the time x since its start in units of `onset`;
+    #: and the integral of that, less max(x, 0)
     shape: Callable[[Array], Array]
     integral: Callable[[Array], Array]
+    #: See `RateProfile`
     substeps: int
 
     def rate(self, time: Any) -> Array:
@@ -210,16 +180,7 @@ def _ramp_integral(x: Array) -> Array:
 def random_rate(rate: float) -> CosineSum:
     """Return a rate that looks random, without power above 50/3 Hz.
 
-    Parameters
-    ----------
-    rate : float
-        Root mean square on each axis in rad/s.
-
-    Returns
-    -------
-    CosineSum
-        Thirty cosines on each axis, of frequencies 0.2 Hz to 50/3 Hz and phases that are the fractional parts of
-        multiples of roots.
+    `rate`: root mean square on each axis in rad/s.
     """
     return random_sum(rate, _FREQUENCY_ROOTS, _PHASE_ROOTS)
 
@@ -227,15 +188,7 @@ def random_rate(rate: float) -> CosineSum:
 def random_sum(
     size: float, frequency_roots: tuple[int, int, int], phase_roots: tuple[int, int, int]
 ) -> CosineSum:
-    """Return a vector that looks random, without power above 50/3 Hz, see `random_rate`.
-
-    Parameters
-    ----------
-    size : float
-        Root mean square on each axis.
-    frequency_roots, phase_roots : tuple of int
-        For each axis the number whose root sets its frequencies, and the one whose root sets its phases.
-    """
+    """Return a vector that looks random, without power above 50/3 Hz, see `random_rate`."""
     number = np.arange(1, _COSINES + 1)
     frequencies = _LOWEST + (_HIGHEST - _LOWEST) * _fractions(frequency_roots, number)
     amplitudes = np.full(frequencies.shape, size * math.sqrt(2 / _COSINES))
@@ -245,22 +198,8 @@ def random_sum(
 def vibration_rate(angle: float, gyro: float) -> CosineSum | ThroughGyro:
     """Return the rate of a vibration of forty lines from 2 Hz to 30 Hz, of which y is a quarter period behind x.
 
-    Parameters
-    ----------
-    angle : float
-        Root mean square of the angle on each axis in rad, the same in every line.
-    gyro : float
-        Bandwidth of the gyro in Hz, a Butterworth filter of second order; infinite for one that passes on everything.
-
-    Returns
-    -------
-    CosineSum or ThroughGyro
-        The phases of x and z have nothing to do with each other.
-
-    Raises
-    ------
-    InputError
-        If the bandwidth is below 0.001 Hz.
+    `angle`: root mean square of the angle on each axis in rad, the same in every line. `gyro`: bandwidth of the
+    gyro in Hz, a Butterworth filter of second order; infinite for one that passes on everything.
     """
     if gyro < _LOWEST_BANDWIDTH:
         raise InputError(f"gyro_hz is {gyro:g}; at least {_LOWEST_BANDWIDTH:g} is needed")
@@ -274,21 +213,7 @@ def vibration_rate(angle: float, gyro: float) -> CosineSum | ThroughGyro:
 def slew(onset: float, rate: float) -> Slews:
     """Return slews whose rate follows the hyperbolic tangent at both ends.
 
-    Parameters
-    ----------
-    onset : float
-        Time in s in which the hyperbolic tangent goes from 0 to tanh 1.
-    rate : float
-        In rad/s.
-
-    Returns
-    -------
-    Slews
-
-    Raises
-    ------
-    InputError
-        If the onset is shorter than 0.1 ms or longer than the slew.
+    `onset`: time in s in which the hyperbolic tangent goes from 0 to tanh 1. `rate`: in rad/s.
     """
     _check_onset(onset)
     axes, sway = _directions(), _sway()
@@ -300,22 +225,7 @@ def slew(onset: float, rate: float) -> Slews:
 def ramps(onset: float, rate: float) -> Slews:
     """Return slews whose rate is linear at both ends.
 
-    Parameters
-    ----------
-    onset : float
-        Duration of a ramp in s.
-    rate : float
-        In rad/s.
-
-    Returns
-    -------
-    Slews
-
-    Raises
-    ------
-    InputError
-        If the onset is shorter than 0.1 ms or longer than the slew, or ends between the substeps of the reference
-        attitude.
+    `onset`: duration of a ramp in s. `rate`: in rad/s.
     """
     _check_onset(onset)
     substeps = onset / KNOT * _SUBSTEPS

@@ -31,15 +31,8 @@ _NODES = 0.5 + np.array([-1.0, 0.0, 1.0]) * math.sqrt(15) / 10
 class ReferenceAttitude:
     """The attitude that a body rate leads to, from the identity at time 0 on.
 
-    Parameters
-    ----------
-    rate : callable
-        ``rate(times)`` returns body rates in rad/s, (..., 3), of times in s.
-    substeps : int
-        Number of substeps in `KNOT`.
+    `rate`: ``rate(times)`` returns body rates in rad/s, (..., 3), of times in s.
 
-    Examples
-    --------
     >>> turn = ReferenceAttitude(lambda t: np.array([0, 0, np.pi]) * np.asarray(t)[..., None], 16)
     >>> turn(np.array([1.0]))[0].round(12) + 0.0  # the integral of pi t is a right angle after 1 s
     array([[ 0., -1.,  0.],
@@ -54,19 +47,7 @@ class ReferenceAttitude:
     def __call__(self, time: Any) -> Array:
         """Return direction cosine matrices, body to reference.
 
-        Parameters
-        ----------
-        time : array_like, (...)
-            Times in s, none below 0.
-
-        Returns
-        -------
-        array, (..., 3, 3)
-
-        Raises
-        ------
-        InputError
-            If a time is below 0.
+        `time`: times in s, none below 0. Returns (..., 3, 3).
         """
         times = np.asarray(time, float)
         if times.min(initial=0.0) < 0:

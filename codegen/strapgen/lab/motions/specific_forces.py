@@ -57,34 +57,18 @@ _TOGETHER = 1 << 11
 
 @dataclass(frozen=True)
 class SpecificForce:
-    """A specific force along a motion.
+    """A specific force along a motion."""
 
-    Parameters
-    ----------
-    name : str
-        A key of `FORCES`.
-    parameters : dict of str to float
-        Its parameters in SI units.
-    """
-
+    #: A key of `FORCES`
     name: str
+    #: Its parameters in SI units
     parameters: dict[str, float]
 
     def velocity_increments(self, motion: Motion, interval: Fraction, first: int, stop: int) -> Array:
         """Return exact velocity increments of some sampling intervals.
 
-        Parameters
-        ----------
-        motion : Motion
-        interval : Fraction
-            Sampling interval in s.
-        first, stop : int
-            Numbers of the first interval and of the one after the last; number 0 begins at t = 0.
-
-        Returns
-        -------
-        array, (stop - first, 3)
-            Integrals of the specific force in m/s, body axes.
+        `interval`: sampling interval in s. Returns (stop - first, 3): integrals of the specific force in m/s, body
+        axes.
         """
         edges = np.arange(first, stop + 1, dtype=np.float64) * float(interval)
         if self.name == "lever":
@@ -95,18 +79,8 @@ class SpecificForce:
     def translation(self, motion: Motion, interval: Fraction, count: int) -> tuple[Array, Array]:
         """Return the true velocity and position in reference axes, from rest at the place of the start.
 
-        Parameters
-        ----------
-        motion : Motion
-        interval : Fraction
-            Time from one instant to the next in s.
-        count : int
-            Number of intervals.
-
-        Returns
-        -------
-        velocity, position : array, (count + 1, 3)
-            In m/s and m, from the instant 0 on.
+        `interval`: time from one instant to the next in s. Returns (count + 1, 3): in m/s and m, from the instant 0
+        on.
         """
         if self.name == "lever":
             times = np.arange(count + 1, dtype=np.float64) * float(interval)
@@ -164,13 +138,6 @@ class SpecificForce:
 def keys(name: str) -> dict[str, dict[str, float]]:
     """Return, for every parameter of a force, the keys that set it and the factor of each to SI units.
 
-    Raises
-    ------
-    InputError
-        If the force is unknown.
-
-    Examples
-    --------
     >>> list(keys("lever")["x"]), list(keys("random")["rms"])
     (['x_m'], ['rms_m_s2', 'rms_g'])
     """
@@ -184,26 +151,11 @@ def keys(name: str) -> dict[str, dict[str, float]]:
 def force(name: str, /, **settings: Any) -> SpecificForce:
     """Return a specific force in body axes.
 
-    Parameters
-    ----------
-    name : str
-        "constant" (keys x, y, z), "random" (rms on each axis, up to 50/3 Hz, and x, y, z on top), "oscillation"
-        (swing_x, swing_y, swing_z, frequency, phase of the cosine, and x, y, z on top) or "lever" (x, y, z: the arm
-        from a point at rest to the sensors), whose keys end with a unit, as in ``x_m_s2``, ``x_g`` or ``x_m``.
-    **settings : number
-        The parameters; one that is left out is zero.
+    `name`: "constant" (keys x, y, z), "random" (rms on each axis, up to 50/3 Hz, and x, y, z on top),
+    "oscillation" (swing_x, swing_y, swing_z, frequency, phase of the cosine, and x, y, z on top) or "lever" (x,
+    y, z: the arm from a point at rest to the sensors), whose keys end with a unit, as in ``x_m_s2``, ``x_g`` or
+    ``x_m``.
 
-    Returns
-    -------
-    SpecificForce
-
-    Raises
-    ------
-    InputError
-        If the force or a key is unknown, a parameter is missing or set twice, or a number is not finite.
-
-    Examples
-    --------
     >>> force("oscillation", swing_y_g=1, frequency_hz=5).parameters["swing_y"]
     9.80665
     """

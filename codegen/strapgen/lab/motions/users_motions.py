@@ -59,19 +59,11 @@ _FINE = 1e-11
 
 @dataclass(frozen=True)
 class UsersMotion(Motion):
-    """A motion of a user's functions.
+    """A motion of a user's functions."""
 
-    Parameters
-    ----------
-    name : str
-        The file as it was named.
-    parameters : dict
-        Empty: the file has its numbers.
-    functions : mapping of str to callable
-        The functions of the file by name.
-    """
-
+    #: Empty: the file has its numbers
     parameters: dict[str, float] = field(default_factory=dict)
+    #: The functions of the file by name
     functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
@@ -92,13 +84,7 @@ class UsersMotion(Motion):
         return self._called("attitude", (*times.shape, 3, 3), times)
 
     def rate(self, time: Any) -> Array:
-        """Return the body rate, see `Motion.rate`.
-
-        Raises
-        ------
-        InputError
-            If the file has no such function.
-        """
+        """Return the body rate, see `Motion.rate`."""
         if "rate" not in self.functions:
             raise InputError(f"{self.name} defines no function rate; rates of the motion need one")
         times = np.asarray(time, float)
@@ -192,23 +178,7 @@ def any_motion(
 ) -> Motion:
     """Return a motion of the catalogue, or of a file.
 
-    Parameters
-    ----------
-    name : str
-        Name of a motion, or a Python file.
-    duration : number
-        Time in s over which a file's motion is checked.
-    settings : mapping
-        Parameters of a motion of the catalogue; a file has its own numbers.
-
-    Returns
-    -------
-    Motion
-
-    Raises
-    ------
-    InputError
-        As `motion` and `read_motion` do.
+    `duration`: time in s over which a file's motion is checked.
     """
     if not is_file(name):
         return motion(name, **settings)
@@ -222,17 +192,7 @@ def any_motion(
 def require_consistent(users: Motion, duration: float | str | Fraction) -> None:
     """Refuse a motion whose increments lead to another attitude than its own, or whose rate has another integral.
 
-    Parameters
-    ----------
-    users : Motion
-    duration : number
-        Time from 0 on in s that is checked.
-
-    Raises
-    ------
-    InputError
-        If an attitude is no rotation or does not begin at zero rotation, increments do not add up, or increments, rate
-        and attitude contradict each other; the message has the time.
+    `duration`: time from 0 on in s that is checked.
     """
     total = float(checks.number("duration", duration, positive=True))
     edges = np.linspace(0, total, _CUTS[0][0] + 1)
@@ -267,13 +227,7 @@ def _functions(name: str) -> dict[str, Callable[..., Any]]:
 
 
 def rate_expressions(path: str | Path) -> tuple[Any, ...]:
-    """Return the rate of a file's motion as expressions of SymPy in `time_symbol`.
-
-    Raises
-    ------
-    InputError
-        As `read_motion` does, or if the file has functions of numbers in place of expressions.
-    """
+    """Return the rate of a file's motion as expressions of SymPy in `time_symbol`."""
     users = read_motion(path, Fraction(1, 1000))
     if not isinstance(users, RateMotion):
         raise InputError(f"{path} has no function {EXPRESSION}, from which series are derived")

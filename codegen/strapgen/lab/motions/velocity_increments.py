@@ -20,20 +20,9 @@ def velocity_increments(
 ) -> Array:
     """Return the velocity increments of a specific force that is constant in reference axes.
 
-    Parameters
-    ----------
-    attitude : callable
-        Returns direction cosine matrices, body to reference, at some times in s.
-    force : iterable of float, (3,)
-        In m/s^2, reference axes.
-    interval : Fraction
-        Length of a cycle in s.
-    count : int
-
-    Returns
-    -------
-    array, (count, 3)
-        In m/s, body axes; Gauss's rule integrates each cycle.
+    `attitude`: returns direction cosine matrices, body to reference, at some times in s. `force`: in m/s^2,
+    reference axes. `interval`: length of a cycle in s. Returns (count, 3): in m/s, body axes; Gauss's rule
+    integrates each cycle.
     """
     vector, step = np.array([*force], float), float(interval)
     if not vector.any():

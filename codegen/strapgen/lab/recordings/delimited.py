@@ -16,22 +16,7 @@ _BLOCK = 1 << 13
 
 
 def blocks(path: Path) -> Iterator[list[str]]:
-    """Yield the lines of a file, some thousands at a time.
-
-    Parameters
-    ----------
-    path : Path
-
-    Yields
-    ------
-    list of str
-        Lines with their ends.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no text, or has a line or a number of lines beyond bounds.
-    """
+    """Yield the lines of a file, some thousands at a time."""
     count = 0
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -56,24 +41,7 @@ def blocks(path: Path) -> Iterator[list[str]]:
 def rows(
     path: Path, lines: Iterator[str], first: int = 1, separator: str = ","
 ) -> Iterator[tuple[int, list[str]]]:
-    """Yield the cells of each row with the number of the line at which it ends.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    lines : iterator of str
-        From `blocks`.
-    first : int, optional
-        Number of the first of these lines.
-    separator : str, optional
-        Character between cells.
-
-    Raises
-    ------
-    InputError
-        If the lines are no table, or a row has too many cells.
-    """
+    """Yield the cells of each row with the number of the line at which it ends."""
     reader = csv.reader(lines, delimiter=separator)
     try:
         for row in reader:

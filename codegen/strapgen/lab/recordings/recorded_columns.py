@@ -24,13 +24,7 @@ PART = 1 << 18
 
 
 class Columns:
-    """A table of numbers that grows by rows.
-
-    Parameters
-    ----------
-    width : int
-        Number of columns.
-    """
+    """A table of numbers that grows by rows."""
 
     def __init__(self, width: int) -> None:
         self.width = width
@@ -39,13 +33,7 @@ class Columns:
         self._file: IO[bytes] | None = None
 
     def append(self, part: Any) -> None:
-        """Add rows, (N, width).
-
-        Raises
-        ------
-        InputError
-            If the temporary folder cannot hold them.
-        """
+        """Add rows, (N, width)."""
         part = np.ascontiguousarray(part, np.float64)
         self.rows += len(part)
         self._parts.append(part)
@@ -86,11 +74,7 @@ def release(array: Any) -> None:
 def parts(array: Array, overlap: int = 0) -> Iterator[tuple[int, Array]]:
     """Yield the rows of an array in parts, each with the number of its first row.
 
-    Parameters
-    ----------
-    array : array, (N, ...)
-    overlap : int, optional
-        Rows of the next part that each has too.
+    `array` has shape (N, ...).
     """
     for first in range(0, max(1, len(array) - overlap), PART):
         yield first, np.asarray(array[first : first + PART + overlap])
@@ -105,15 +89,8 @@ def largest_magnitude(array: Array) -> float:
 class SampleIntervals:
     """The differences of rising times.
 
-    Parameters
-    ----------
-    time : array, (N,)
-        At least two finite times in s.
-
-    Attributes
-    ----------
-    shortest, longest : tuple of float and int
-        The interval in s, and the number of the time before it.
+    `time` (N,): at least two finite times in s. `shortest, longest`: the interval in s, and the number of the
+    time before it.
     """
 
     def __init__(self, time: Array) -> None:

@@ -27,42 +27,28 @@ _SUFFIXES = ("ns", "us", "ms", "s", "sec", "rad_s", "rads", "deg_s", "dps", "mdp
 
 @dataclass(frozen=True)
 class Stated:
-    """What a user states of a recording of rates, in place of its header.
+    """What a user states of a recording of rates, in place of its header."""
 
-    Parameters
-    ----------
-    unit, time_unit : str or None
-        Units of rates and time, in the spelling of `units`.
-    columns : str or None
-        Names or numbers of the columns with commas between: the time and three rates; with `sample_hz` the rates alone.
-    sample_hz : number or None
-        Sampling rate in Hz in place of a column of times.
-    """
-
+    #: Units of rates and time, in the spelling of `units`
     unit: str | None = None
+    #: Names or numbers of the columns with commas between: the time and three rates; with `sample_hz` the rates
+    #: alone
     columns: str | None = None
     time_unit: str | None = None
+    #: Sampling rate in Hz in place of a column of times
     sample_hz: float | str | Fraction | None = None
 
 
 @dataclass(frozen=True)
 class ColumnLayout:
-    """Where the columns stand, and in which units.
+    """Where the columns stand, and in which units."""
 
-    Parameters
-    ----------
-    places : tuple of int
-        Of the time and of the values; without a time, of the values alone.
-    width : int
-        Cells of a row.
-    has_time : bool
-    time_unit, unit : str or None
-        Units that header or user state, in the spelling of `units`; None where none does.
-    """
-
+    #: Of the time and of the values; without a time, of the values alone
     places: tuple[int, ...]
+    #: Cells of a row
     width: int
     has_time: bool = True
+    #: Units that header or user state, in the spelling of `units`; None where none does
     time_unit: str | None = None
     unit: str | None = None
 
@@ -77,21 +63,7 @@ class _HeaderCell:
 
 
 def rates_layout(header: Sequence[str] | None, width: int, stated: Stated) -> ColumnLayout:
-    """Return where time and rates stand in a file of rates.
-
-    Parameters
-    ----------
-    header : sequence of str or None
-        Cells of the header, if there is one.
-    width : int
-        Cells of a row.
-    stated : Stated
-
-    Raises
-    ------
-    InputError
-        If the columns or units are open, or what is stated contradicts the header.
-    """
+    """Return where time and rates stand in a file of rates."""
     cells = None if header is None else [_cell(text) for text in header]
     has_time = stated.sample_hz is None
     places = _stated_places(stated, cells, width) if stated.columns else _found_places(cells, width, has_time)
@@ -107,17 +79,7 @@ def rates_layout(header: Sequence[str] | None, width: int, stated: Stated) -> Co
 def named_layout(
     header: Sequence[str] | None, width: int, names: Sequence[str], wanted: Sequence[str]
 ) -> ColumnLayout:
-    """Return where columns with fixed names stand; a file without a header has them in their order.
-
-    Parameters
-    ----------
-    header, width
-        As for `rates_layout`.
-    names : sequence of str
-        The time first.
-    wanted : sequence of str
-        Units that columns may state, by name.
-    """
+    """Return where columns with fixed names stand; a file without a header has them in their order."""
     if header is None:
         if width != len(names):
             raise InputError(
@@ -221,13 +183,7 @@ def _stated_places(stated: Stated, cells: Sequence[_HeaderCell] | None, width: i
 
 
 def known_unit(what: str, text: str, table: Mapping[str, Fraction]) -> str:
-    """Return a unit of a table in its usual spelling.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """Return a unit of a table in its usual spelling."""
     name = units.spelled(checks.text(what, text))
     return name if name in table else checks.choice(what, text, [*table])
 
@@ -235,13 +191,7 @@ def known_unit(what: str, text: str, table: Mapping[str, Fraction]) -> str:
 def _agreed(
     option: str, stated: str | None, cell: _HeaderCell, table: Mapping[str, Fraction], what: str
 ) -> str | None:
-    """Return the unit that a user or a column states.
-
-    Raises
-    ------
-    InputError
-        If they differ, or the column is in no such unit.
-    """
+    """Return the unit that a user or a column states."""
     if cell.unit is None:
         return stated
     if cell.unit not in table:

@@ -58,20 +58,13 @@ class LineNumbers:
 
 @dataclass(frozen=True)
 class RecordedRows:
-    """The rows of a file.
+    """The rows of a file."""
 
-    Parameters
-    ----------
-    time : array, (N,)
-        The first column.
-    values : array, (N, columns)
-        The others; a long recording is on the disk, see `recorded_columns`.
-    lines : LineNumbers
-        The number of the line of each row.
-    """
-
+    #: (N,): the first column
     time: Array
+    #: (N, columns): the others; a long recording is on the disk, see `recorded_columns`
     values: Array
+    #: The number of the line of each row
     lines: LineNumbers
 
 
@@ -87,24 +80,7 @@ def read_rows(
     Cells are separated by commas, semicolons, tabs or blanks. Lines before the header that begin with #, % or // are
     comments; the last of them is the header if it names the columns.
 
-    Parameters
-    ----------
-    path : Path
-    find : callable
-        Returns the layout of the file.
-    sample_hz : number, optional
-        Sampling rate in Hz of a file without times.
-
-    Returns
-    -------
-    tuple of RecordedRows and ColumnLayout
-        Times in s; values as they stand.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is beyond bounds, a value is no finite number, a row has other columns than the
-        header, or the unit of the times is open.
+    `sample_hz`: sampling rate in Hz of a file without times. Returns: times in s; values as they stand.
     """
     reading = _Reading(path, find)
     time, values, lines = Columns(1), Columns(3), LineNumbers()

@@ -30,14 +30,7 @@ _COLUMNS = (
 
 
 def sensor_report(rows: Sequence[SensorScatter], settings: dict[str, Any]) -> Report:
-    """Return a study of sensor errors as a report: the errors of the attitude at the end of the runs.
-
-    Parameters
-    ----------
-    rows : sequence of SensorScatter
-    settings : dict
-        What the study ran.
-    """
+    """Return a study of sensor errors as a report: the errors of the attitude at the end of the runs."""
     table: list[list[Any]] = [
         [row.cause, row.runs, axis, *(float(np.degrees(value)) for value in _numbers(row, place))]
         for row in rows

@@ -34,31 +34,21 @@ ALL = "all"
 
 @dataclass(frozen=True, eq=False)
 class SensorScatter:
-    """The error of the attitude that sensors cause, over many runs.
+    """The error of the attitude that sensors cause, over many runs."""
 
-    Parameters
-    ----------
-    cause : str
-        Which errors the sensors have: "all", or one of `CAUSES` alone.
-    runs : int
-        1 where all are the same.
-    time : array, (N,)
-        Times of the records in s, from after the start to the end.
-    mean, deviation : array, (N, 3)
-        Mean and standard deviation over the runs in rad, reference axes; what leads is positive.
-    low, high : array, (N, 3)
-        Interval of 95 % of the standard deviation.
-    predicted_mean, predicted : array, (N, 3)
-        Mean and standard deviation in closed form, to first order.
-    """
-
+    #: Which errors the sensors have: "all", or one of `CAUSES` alone
     cause: str
+    #: 1 where all are the same
     runs: int
+    #: (N,): times of the records in s, from after the start to the end
     time: Array
+    #: (N, 3): mean and standard deviation over the runs in rad, reference axes; what leads is positive
     mean: Array
     deviation: Array
+    #: (N, 3): interval of 95 % of the standard deviation
     low: Array
     high: Array
+    #: (N, 3): mean and standard deviation in closed form, to first order
     predicted_mean: Array
     predicted: Array
 
@@ -75,8 +65,6 @@ def student_quantile(degrees: int) -> float:
 
     It is the expansion by Fisher and Cornish, to 0.1 % from five degrees of freedom on.
 
-    Examples
-    --------
     >>> round(student_quantile(9), 3), round(student_quantile(99), 3)
     (2.262, 1.984)
     """
@@ -94,8 +82,6 @@ def deviation_interval(degrees: int) -> tuple[float, float]:
 
     The quantiles of chi-square are those of Wilson and Hilferty, to 0.5 % from nine degrees of freedom on.
 
-    Examples
-    --------
     >>> [round(end, 2) for end in deviation_interval(99)]
     [0.88, 1.16]
     """
@@ -105,21 +91,7 @@ def deviation_interval(degrees: int) -> tuple[float, float]:
 
 
 class SensorStudy:
-    """Runs of an algorithm on sensors with errors.
-
-    Parameters
-    ----------
-    backend : Backend
-        The algorithm; its step takes increments.
-    path : Path
-        The motion, the step and the records.
-    errors : InstrumentErrors
-
-    Raises
-    ------
-    InputError
-        If the sensors have no errors, or some that depend on a specific force that is zero.
-    """
+    """Runs of an algorithm on sensors with errors."""
 
     def __init__(self, backend: Backend, path: Path, errors: InstrumentErrors) -> None:
         if not any(errors.causes):
@@ -140,13 +112,7 @@ class SensorStudy:
         self._reference = self._attitudes(self._angle[None])[0]
 
     def rows(self, runs: int) -> Iterator[SensorScatter]:
-        """Yield the scatter of all causes together, and of each alone if there are several.
-
-        Parameters
-        ----------
-        runs : int
-            Runs of causes with random numbers.
-        """
+        """Yield the scatter of all causes together, and of each alone if there are several."""
         causes = [*self._errors.causes]
         spread = sensor_covariance.covariances(self._path, self._errors)
         for cause in [ALL, *(causes if len(causes) > 1 else [])]:

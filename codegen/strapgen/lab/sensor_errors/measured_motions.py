@@ -37,26 +37,15 @@ class MeasuredMotion(Motion):
     """A motion whose increments are those of sensors with errors, and whose attitude is the true one.
 
     The random errors begin at t = 0; increments from before have the steady errors alone.
-
-    Parameters
-    ----------
-    name : str
-    parameters : dict of str to float
-        Those of the true motion.
-    true : Motion
-    errors : InstrumentErrors
-    run : int
-        Number of the run, which decides on the random numbers.
-    force : tuple of float, (3,)
-        Specific force in m/s^2, constant in reference axes.
-    start : array, (3, 3), or None
-        Attitude at the start, before that of the motion; None for zero rotation.
     """
 
     true: Motion = field(default_factory=lambda: Motion("constant", {}))
     errors: InstrumentErrors = field(default_factory=InstrumentErrors)
+    #: Number of the run, which decides on the random numbers
     run: int = 0
+    #: Specific force in m/s^2, constant in reference axes
     force: tuple[float, ...] = (0.0, 0.0, 0.0)
+    #: (3, 3): attitude at the start, before that of the motion; None for zero rotation
     start: Any = None
     _progress: list[_Progress] = field(default_factory=list)
 
@@ -81,12 +70,7 @@ class MeasuredMotion(Motion):
         return self.true.attitude(time)
 
     def rate(self, time: Any) -> Array:
-        """Refuse to return a rate: sensors measure increments.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse to return a rate: sensors measure increments."""
         raise InputError("sensor errors go with increments, and the algorithm takes rates")
 
     def _at(self, interval: Fraction, first: int) -> _Progress:
@@ -206,21 +190,8 @@ def both_increments(
 ) -> tuple[Array, Array]:
     """Return the angle and velocity increments that a whole unit measures on a motion from t = 0 on.
 
-    Parameters
-    ----------
-    motion : Motion
-    attitude : callable
-        Returns the attitude at some times in s, that at the start included.
-    force : tuple of float, (3,)
-        Specific force in m/s^2, constant in reference axes.
-    interval : Fraction
-        In s.
-    count : int
-
-    Returns
-    -------
-    angle, velocity : array, (count, 3)
-        In rad and m/s, body axes.
+    `attitude`: returns the attitude at some times in s, that at the start included. `force`: specific force in
+    m/s^2, constant in reference axes. `interval`: in s. Returns (count, 3): in rad and m/s, body axes.
     """
     velocity = velocity_increments(attitude, force, interval, count)
     if not isinstance(motion, MeasuredMotion):

@@ -22,16 +22,11 @@ _MOST_LATE = 1_000_000
 
 @dataclass(frozen=True)
 class LinearRecursion:
-    """A recursion ``y = c s + d x``, ``s' = a s + b x`` on single numbers x and y.
+    """A recursion ``y = c s + d x``, ``s' = a s + b x`` on single numbers x and y."""
 
-    Parameters
-    ----------
-    a : array, (m, m)
-    b, c : array, (m,)
-    d : float
-    """
-
+    #: (m, m)
     a: Array
+    #: (m,)
     b: Array
     c: Array
     d: float
@@ -67,17 +62,8 @@ def second_order(frequency: float, damping: float, interval: float) -> LinearRec
     It is exact for a rate that is constant over each interval. The state is the rate that comes out, in increments
     per interval, and its derivative over w.
 
-    Parameters
-    ----------
-    frequency : float
-        Natural frequency w/(2 pi) in Hz.
-    damping : float
-        zeta.
-    interval : float
-        In s.
+    `frequency`: natural frequency w/(2 pi) in Hz. `interval`: in s.
 
-    Examples
-    --------
     >>> settled = second_order(80, 0.7, 0.001).run(np.ones(3), np.array([1.0, 0.0]))[0]
     >>> settled.round(12)
     array([1., 1., 1.])
@@ -158,12 +144,8 @@ class SampleTimes:
     def __call__(self, row: Array, departures: Array) -> Array:
         """Return the increments between the instants, (n, 3).
 
-        Parameters
-        ----------
-        row : array, (n, 3)
-            Increments between exact instants.
-        departures : array, (n, 1)
-            Departures of the instants from their times in standard deviations of the jitter.
+        `row` (n, 3): increments between exact instants. `departures` (n, 1): departures of the instants from their
+        times in standard deviations of the jitter.
         """
         if self._history is None:
             self._history = np.tile(row[0], (self._depth, 1))

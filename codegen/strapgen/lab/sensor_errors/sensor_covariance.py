@@ -35,27 +35,18 @@ DRAWN = ("bias", "scale", "misalignment", "terms")
 
 @dataclass(frozen=True)
 class Path:
-    """A motion in so many records, each of so many intervals for integrals.
+    """A motion in so many records, each of so many intervals for integrals."""
 
-    Parameters
-    ----------
-    motion : Motion
-        The true one.
-    choice : Choice
-        The step that computes its attitude.
-    step : Fraction
-        In s.
-    steps, records : int
-        Steps of the run, and records after its start; they divide the steps.
-    force : tuple of float, (3,)
-        Specific force in m/s^2, constant in reference axes.
-    """
-
+    #: The true one
     motion: Motion
+    #: The step that computes its attitude
     choice: Choice
+    #: In s
     step: Fraction
+    #: Steps of the run, and records after its start; they divide the steps
     steps: int
     records: int
+    #: Specific force in m/s^2, constant in reference axes
     force: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     @property
@@ -118,10 +109,7 @@ class Path:
 def error_mean(path: Path, errors: InstrumentErrors) -> Array:
     """Return the error of the attitude that all runs have in common, to first order.
 
-    Returns
-    -------
-    array, (records, 3)
-        In rad, reference axes; what leads is positive.
+    Returns (records, 3): in rad, reference axes; what leads is positive.
     """
     common = errors.only(*(cause for cause in STEADY if not (errors.drawn and cause in DRAWN)))
     return _effect(path, common) - _mean_loss(path, errors)
@@ -130,18 +118,8 @@ def error_mean(path: Path, errors: InstrumentErrors) -> Array:
 def covariances(path: Path, errors: InstrumentErrors) -> dict[str, Array]:
     """Return the covariance of the error of the attitude by cause, to first order.
 
-    Parameters
-    ----------
-    path : Path
-    errors : InstrumentErrors
+    Returns (records, 3, 3): in rad^2, reference axes; zero for a cause that is the same in every run.
 
-    Returns
-    -------
-    dict of str to array, (records, 3, 3)
-        In rad^2, reference axes; zero for a cause that is the same in every run.
-
-    Examples
-    --------
     White noise N leaves N sqrt(t) on every axis, on any motion:
 
     >>> from strapgen import choose, motion

@@ -73,16 +73,8 @@ class MeasurementUnit:
     def __call__(self, angle: Array, velocity: Array | None = None) -> tuple[Array, Array]:
         """Return what the sensors measure.
 
-        Parameters
-        ----------
-        angle : array, (n, 3)
-            True angle increments after those of the call before, in rad, body axes.
-        velocity : array, (n, 3), optional
-            True velocity increments in m/s, body axes; by default they are zero.
-
-        Returns
-        -------
-        angle, velocity : array, (n, 3)
+        `angle` (n, 3): true angle increments after those of the call before, in rad, body axes. `velocity` (n, 3):
+        true velocity increments in m/s, body axes; by default they are zero. Returns (n, 3).
         """
         velocity = np.zeros_like(angle) if velocity is None else velocity
         if not self._causes or not len(angle):

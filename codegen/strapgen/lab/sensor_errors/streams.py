@@ -16,12 +16,6 @@ class Streams:
     A stream depends on the seed, the number of the run and its name alone: a cause that is switched off takes nothing
     from the others, and a run that is read in parts has the numbers of a whole one.
 
-    Parameters
-    ----------
-    seed, run : int
-
-    Examples
-    --------
     >>> one, other = Streams(1, 0), Streams(1, 0)
     >>> _ = one.normal("noise", 5)
     >>> bool((one.normal("walk", 4) == other.normal("walk", 4)).all())

@@ -28,15 +28,7 @@ _UNITS_A_STEP = 4
 def angles(run: Run) -> NDArray[np.float64]:
     """Return the angle between the computed and the true attitude at every record.
 
-    Parameters
-    ----------
-    run : Run
-        Of an algorithm whose attitudes are rotations, up to their length.
-
-    Returns
-    -------
-    array, (N,)
-        In rad, 0 to pi.
+    Returns (N,): in rad, 0 to pi.
     """
     # The error matrix is s R - I with a rotation R and a length s: its sum with I has the norm s sqrt(3), its trace is
     # s (1 + 2 cos) - 3, and the drift is as long as s sin.
@@ -49,17 +41,8 @@ def angles(run: Run) -> NDArray[np.float64]:
 def drift(run: Run) -> float:
     """Return the largest angle of a run from the true attitude, divided by the duration.
 
-    Parameters
-    ----------
-    run : Run
+    Returned in deg/h.
 
-    Returns
-    -------
-    float
-        In deg/h.
-
-    Examples
-    --------
     >>> from strapgen import backend, motion, simulate
     >>> cone = motion("cone", half_angle_deg=1, frequency_hz=5)
     >>> round(drift(simulate(backend("euler", "coning-compressed", 2), cone, "0.02", 10)), 3)
@@ -76,25 +59,7 @@ def drift_of(angle: float, duration: float | Fraction) -> float:
 def measured_drift(choice: Choice, motion: Motion, step: Fraction, count: int) -> float:
     """Return the drift of a step on a motion, in many digits where double precision may show its own rounding.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that takes increments.
-    motion : Motion
-    step : Fraction
-        In s.
-    count : int
-        Number of steps.
-
-    Returns
-    -------
-    float
-        In deg/h, see `drift`.
-
-    Raises
-    ------
-    InputError
-        If the attitude leaves the range of its numbers.
+    `step`: in s. Returned in deg/h, see `drift`.
     """
     stepper, duration = backend(choice), count * step
     value = drift(simulate(stepper, motion, step, duration))
@@ -112,15 +77,7 @@ def steady_drift(run: Run) -> float:
 
     What only swings, as the lag of a gyro does on a vibration, is not part of it.
 
-    Parameters
-    ----------
-    run : Run
-        At least ten records, of small errors.
-
-    Returns
-    -------
-    float
-        In deg/h.
+    Returned in deg/h.
     """
     count = max(1, len(run.time) // _END)
     change = run.drift[-count:].mean(axis=0) - run.drift[:count].mean(axis=0)

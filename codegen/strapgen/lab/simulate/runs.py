@@ -69,15 +69,8 @@ class Run(Records):
 def attitude(backend: Backend, states: Any) -> Array:
     """Return the attitude of states of a back end.
 
-    Parameters
-    ----------
-    backend : Backend
-    states : array_like, (..., state shape)
-
-    Returns
-    -------
-    array, (..., 3, 3)
-        Direction cosine matrices, body to reference, in double.
+    `states` has shape (..., state shape). Returns (..., 3, 3): direction cosine matrices, body to reference, in
+    double.
     """
     return backend.matrices(states)
 
@@ -85,15 +78,8 @@ def attitude(backend: Backend, states: Any) -> Array:
 def drift_between(computed: Any, other: Any) -> Array:
     """Return the drift vectors between attitudes.
 
-    Parameters
-    ----------
-    computed, other : array_like, (..., 3, 3)
-        Direction cosine matrices.
-
-    Returns
-    -------
-    array, (..., 3)
-        In rad, reference axes. To first order, the length of each is the angle between the attitudes.
+    `computed, other` (..., 3, 3): direction cosine matrices. Returns (..., 3): in rad, reference axes. To first
+    order, the length of each is the angle between the attitudes.
     """
     drift: Array = evaluator("error-matrix")(computed, other)[3]
     return drift
@@ -110,24 +96,7 @@ def largest_increment(
 ) -> float:
     """Return the largest magnitude of an element of the angle increments of a simulation, in rad.
 
-    Parameters
-    ----------
-    motion : Motion
-    step, duration, pulse : number
-        As for `simulate`.
-    samples : int
-        Increments per step.
-    beside : tuple of int, optional
-        Increments from before a step and from after it that it takes in addition.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed.
+    `samples`: increments per step.
     """
     h = checks.number("step", step, positive=True)
     return _largest(_increments(motion, h, samples, beside, pulse), h, duration)
@@ -142,23 +111,7 @@ def largest_turn(
 ) -> float:
     """Return the largest magnitude of an element of the rates at nodes, times the step, of a simulation.
 
-    Parameters
-    ----------
-    motion : Motion
-    step, duration : number
-        As for `simulate`.
-    nodes : sequence of float
-        Nodes as fractions of the step.
-
-    Returns
-    -------
-    float
-        In rad.
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed.
+    Returned in rad.
     """
     h = checks.number("step", step, positive=True)
     return _largest(_turns(motion, h, nodes), h, duration)
@@ -201,20 +154,7 @@ def _turns(motion: Motion, step: Fraction, nodes: Sequence[float]) -> Callable[[
 def initial_state(backend: Backend, matrix: Any) -> Array:
     """Return the state of a back end that has an attitude.
 
-    Parameters
-    ----------
-    backend : Backend
-    matrix : array_like, (3, 3)
-        Direction cosine matrix, body to reference.
-
-    Returns
-    -------
-    array, (state shape)
-
-    Raises
-    ------
-    InputError
-        If no kernel of the catalogue converts a matrix to such a state.
+    `matrix` (3, 3): direction cosine matrix, body to reference. Returns (state shape).
     """
     numbers = checks.real_array("initial", matrix, (3, 3), np.dtype(np.float64))
     if backend.attitude is None:

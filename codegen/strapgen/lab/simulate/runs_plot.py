@@ -49,27 +49,7 @@ def run_figure(run: Run, title: str) -> Any:
 
 
 def run_image(run: Run, title: str, path: str | Path) -> bytes:
-    """Return the nine errors of a run against time: scale, skew and drift, three axes each.
-
-    Parameters
-    ----------
-    run : Run
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return the nine errors of a run against time: scale, skew and drift, three axes each."""
     return figures.image(run_figure(run, title), path)
 
 

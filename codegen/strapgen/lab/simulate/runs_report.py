@@ -74,35 +74,19 @@ def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class RunLayout:
-    """How a run is reported.
+    """How a run is reported."""
 
-    Parameters
-    ----------
-    motion : str
-        The motion with its parameters in words, for the text.
-    title : str, optional
-    matrices : bool, optional
-        Whether all matrices follow in JSON.
-    every : int, optional
-        Records from one print of the matrices to the next in the text; by default those at the end are printed.
-    """
-
+    #: The motion with its parameters in words, for the text
     motion: str
     title: str | None = None
+    #: Whether all matrices follow in JSON
     matrices: bool = False
+    #: Records from one print of the matrices to the next in the text; by default those at the end are printed
     every: int | None = None
 
 
 def run_report(run: Run, settings: dict[str, Any], layout: RunLayout) -> Report:
-    """Return a run as a report.
-
-    Parameters
-    ----------
-    run : Run
-    settings : dict
-        Settings that the run was made with.
-    layout : RunLayout
-    """
+    """Return a run as a report."""
 
     def text() -> str:
         lines = [] if layout.title is None else [layout.title, ""]

@@ -44,22 +44,15 @@ MotionSettings = Annotated[
 
 @dataclass(frozen=True)
 class Inputs:
-    """Increments of a run, and the truth where it is known.
+    """Increments of a run, and the truth where it is known."""
 
-    Parameters
-    ----------
-    increments : array, (N, K, 3)
-        In rad.
-    truth : array, (1 + N, 3, 3), or None
-    step : float
-        In s.
-    title : str
-        Where they come from, in words for a reader.
-    """
-
+    #: (N, K, 3): in rad
     increments: NDArray[Any]
+    #: (1 + N, 3, 3)
     truth: NDArray[Any] | None
+    #: In s
     step: float
+    #: Where they come from, in words for a reader
     title: str
 
 
@@ -172,13 +165,7 @@ class SampleSource:
         return any(getattr(self, field.name) not in (None, False) for field in fields(self))
 
     def check(self, of_system: bool = False) -> None:
-        """Check that there is one source of increments, with the options that go with it and no others.
-
-        Parameters
-        ----------
-        of_system : bool, optional
-            Whether a described system runs, which states its rate itself.
-        """
+        """Check that there is one source of increments, with the options that go with it and no others."""
         felt = of_system or self.errors is not None
         if self.specific_force is not None and not (felt and self.motion is not None):
             raise InputError("--specific-force goes with a described system or --errors, and with --motion")
@@ -232,10 +219,7 @@ class SampleSource:
 
         A motion of a file is checked over the duration of the run.
 
-        Parameters
-        ----------
-        start : array, (3, 3), optional
-            Attitude at the start, body to reference; by default there is no rotation.
+        `start` (3, 3): attitude at the start, body to reference; by default there is no rotation.
         """
         from strapgen.lab.motions.users_motions import any_motion
 
@@ -305,24 +289,7 @@ class SampleSource:
         return with_errors(data, errors)
 
     def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
-        """Return the increments that the options describe.
-
-        Parameters
-        ----------
-        samples : int
-            Increments of a step.
-        previous, ahead : int
-            Increments from before the step and from after it that it takes as well.
-
-        Returns
-        -------
-        Inputs
-
-        Raises
-        ------
-        InputError
-            If the motion or the file cannot be used, or does not fill a step.
-        """
+        """Return the increments that the options describe."""
         from strapgen.run.increments import pulses
 
         pulse = self.pulse
@@ -371,14 +338,7 @@ def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
 
 
 def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> None:
-    """Check that a motion, if one is named, is of the catalogue or a file.
-
-    Parameters
-    ----------
-    name : str or None
-    further : mapping, optional
-        Motions that are allowed beside those with a closed form.
-    """
+    """Check that a motion, if one is named, is of the catalogue or a file."""
     from strapgen.ir import checks
 
     if name is not None and not is_file(name):

@@ -34,20 +34,13 @@ PATIENCE = 4
 
 @dataclass(frozen=True)
 class Step:
-    """An attitude step and the samples that it takes.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    nodes : tuple of number or None
-        Nodes at which it takes the rate, as fractions of the step; None for a step that takes increments.
-    lowest : int
-        For a method with rounded coefficients, the power of the step at which its error would begin with exact ones;
-        0 if the coefficients are exact.
-    """
+    """An attitude step and the samples that it takes."""
 
     kernel: Kernel
+    #: Nodes at which it takes the rate, as fractions of the step; None for a step that takes increments
     nodes: tuple[Number, ...] | None
+    #: For a method with rounded coefficients, the power of the step at which its error would begin with exact
+    #: ones; 0 if the coefficients are exact
     lowest: int = 0
 
     @property
@@ -85,21 +78,7 @@ class Step:
 
 
 def step(choice: Choice) -> Step:
-    """Return a chosen attitude step.
-
-    Parameters
-    ----------
-    choice : Choice
-
-    Returns
-    -------
-    Step
-
-    Raises
-    ------
-    InputError, InputTypeError
-        If it is no attitude step, or `choice` is no `Choice`.
-    """
+    """Return a chosen attitude step."""
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
@@ -111,21 +90,7 @@ def step(choice: Choice) -> Step:
 
 
 def linear_step(choice: Choice) -> Step:
-    """Return a chosen attitude step that is linear in its state, so that its error is the same at any attitude.
-
-    Parameters
-    ----------
-    choice : Choice
-
-    Returns
-    -------
-    Step
-
-    Raises
-    ------
-    InputError, InputTypeError
-        If it is not linear in its state, holds unknowns, or is no attitude step.
-    """
+    """Return a chosen attitude step that is linear in its state, so that its error is the same at any attitude."""
     attitude_step = step(choice)
     attitude_step.kernel.require_known()
     if attitude_step.kernel.transition is None:
@@ -137,14 +102,7 @@ def linear_step(choice: Choice) -> Step:
 
 
 def general_rate(attitude_step: Step, count: int) -> tuple[Frame, Any, list[list[Any]]]:
-    """Return a general rate: a rotated frame, a ring over the field of the step, and the rate with its derivatives.
-
-    Parameters
-    ----------
-    attitude_step : Step
-    count : int
-        Number of derivatives, counting the rate itself.
-    """
+    """Return a general rate: a rotated frame, a ring over the field of the step, and the rate with its derivatives."""
     frame = Frame(count)
     ring = frame.ring.clone(domain=attitude_step.domain)
     return frame, ring, [[element.set_ring(ring) for element in vector] for vector in frame.vectors]
@@ -153,21 +111,7 @@ def general_rate(attitude_step: Step, count: int) -> tuple[Frame, Any, list[list
 def errors(attitude_step: Step, ring: Any, rate: Rate, top: int) -> dict[str, list[Powers]]:
     """Return the error matrix of one step from zero rotation, and its parts, up to a power of the step.
 
-    Parameters
-    ----------
-    attitude_step : Step
-    ring : PolyRing
-        Ring of the coefficients, over the step's own field.
-    rate : sequence of sequence of ring element
-        The rate and its derivatives at the beginning of the step; further derivatives are zero.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    dict of str to list of Powers
-        "error", nine elements row by row, "scale", "skew" and "drift", three each: the outputs of the kernel
-        error-matrix.
+    `ring`: ring of the coefficients, over the step's own field.
     """
     computed, true = computed_matrix(attitude_step, ring, rate, top), true_matrix(ring, rate, top)
     parts = parts_of_error(computed, true, ring, top)
@@ -208,18 +152,7 @@ def shown(attitude_step: Step, element: Any) -> Any:
 
 
 def split(error: Sequence[Any]) -> dict[str, list[Any]]:
-    """Return the scale, skew and drift of an error matrix.
-
-    Parameters
-    ----------
-    error : sequence of Expr
-        Nine elements, row by row.
-
-    Returns
-    -------
-    dict of str to list of Expr
-        "scale", "skew" and "drift", three elements each.
-    """
+    """Return the scale, skew and drift of an error matrix."""
     return {
         name: [sp.Add(*(share * error[place] for place, share in form)) for form in forms]
         for name, forms in _forms_of_error().items()
@@ -251,20 +184,7 @@ def _error_matrix() -> Kernel:
 def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
     """Return the state after one step from zero rotation, row by row.
 
-    Parameters
-    ----------
-    attitude_step : Step
-    ring : PolyRing
-        Ring of the coefficients, over the field of the step.
-    rate : sequence of sequence of ring element
-        The rate in rad/s and its derivatives at the beginning of the step.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    list of Powers
-        The elements of the state, row-major.
+    `rate`: the rate in rad/s and its derivatives at the beginning of the step.
     """
     sampled = sampled_motion.elements(ring, rate, attitude_step.shares(len(rate)), top)
     return state_of(attitude_step, sampled, ring, top)
@@ -311,19 +231,8 @@ def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:
 
     For the rate sum_j g_j t^j, dC/dt = C skew(w) leads to (n + 1) C_(n+1) = sum_j C_(n-j) skew(g_j).
 
-    Parameters
-    ----------
-    ring : PolyRing
-        Ring of the coefficients.
-    rate : sequence of sequence of ring element
-        The rate in rad/s and its derivatives at the beginning of the step.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    list of Powers
-        Nine elements, body to reference axes.
+    `rate`: the rate in rad/s and its derivatives at the beginning of the step. Returns: nine elements, body to
+    reference axes.
     """
     zero, one = ring.zero, ring.one
     skews = [

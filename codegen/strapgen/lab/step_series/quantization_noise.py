@@ -36,32 +36,19 @@ SAMPLE = PULSE**2 / 12
 
 @dataclass(frozen=True)
 class QuantizationNoise:
-    """The error of an attitude that quantized increments cause, as exact variances on an axis in units of q^2/12.
+    """The error of an attitude that quantized increments cause, as exact variances on an axis in units of q^2/12."""
 
-    Parameters
-    ----------
-    walk : Expr
-        What every step adds on all axes; 0 for a step in which the samples between steps cancel.
-    turning : Expr
-        What every step adds on the axes across the rate, in units of (w h)^2.
-    start, end : Expr
-        What the samples at the beginning of a run add once, and those at its end. A run whose first angle is exact
-        lacks the former. Beside a walk they are negligible.
-    """
-
+    #: What every step adds on all axes; 0 for a step in which the samples between steps cancel
     walk: sp.Expr
+    #: What every step adds on the axes across the rate, in units of (w h)^2
     turning: sp.Expr
+    #: What the samples at the beginning of a run add once, and those at its end. A run whose first angle is
+    #: exact lacks the former. Beside a walk they are negligible
     start: sp.Expr
     end: sp.Expr
 
     def across(self, ends: int = 1) -> sp.Expr:
-        """Return the variance on an axis across the rate in rad^2, in the symbols of this module.
-
-        Parameters
-        ----------
-        ends : int, optional
-            1 if the first angle of the run is exact, 2 if it is quantized too.
-        """
+        """Return the variance on an axis across the rate in rad^2, in the symbols of this module."""
         return self.along(ends) + SAMPLE * self.turning * RATE**2 * STEP * TIME
 
     def along(self, ends: int = 1) -> sp.Expr:
@@ -73,19 +60,8 @@ class QuantizationNoise:
     def mean_square(self, pulse: float, squared_angle: float, steps: int) -> float:
         """Return the mean square of the angle of the error at the end of a run whose first angle is exact.
 
-        Parameters
-        ----------
-        pulse : float
-            Angle of a pulse in rad.
-        squared_angle : float
-            Sum of the squares of the angles in rad by which the body turns in each step.
-        steps : int
-            Number of steps.
-
-        Returns
-        -------
-        float
-            In rad^2, of all axes together.
+        `pulse`: angle of a pulse in rad. `squared_angle`: sum of the squares of the angles in rad by which the body
+        turns in each step. Returned in rad^2, of all axes together.
         """
         once = 3 * (float(self.end) + float(self.walk) * steps)
         return pulse**2 / 12 * (once + 2 * float(self.turning) * squared_angle)
@@ -94,22 +70,6 @@ class QuantizationNoise:
 def quantization_noise(choice: Choice) -> QuantizationNoise:
     """Derive the noise of an attitude step.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step that takes increments.
-
-    Returns
-    -------
-    QuantizationNoise
-
-    Raises
-    ------
-    InputError
-        If the step takes no increments, or does not turn with its inputs to the second power.
-
-    Examples
-    --------
     A step of fourth order is exact for a linear rate, and has the factor 5/9:
 
     >>> noise = quantization_noise(catalogue.choose_step("euler", "rk4", 2))
@@ -132,26 +92,9 @@ def polynomial_noise(
 ) -> QuantizationNoise:
     """Derive the noise of a step whose rotation vector is a polynomial in its increments.
 
-    Parameters
-    ----------
-    rotation : sequence of Expr, (3,)
-        The rotation vector of a step; terms above the second power do not matter.
-    increments : sequence of sequence of Symbol, (K, 3)
-        The increments that it takes, oldest first.
-    previous, ahead : int, optional
-        How many of them lie before the step, and after it.
+    `rotation` (3,): the rotation vector of a step; terms above the second power do not matter. `increments` (K,
+    3): the increments that it takes, oldest first.
 
-    Returns
-    -------
-    QuantizationNoise
-
-    Raises
-    ------
-    InputError
-        If the vector is not a sum of increments and of their cross products, or no increment lies in the step.
-
-    Examples
-    --------
     >>> d1, d2 = (sp.Matrix(sp.symbols(f"{name}x {name}y {name}z")) for name in "ab")
     >>> [polynomial_noise(d1 + d2 + c * d1.cross(d2), [d1, d2]).turning for c in (0, sp.Rational(1, 2), 2)]
     [1, 1/2, 5]
@@ -178,22 +121,8 @@ def polynomial_noise(
 def extraction_noise(increments: int, node: sp.Expr, previous: int = 0, ahead: int = 0) -> sp.Expr:
     """Return the standard deviation of a rate that is extracted from quantized increments.
 
-    Parameters
-    ----------
-    increments : int
-        Increments of a step.
-    node : Expr
-        Time as a fraction of the step.
-    previous, ahead : int, optional
-        Increments from before the step and after it.
+    Returned in rad/s on each axis, in the symbols of this module.
 
-    Returns
-    -------
-    Expr
-        In rad/s on each axis, in the symbols of this module.
-
-    Examples
-    --------
     The thesis's extraction on two increments, at the beginning and in the middle of a step:
 
     >>> [extraction_noise(2, sp.sympify(node)) for node in ("0", "1/2")]

@@ -18,21 +18,7 @@ Rate = Sequence[Sequence[Any]]
 def elements(ring: Any, rate: Rate, shares: Sequence[Sequence[sp.Expr]], top: int) -> list[Powers]:
     """Return the elements of samples, row by row: the sum of shares[k][j] w_j h^(j+1) for the sample k.
 
-    Parameters
-    ----------
-    ring : PolyRing
-        Ring of the coefficients.
-    rate : sequence of sequence of ring element
-        The rate in rad/s, or the specific force in m/s^2, and its derivatives at the beginning of the step.
-    shares : sequence of sequence of Expr
-        What each derivative adds to each sample, as `increment_shares` or `node_shares` returns it.
-    top : int
-        The last power of the series.
-
-    Returns
-    -------
-    list of Powers
-        Three elements for each sample, in the order of the samples.
+    `rate`: the rate in rad/s, or the specific force in m/s^2, and its derivatives at the beginning of the step.
     """
     rows = []
     for row in shares:
@@ -67,14 +53,7 @@ def with_step(ring: Any, element: Any) -> Any:
 def by_power(ring: Any, elements: Sequence[Powers], top: int) -> dict[int, list[Any]]:
     """Return elements that are series in the size of the motion by the power of the step, in the ring of the frame.
 
-    Parameters
-    ----------
-    ring : PolyRing
-        The ring of the frame, without the length of the step.
-    elements : sequence of Powers
-        Their coefficients hold the length of the step as first generator.
-    top : int
-        The last power of the step.
+    `ring`: the ring of the frame, without the length of the step.
     """
     rows: dict[int, list[Any]] = {}
     for number, element in enumerate(elements):

@@ -45,28 +45,16 @@ class Movable(Protocol):
 
 @dataclass(frozen=True)
 class Bundle:
-    """Files of the user's that cases name.
+    """Files of the user's that cases name."""
 
-    Parameters
-    ----------
-    folder : Path
-        The folder that holds them all.
-    contents : dict of str to bytes
-        What they hold, by their paths in it.
-    """
-
+    #: The folder that holds them all
     folder: Path
+    #: What they hold, by their paths in it
     contents: dict[str, bytes]
 
     @classmethod
     def of(cls, paths: Iterable[str | Path]) -> Bundle | None:
-        """Return files with the folder that holds them all; None if there are none.
-
-        Raises
-        ------
-        InputError
-            If one cannot be read.
-        """
+        """Return files with the folder that holds them all; None if there are none."""
         files = [Path(path).resolve() for path in paths]
         if not files:
             return None
@@ -87,37 +75,17 @@ def moved(path: str, begin: Path, end: Path) -> str:
 
 @dataclass(frozen=True)
 class Cluster:
-    """Where the workers are.
+    """Where the workers are."""
 
-    Parameters
-    ----------
-    scheduler : str
-        Address of a Dask scheduler, as "tcp://10.0.0.7:8786"; empty for workers on this machine.
-    workers : int
-        Number of workers on this machine.
-    """
-
+    #: Address of a Dask scheduler, as "tcp://10.0.0.7:8786"; empty for workers on this machine
     scheduler: str = ""
+    #: Number of workers on this machine
     workers: int = 0
 
     @classmethod
     def of(cls, scheduler: str | None, cluster: str | None) -> Cluster | None:
         """Return the cluster that two options state; None if neither does.
 
-        Parameters
-        ----------
-        scheduler : str or None
-            The address of a scheduler.
-        cluster : str or None
-            "local:N" for N workers on this machine.
-
-        Raises
-        ------
-        InputError
-            If both are stated, or one has another form.
-
-        Examples
-        --------
         >>> Cluster.of(None, "local:2")
         Cluster(scheduler='', workers=2)
         """
@@ -143,31 +111,7 @@ def on_cluster(
     cluster: Cluster,
     files: Bundle | None = None,
 ) -> Iterator[tuple[str, Any]]:
-    """Run cases on a cluster, and yield each result when its case ends.
-
-    Parameters
-    ----------
-    work : callable
-        ``work(case)`` returns the result of a case; a function of a module of this package.
-    cases : mapping of str to object
-        What each case needs, by its name.
-    cluster : Cluster
-    files : Bundle, optional
-        Files that the cases name; the cases are then `Movable`.
-
-    Yields
-    ------
-    name : str
-    result : object
-
-    Raises
-    ------
-    MissingExtraError
-        If Dask is not installed.
-    StrapgenError
-        If the scheduler does not answer or is gone, a worker has another version of the code, or a case kills every
-        worker. What `work` raises is raised here.
-    """
+    """Run cases on a cluster, and yield each result when its case ends."""
     distributed = _distributed()
     run = uuid.uuid4().hex  # results of an earlier run are not taken for those of this one
     lost = (OSError, TimeoutError, distributed.comm.CommClosedError, distributed.CancelledError)

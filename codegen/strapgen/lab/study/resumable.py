@@ -37,31 +37,7 @@ def side_by_side(
     cluster: Cluster | None = None,
     files: Bundle | None = None,
 ) -> Iterator[tuple[str, Any]]:
-    """Run cases in several processes, here or on a cluster, and yield each result when its case ends.
-
-    Parameters
-    ----------
-    work : callable
-        ``work(case)`` returns the result of a case; a function of a module, which other processes can import.
-    cases : mapping of str to object
-        What each case needs, by its name.
-    jobs : int, optional
-        Number of processes; by default one for each processor.
-    cluster : Cluster, optional
-        Where the cases run, in place of processes of this one.
-    files : Bundle, optional
-        Files that the cases name, for workers on other machines.
-
-    Yields
-    ------
-    name : str
-    result : object
-
-    Raises
-    ------
-    StrapgenError
-        If a process is killed. What `work` raises is raised here.
-    """
+    """Run cases in several processes, here or on a cluster, and yield each result when its case ends."""
     if cluster is not None:
         yield from on_cluster(work, cases, cluster, files)
         return
@@ -97,34 +73,7 @@ def resume(
     cluster: Cluster | None = None,
     files: Bundle | None = None,
 ) -> Iterator[tuple[str, Any]]:
-    """Run the cases whose results a file does not hold yet, and add each result to the file when its case ends.
-
-    Parameters
-    ----------
-    work : callable
-        As for `side_by_side`; it returns plain JSON data.
-    cases : mapping of str to object
-        As for `side_by_side`. The file may hold results of other cases as well.
-    results : path
-        The results file, which is created if it does not exist.
-    identity : mapping of str to JSON data
-        What the study is: the version of what computes, and all parameters that its cases share.
-    jobs, cluster, files
-        As for `side_by_side`.
-
-    Yields
-    ------
-    name : str
-    result : JSON data
-        Those of the file first, then the others as they come. A result has the same value when it is read again.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written, another process writes it, or it holds another study.
-    StrapgenError
-        If a process is killed.
-    """
+    """Run the cases whose results a file does not hold yet, and add each result to the file when its case ends."""
     path = Path(results)
     with _opened(path) as file:
         known = _known(file, path, dict(identity))

@@ -20,24 +20,6 @@ def word_length_image(outcomes: Sequence[Outcome], path: str | Path) -> bytes:
 
     Dotted, in the colour of its line, the certified bound of the rounding, on top of what else moves the drift; dashed
     the floor of the method, and where gyro pulses set a higher one, that.
-
-    Parameters
-    ----------
-    outcomes : sequence of Outcome
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
     """
     panels = by_method_step_and_pulse(outcomes)
     columns = min(3, len(panels))

@@ -69,17 +69,11 @@ FORMS: dict[str, tuple[str, dict[str, str]]] = {
 
 @dataclass(frozen=True)
 class PartRates:
-    """How often a navigator runs each part, in Hz.
+    """How often a navigator runs each part, in Hz."""
 
-    Parameters
-    ----------
-    update : float
-        Slow cycles: update, matrix, velocity.
-    navigation, orthonormalization : float
-        0 for a part that is never run.
-    """
-
+    #: Slow cycles: update, matrix, velocity
     update: float
+    #: 0 for a part that is never run
     navigation: float
     orthonormalization: float
 
@@ -92,25 +86,17 @@ class PartRates:
 
 @dataclass(frozen=True)
 class PartCost:
-    """What a part of a form costs.
+    """What a part of a form costs."""
 
-    Parameters
-    ----------
-    form, part, kernel : str
-        Keys of `FORMS` and `PARTS`; the kernel is "" where the form does without the part.
-    hz : float
-        How often it runs.
-    operations : mapping of str to int
-        Operations of a call in floating point, by kind.
-    executed : int or None
-        Instructions of a call in fixed point; None where none were counted.
-    """
-
+    #: Keys of `FORMS` and `PARTS`; the kernel is "" where the form does without the part
     form: str
     part: str
     kernel: str
+    #: How often it runs
     hz: float
+    #: Operations of a call in floating point, by kind
     operations: Mapping[str, int]
+    #: Instructions of a call in fixed point; None where none were counted
     executed: int | None = None
 
     @property
@@ -121,44 +107,28 @@ class PartCost:
 
 @dataclass(frozen=True)
 class VelocityLoss:
-    """What the first-order attitude in a slow cycle costs in velocity.
+    """What the first-order attitude in a slow cycle costs in velocity."""
 
-    Parameters
-    ----------
-    largest_rate : float
-        In rad/s.
-    angle : float
-        Angle of a slow cycle at that rate, in rad.
-    along, across : float
-        Errors as parts of the velocity increment.
-    error, slowest_hz : float
-        A stated error, and the slow rate that it takes.
-    """
-
+    #: In rad/s
     largest_rate: float
+    #: Angle of a slow cycle at that rate, in rad
     angle: float
+    #: Errors as parts of the velocity increment
     along: float
     across: float
+    #: A stated error, and the slow rate that it takes
     error: float
     slowest_hz: float
 
 
 @dataclass(frozen=True)
 class FormStudy:
-    """The costs of all forms.
-
-    Parameters
-    ----------
-    rates : PartRates
-    parts : tuple of PartCost
-    truncation : VelocityLoss
-    cpu : str
-        Processor on which instructions were counted; "" if none were.
-    """
+    """The costs of all forms."""
 
     rates: PartRates
     parts: tuple[PartCost, ...]
     truncation: VelocityLoss
+    #: Processor on which instructions were counted; "" if none were
     cpu: str = ""
 
     def of(self, form: str) -> list[PartCost]:
@@ -183,13 +153,7 @@ class FormStudy:
 
 
 def pairs(without: Iterable[str] = ()) -> list[tuple[str, str]]:
-    """Return the forms and parts that are counted.
-
-    Raises
-    ------
-    InputError
-        If a part that is left out is not known, or none is left.
-    """
+    """Return the forms and parts that are counted."""
     left_out = {checks.choice("without", name, PARTS) for name in without}
     remaining = [part for part in PARTS if part not in left_out]
     if not remaining:
@@ -200,26 +164,7 @@ def pairs(without: Iterable[str] = ()) -> list[tuple[str, str]]:
 def part_costs(
     which: Iterable[tuple[str, str]], rates: PartRates, cpu: str = "", settings: Settings | None = None
 ) -> Iterator[PartCost]:
-    """Count the operations of parts, and where a processor is named their instructions in fixed point.
-
-    Parameters
-    ----------
-    which : iterable of (str, str)
-        Forms and parts.
-    rates : PartRates
-    cpu : str, optional
-    settings : Settings, optional
-        Settings of fixed point.
-
-    Yields
-    ------
-    PartCost
-
-    Raises
-    ------
-    CompilerError
-        If the code cannot be measured on the processor.
-    """
+    """Count the operations of parts, and where a processor is named their instructions in fixed point."""
     for form, part in which:
         kernel = FORMS[form][1][part]
         if not kernel:
@@ -234,13 +179,7 @@ def part_costs(
 def truncation(rates: PartRates, largest_rate: float, error: float) -> VelocityLoss:
     """Return what (47) costs at the slow rate, and the slow rate for a stated error.
 
-    Parameters
-    ----------
-    rates : PartRates
-    largest_rate : float
-        In rad/s.
-    error : float
-        As part of the velocity increment.
+    `largest_rate`: in rad/s.
     """
     slowest = transformation_error.slowest_rate(largest_rate, error)
     angle = largest_rate / rates.update

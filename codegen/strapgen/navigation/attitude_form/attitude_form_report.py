@@ -26,21 +26,7 @@ def attitude_form_report(study: FormStudy) -> Report:
 
 
 def attitude_form_image(study: FormStudy, path: str | Path) -> bytes:
-    """Return the operations of each form in a second, a bar whose pieces are the parts.
-
-    Parameters
-    ----------
-    study : FormStudy
-    path : path
-        File for the image; its ending says which kind.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return the operations of each form in a second, a bar whose pieces are the parts."""
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 3.6))
     axes = grid[0, 0]
     shown = list(dict.fromkeys(part.part for part in study.parts))

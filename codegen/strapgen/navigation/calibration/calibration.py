@@ -32,18 +32,6 @@ RATE, ACCELERATION = sp.symbols("w_x w_y w_z"), sp.symbols("a_x a_y a_z")
 def error_derivatives(quantity: str) -> dict[str, sp.Matrix]:
     """Return the derivatives of the error of a quantity by the coefficients of the error model.
 
-    Parameters
-    ----------
-    quantity : str
-        A key of `QUANTITIES`.
-
-    Returns
-    -------
-    dict of str to Matrix, 3 x 1
-        By the name of the coefficient, in `RATE` and `ACCELERATION`; in the order of the model.
-
-    Examples
-    --------
     >>> error_derivatives("rate")["B_yz"].T
     Matrix([[0, a_z, -a_y]])
     """
@@ -78,16 +66,10 @@ def _columns_at_rest(quantity: str) -> dict[str, sp.Matrix]:
 
 @dataclass(frozen=True)
 class Scheme:
-    """Positions of a unit at rest.
-
-    Parameters
-    ----------
-    name : str
-    positions : tuple of tuple of Expr, (N, 3)
-        The specific force in body axes in the unit of gravity, as exact numbers.
-    """
+    """Positions of a unit at rest."""
 
     name: str
+    #: The specific force in body axes in the unit of gravity, as exact numbers
     positions: tuple[tuple[sp.Expr, ...], ...]
 
     def design(self, quantity: str) -> sp.Matrix:
@@ -101,25 +83,16 @@ class Scheme:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a scheme tells of the coefficients of one quantity.
+    """What a scheme tells of the coefficients of one quantity."""
 
-    Parameters
-    ----------
-    quantity : str
-        A key of `QUANTITIES`.
-    names : tuple of str
-        The coefficients, in the order of the model.
-    rank : int
-        Exact rank of the matrix a.
-    unseen : tuple of dict of str to Expr
-        Combinations of coefficients that leave no trace in any position, as exact numbers by the coefficient's name.
-    design : Matrix
-        The matrix a.
-    """
-
+    #: A key of `QUANTITIES`
     quantity: str
+    #: The coefficients, in the order of the model
     names: tuple[str, ...]
+    #: Exact rank of the matrix a
     rank: int
+    #: Combinations of coefficients that leave no trace in any position, as exact numbers by the coefficient's
+    #: name
     unseen: tuple[dict[str, sp.Expr], ...]
     design: sp.Matrix
 
@@ -150,15 +123,7 @@ class Calibration:
     def estimate(self, errors: Any) -> dict[str, float]:
         """Return the least squares of measured errors.
 
-        Parameters
-        ----------
-        errors : array_like, (N, 3)
-            The error of each position, in the order of the scheme.
-
-        Raises
-        ------
-        InputError
-            If the scheme cannot see a coefficient; the message names it.
+        `errors` (N, 3): the error of each position, in the order of the scheme.
         """
         if self.unseen:
             raise InputError(
@@ -174,15 +139,8 @@ class Calibration:
     def error_covariance(self, rate: Sequence[float], acceleration: Sequence[float]) -> Array:
         """Return the covariance of the compensated quantity that estimated coefficients leave, (3, 3).
 
-        Parameters
-        ----------
-        rate, acceleration : sequence of float, (3,)
-            In rad/s, and in the unit of gravity, body axes. Coefficients that rest cannot show are taken for exact.
-
-        Returns
-        -------
-        array, (3, 3)
-            In the variance of a measurement.
+        `rate, acceleration` (3,): in rad/s, and in the unit of gravity, body axes. Coefficients that rest cannot
+        show are taken for exact.
         """
         values = dict(zip((*RATE, *ACCELERATION), (*rate, *acceleration), strict=True))
         columns = error_derivatives(self.quantity)
@@ -195,14 +153,6 @@ class Calibration:
 def calibrated(scheme: Scheme, quantity: str) -> Calibration:
     """Return what a scheme tells of the coefficients of a quantity.
 
-    Parameters
-    ----------
-    scheme : Scheme
-    quantity : str
-        A key of `QUANTITIES`.
-
-    Examples
-    --------
     >>> one = calibrated(Scheme("up and down", ((0, 0, 1), (0, 0, -1))), "rate")
     >>> one.rank, len(one.names)
     (6, 15)

@@ -31,36 +31,21 @@ _LENGTH = 1e-6
 
 @dataclass(frozen=True)
 class CalibrationFile:
-    """A scheme, the noise of its measurements, and the errors that were measured.
-
-    Parameters
-    ----------
-    scheme : Scheme
-    sigma : dict of str to float
-        Standard deviation of a measurement by quantity, in `UNITS`; 1 where the file has none.
-    errors : dict of str to list
-        Rows of three errors, indicated less true, by quantity, in `UNITS`; of those that were measured.
-    """
+    """A scheme, the noise of its measurements, and the errors that were measured."""
 
     scheme: Scheme
+    #: Standard deviation of a measurement by quantity, in `UNITS`; 1 where the file has none
     sigma: dict[str, float]
+    #: Rows of three errors, indicated less true, by quantity, in `UNITS`; of those that were measured
     errors: dict[str, list[list[float]]]
 
 
 def read(path: str | Path) -> CalibrationFile:
     """Read a scheme.
 
-    Parameters
-    ----------
-    path : path
-        A TOML file with ``positions``, rows of three exact numbers such as "sqrt(2)/2", the specific force in body axes
-        in the unit of gravity; and, if need be, ``name``, ``rate_sigma_deg_h``, ``acceleration_sigma_micro_g``,
-        ``rate_errors_deg_h`` and ``acceleration_errors_micro_g``.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or a key or a number is not allowed; one line names it.
+    `path`: a TOML file with ``positions``, rows of three exact numbers such as "sqrt(2)/2", the specific force
+    in body axes in the unit of gravity; and, if need be, ``name``, ``rate_sigma_deg_h``,
+    ``acceleration_sigma_micro_g``, ``rate_errors_deg_h`` and ``acceleration_errors_micro_g``.
     """
     data = toml_files.content(path, "a scheme of positions", _MOST_BYTES, parse_float=str)
     try:

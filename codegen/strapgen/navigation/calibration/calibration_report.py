@@ -27,15 +27,8 @@ def calibration_report(
 ) -> Report:
     """Return the study as a report.
 
-    Parameters
-    ----------
-    file : CalibrationFile
-    several : sequence of Calibration
-        One for each quantity.
-    estimates : mapping of str to mapping
-        Least squares of measured errors, by quantity and coefficient.
-    remaining : mapping of str to array, (3, 3)
-        Covariance of the compensated quantity in flight, in squares of its unit; empty without a flight.
+    `remaining` (3, 3): covariance of the compensated quantity in flight, in squares of its unit; empty without
+    a flight.
     """
     rows = [_row(file, one, name, estimates) for one in several for name in one.names]
     return Report(

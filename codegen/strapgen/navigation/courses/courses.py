@@ -57,17 +57,11 @@ class Course(Records):
 
 @dataclass(frozen=True)
 class NavigationFrame:
-    """The navigation frame of a run: the attitude of the body in it at the start, and its rate.
+    """The navigation frame of a run: the attitude of the body in it at the start, and its rate."""
 
-    Parameters
-    ----------
-    initial_angles : iterable of float, (3,), optional
-        Roll, pitch, heading at the start in rad.
-    frame_rate : iterable of float, (3,), optional
-        Rate of the navigation frame in rad/s, navigation axes.
-    """
-
+    #: Roll, pitch, heading at the start in rad
     initial_angles: Iterable[float] = (0.0, 0.0, 0.0)
+    #: Rate of the navigation frame in rad/s, navigation axes
     frame_rate: Iterable[float] = (0.0, 0.0, 0.0)
 
 

@@ -54,15 +54,7 @@ TIME = Signal.scalar(
 
 
 def coarse_leveling() -> Kernel:
-    """Return roll and pitch at rest, and the earth's rotation in level axes: the first part of the gyrocompass.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``vertical`` (3,), the sum of the velocity increments over gravity and time, and ``angle_sum`` (3,) in
-        rad, over any time at rest, axes b; outputs ``level`` (2,) in rad, roll and pitch against north, east and down,
-        and ``level_angles`` (3,) in rad, ahead, right and down.
-    """
+    """Return roll and pitch at rest, and the earth's rotation in level axes: the first part of the gyrocompass."""
     build = KernelBuilder()
     f, beta = build.input(VERTICAL), build.input(ANGLE_SUM)
     roll = build.value("level_roll", sp.atan2(-f[1], -f[2]), "roll")
@@ -88,11 +80,8 @@ def coarse_leveling() -> Kernel:
 def coarse_azimuth() -> Kernel:
     """Return the angles of the attitude at rest: the horizontal earth rate points north.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``level`` (2,) in rad and ``level_angles`` (3,) in rad; output ``angles`` (3,) in rad: roll, pitch and
-        heading against north, east and down.
+    Returns: inputs ``level`` (2,) in rad and ``level_angles`` (3,) in rad; output ``angles`` (3,) in rad: roll,
+    pitch and heading against north, east and down.
     """
     build = KernelBuilder()
     level, beta = build.input(LEVEL), build.input(LEVEL_ANGLES)
@@ -121,12 +110,6 @@ def late_latitude() -> Kernel:
     """Return the attitude after an alignment without the vertical earth rate, once latitude is known.
 
     Such a frame is left behind by We sin(latitude) t about up.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` (3, 3), C_b^n, ``geographic`` (3,) in rad, ``sidereal_rate`` in rad/s and ``time`` in s; output
-        ``next_state`` (3, 3).
     """
     build = KernelBuilder()
     C = build.input(ATTITUDE)

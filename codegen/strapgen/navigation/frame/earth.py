@@ -13,45 +13,24 @@ from strapgen.ir.exceptions import InputError
 class Earth:
     """A model of the earth, and its constants by the names of the kernels' inputs.
 
-    Parameters
-    ----------
-    shape : str
-        "sphere" or "ellipsoid", as in the names of the kernels.
-    radius : float
-        Radius of the sphere, or equatorial radius, in m.
-    rate : float
-        Earth rate against inertial axes, in rad/s.
-    constants : mapping of str to float
-        Value of every input of the kernels that is a constant of the earth, in SI units.
-
-    Examples
-    --------
     >>> Earth.sphere(3.986004418e14, 6.4e6, 7.292115e-5).constants["curvature"]
     1.5625e-07
     """
 
+    #: "sphere" or "ellipsoid", as in the names of the kernels
     shape: str
+    #: Radius of the sphere, or equatorial radius, in m
     radius: float
+    #: Earth rate against inertial axes, in rad/s
     rate: float
+    #: Value of every input of the kernels that is a constant of the earth, in SI units
     constants: Mapping[str, float]
 
     @classmethod
     def sphere(cls, mu: float, radius: float, rate: float) -> Earth:
         """Return a turning sphere.
 
-        Parameters
-        ----------
-        mu : float
-            Gravitational constant times mass, in m^3/s^2.
-        radius : float
-            In m.
-        rate : float
-            In rad/s.
-
-        Raises
-        ------
-        InputError
-            If the constant or the radius is not above zero.
+        `mu`: gravitational constant times mass, in m^3/s^2. `rate`: in rad/s.
         """
         for name, value in (("mu", mu), ("radius", radius)):
             if not value > 0:
@@ -68,8 +47,6 @@ class Earth:
     def wgs84(cls) -> Earth:
         """Return the ellipsoid of the World Geodetic System 1984, NIMA TR8350.2, tables 3.1 to 3.4.
 
-        Examples
-        --------
         >>> round(1 / Earth.wgs84().constants["curvature"])
         6378137
         """
@@ -90,15 +67,8 @@ class Earth:
 def schuler_rate(gravity: float, radius: float) -> float:
     """Return Schuler's frequency sqrt(g/R) in rad/s.
 
-    Parameters
-    ----------
-    gravity : float
-        In m/s^2.
-    radius : float
-        In m.
+    `gravity`: in m/s^2.
 
-    Examples
-    --------
     >>> f"{schuler_rate(9.81, 6373388):.10e}"
     '1.2406501275e-03'
     """

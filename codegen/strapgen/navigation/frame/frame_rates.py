@@ -47,13 +47,7 @@ LEAD = Signal.scalar(
 
 
 def earth_rate() -> Kernel:
-    """Return the earth rate in navigation axes, Wn = C_n^e' (0, 0, We).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``position`` (3, 3), C_n^e, and ``sidereal_rate`` in rad/s; output ``earth_rate`` (3,) in rad/s, axes n.
-    """
+    """Return the earth rate in navigation axes, Wn = C_n^e' (0, 0, We)."""
     build = KernelBuilder()
     position, rate = build.input(POSITION), build.scalar(SIDEREAL_RATE)
     build.output(EARTH_RATE, rate * position[2, :].T)
@@ -62,32 +56,16 @@ def earth_rate() -> Kernel:
 
 @dataclass(frozen=True)
 class Curvatures:
-    """Curvatures of the surface at a height, as they enter the transport rate without a singularity at the poles.
+    """Curvatures of the surface at a height, as they enter the transport rate without a singularity at the poles."""
 
-    Parameters
-    ----------
-    transverse : Expr
-        1/(R_N + h) in 1/m, R_N the transverse radius.
-    excess : Expr
-        (R_N - R_M)/((R_M + h) cos^2 latitude), R_M the meridian radius; 0 on a sphere.
-    """
-
+    #: 1/(R_N + h) in 1/m, R_N the transverse radius
     transverse: sp.Expr
+    #: (R_N - R_M)/((R_M + h) cos^2 latitude), R_M the meridian radius; 0 on a sphere
     excess: sp.Expr
 
 
 def curvatures(build: KernelBuilder, shape: str, position: sp.Matrix, height: sp.Symbol) -> Curvatures:
-    """Declare the constants of a shape, "sphere" or "ellipsoid", as inputs, and return its curvatures.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    shape : str
-    position : Matrix, 3 x 3
-        C_n^e.
-    height : Symbol
-        In m.
-    """
+    """Declare the constants of a shape, "sphere" or "ellipsoid", as inputs, and return its curvatures."""
     curvature = build.scalar(CURVATURE)
     if shape == "sphere":
         raised = build.value("relative_height", curvature * height, "height over the radius")
@@ -112,20 +90,6 @@ def transport_rate(shape: str, azimuth: str = "wander") -> Kernel:
     On an ellipsoid, with u = (C31, C32) the horizontal part of the earth's axis in n, the rate is
     (-v_y - k (u v) C32, v_x + k (u v) C31)/(R_N + h), k = (R_N - R_M)/((R_M + h) cos^2 latitude). Nothing of it is
     singular at the poles, since u is the cosine of latitude times the direction of north.
-
-    Parameters
-    ----------
-    shape : str
-        "sphere" or "ellipsoid".
-    azimuth : str
-        "wander", "free" or "north".
-
-    Returns
-    -------
-    Kernel
-        Inputs ``position`` (3, 3), ``velocity`` (3,) in m/s, axes n, ``height`` in m, ``curvature`` in 1/m, for an
-        ellipsoid ``eccentricity_squared``, for "free" ``sidereal_rate`` in rad/s; output ``transport_rate`` (3,) in
-        rad/s, axes n.
     """
     build = KernelBuilder()
     P, v = build.input(POSITION), build.input(VELOCITY)
@@ -165,18 +129,6 @@ def navigation_turn(ahead: bool = False) -> Kernel:
     A slow loop that holds this value over m of its cycles needs it ahead: extrapolated by `lead` navigation cycles,
     1/2 + 1/(2m), a rate that is linear in time is integrated exactly by the rule, which itself lags by half a slow
     cycle.
-
-    Parameters
-    ----------
-    ahead : bool
-        Whether to extrapolate.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``earth_rate`` and ``transport_rate`` (3,) in rad/s, axes n, ``cycle`` in s, that of the loop which takes
-        the result, and to extrapolate ``previous_rate`` (3,), a state, in rad/s, and ``lead``; outputs ``turn`` (3,) in
-        rad, axes n, and ``next_previous_rate``.
     """
     build = KernelBuilder()
     before = build.input(PREVIOUS_RATE) if ahead else None

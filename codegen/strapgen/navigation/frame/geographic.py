@@ -24,12 +24,6 @@ def geographic_angles() -> Kernel:
 
     Columns z, x, y of C_n^e are a rotation whose heading is longitude, whose pitch is minus latitude and whose roll is
     the wander angle, so that they are as accurate at a pole as there: (61) to (63) of Savage.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``position`` (3, 3) and ``previous`` (3,), the angles of the call before in rad; output ``next`` (3,) in
-        rad: latitude, longitude, wander angle.
     """
     build = KernelBuilder()
     P = build.input(POSITION)
@@ -70,10 +64,7 @@ def _wander(build: KernelBuilder) -> tuple[sp.Symbol, sp.Symbol]:
 def position_from_angles() -> Kernel:
     """Return the position of latitude, longitude and wander angle, with which a run begins.
 
-    Returns
-    -------
-    Kernel
-        Input ``geographic`` (3,) in rad; output ``position`` (3, 3), C_n^e.
+    Returns: input ``geographic`` (3,) in rad; output ``position`` (3, 3), C_n^e.
     """
     build = KernelBuilder()
     (cl, sl), (co, so), (ca, sa) = _cosines(build, build.input(GEOGRAPHIC))
@@ -86,16 +77,9 @@ def position_from_angles() -> Kernel:
 def north_east_down(inverse: bool = False) -> Kernel:
     """Return the attitude against north, east and down, of which `euler-angles-from-dcm` has roll, pitch and heading.
 
-    Parameters
-    ----------
-    inverse : bool
-        Whether to return the attitude against axes n instead; the matrix between both is its own inverse.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state`` (3, 3), C_b^n, and ``geographic`` (3,) in rad; output ``attitude`` (3, 3), body to north, east
-        and down. For the inverse the input is ``attitude`` and the output ``state``.
+    `inverse`: whether to return the attitude against axes n instead; the matrix between both is its own
+    inverse. Returns: inputs ``state`` (3, 3), C_b^n, and ``geographic`` (3,) in rad; output ``attitude`` (3,
+    3), body to north, east and down. For the inverse the input is ``attitude`` and the output ``state``.
     """
     build = KernelBuilder()
     words = "attitude, direction cosine matrix from body axes b to north, east and down"
@@ -115,10 +99,8 @@ def north_east_down(inverse: bool = False) -> Kernel:
 def ground_velocity() -> Kernel:
     """Return the velocity to north, east and down.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``velocity`` (3,) in m/s, axes n, and ``geographic`` (3,) in rad; output ``ground_velocity`` (3,) in m/s.
+    Returns: inputs ``velocity`` (3,) in m/s, axes n, and ``geographic`` (3,) in rad; output ``ground_velocity``
+    (3,) in m/s.
     """
     build = KernelBuilder()
     v = build.input(VELOCITY)

@@ -54,12 +54,6 @@ def gravity_sphere() -> Kernel:
     """Return the gravity of a turning sphere, (0, 0, -mu/r^2) - Wn x (Wn x (0, 0, r)).
 
     With c the third row of C_n^e the second part is -We^2 r (c_z c - (0, 0, 1)).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``position`` (3, 3), ``height`` in m, ``curvature`` in 1/m, ``gravitation`` and ``centrifugal``, mu/R^2
-        and We^2 R, in m/s^2; output ``gravity`` (3,) in m/s^2, axes n.
     """
     build = KernelBuilder()
     c = build.input(POSITION)[2, :].T
@@ -86,13 +80,6 @@ def gravity_ellipsoid() -> Kernel:
     The height enters as gamma = gamma_0 (1 - 2 (f + m - 2 f sin^2) h/a)/(1 + h/a)^2, which is (2-123) of the source to
     second order in h/a and the flattening, and the sphere's inverse square where f and m are zero. The plumb line bends
     with height, so that gravity has the part -2 (h/a) gamma_e (k + e^2/2) sin cos along north, to first order: derived.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``position`` (3, 3), ``height`` in m, ``curvature`` in 1/m, ``eccentricity_squared``,
-        ``equator_gravity`` in m/s^2, ``gravity_increase``, ``flattening`` and ``centrifugal_ratio``; output
-        ``gravity`` (3,) in m/s^2, axes n.
     """
     build = KernelBuilder()
     c = build.input(POSITION)[2, :].T

@@ -58,14 +58,7 @@ def midpoint(rate: sp.Matrix, before: sp.Matrix) -> sp.Matrix:
 
 
 def coriolis_gravity() -> Kernel:
-    """Return what changes the velocity beside the specific force, g_n - (2 Wn + rho) x v.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``velocity`` (3,) in m/s, ``gravity`` (3,) in m/s^2, ``earth_rate`` and ``transport_rate`` (3,) in rad/s,
-        all axes n; output ``acceleration`` (3,) in m/s^2, axes n.
-    """
+    """Return what changes the velocity beside the specific force, g_n - (2 Wn + rho) x v."""
     build = KernelBuilder()
     v, g, W, rho = map(build.input, (VELOCITY, GRAVITY, EARTH_RATE, TRANSPORT_RATE))
     build.output(ACCELERATION, g - cross(2 * W + rho, v))
@@ -75,17 +68,9 @@ def coriolis_gravity() -> Kernel:
 def velocity_step(level: bool = False) -> Kernel:
     """Return the velocity after a cycle: specific force integrated, gravity and Coriolis by extrapolation to mid-cycle.
 
-    Parameters
-    ----------
-    level : bool
-        Whether the vertical velocity is held.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``velocity`` (3,) in m/s, ``previous_acceleration`` and ``acceleration`` (3,) in m/s^2,
-        ``velocity_change`` (3,) in m/s, all axes n, ``cycle`` in s; outputs ``next_velocity`` and
-        ``next_previous_acceleration``.
+    Returns: inputs ``velocity`` (3,) in m/s, ``previous_acceleration`` and ``acceleration`` (3,) in m/s^2,
+    ``velocity_change`` (3,) in m/s, all axes n, ``cycle`` in s; outputs ``next_velocity`` and
+    ``next_previous_acceleration``.
     """
     build = KernelBuilder()
     v, before, a, change = map(build.input, (VELOCITY, PREVIOUS_ACCELERATION, ACCELERATION, VELOCITY_CHANGE))
@@ -104,14 +89,7 @@ def velocity_step(level: bool = False) -> Kernel:
 
 
 def position_step() -> Kernel:
-    """Return the position after a cycle, C_n^e (I + [zeta x] + [zeta x]^2/2), zeta = T (3 rho - previous rho)/2.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``position`` (3, 3), ``previous_transport_rate`` and ``transport_rate`` (3,) in rad/s, axes n, ``cycle``
-        in s; outputs ``next_position`` and ``next_previous_transport_rate``.
-    """
+    """Return the position after a cycle, C_n^e (I + [zeta x] + [zeta x]^2/2), zeta = T (3 rho - previous rho)/2."""
     build = KernelBuilder()
     position, before, rho = map(build.input, (POSITION, PREVIOUS_TRANSPORT_RATE, TRANSPORT_RATE))
     zeta = build.stage(
@@ -136,11 +114,8 @@ def position_step() -> Kernel:
 def height_step() -> Kernel:
     """Return the height after a cycle, by the trapezoidal rule.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``height`` in m, ``velocity`` and ``next_velocity`` (3,) in m/s, axes n, ``cycle`` in s; output
-        ``next_height`` in m.
+    Returns: inputs ``height`` in m, ``velocity`` and ``next_velocity`` (3,) in m/s, axes n, ``cycle`` in s;
+    output ``next_height`` in m.
     """
     build = KernelBuilder()
     height = build.scalar(HEIGHT)

@@ -30,17 +30,9 @@ DISPLACEMENT = Signal.vector(
 def translation(name: str) -> Kernel:
     """Return velocity and position after a step: v + C dv + g T, and r + (v + C dr + g T/2) T.
 
-    Parameters
-    ----------
-    name : str
-        "dcm" or "euler".
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state``, the attitude at the start of the step, ``velocity_change`` and ``position_change`` (3,) in m/s
-        in body axes there, ``velocity`` (3,) in m/s, ``displacement`` (3,) in m and ``gravity`` (3,) in m/s^2, axes n,
-        ``cycle`` in s; outputs ``next_velocity`` and ``next_displacement``.
+    Returns: inputs ``state``, the attitude at the start of the step, ``velocity_change`` and
+    ``position_change`` (3,) in m/s in body axes there, ``velocity`` (3,) in m/s, ``displacement`` (3,) in m and
+    ``gravity`` (3,) in m/s^2, axes n, ``cycle`` in s; outputs ``next_velocity`` and ``next_displacement``.
     """
     build = KernelBuilder()
     state = build.input(KINEMATICS[name].state)

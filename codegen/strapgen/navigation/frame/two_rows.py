@@ -37,19 +37,7 @@ def _third(rows: list[sp.Matrix]) -> sp.Matrix:
 
 
 def update(order: int | None = None) -> Kernel:
-    """Return the kernel that rotates two rows by the rotation vector of a cycle, equations (2) to (4).
-
-    Parameters
-    ----------
-    order : int, optional
-        Highest degree of products of elements of the rotation vector; exact by default.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``row_1`` and ``row_2`` (3,), axes b, and ``rotation_vector`` (3,) in rad; outputs ``next_row_1`` and
-        ``next_row_2``.
-    """
+    """Return the kernel that rotates two rows by the rotation vector of a cycle, equations (2) to (4)."""
     build = KernelBuilder()
     rows = [build.input(row) for row in ROWS]
     turned = transition(build, DCM, build.input(ROTATION_VECTOR), order)
@@ -64,19 +52,7 @@ def update(order: int | None = None) -> Kernel:
 
 
 def navigation(order: int | None = None) -> Kernel:
-    """Return the kernel that refers two rows to the rotated navigation frame, equations (5), (6) and (43).
-
-    Parameters
-    ----------
-    order : int, optional
-        As for `update`.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``row_1`` and ``row_2`` (3,), axes b, and ``navigation_rotation`` (3,) in rad, axes n; outputs
-        ``next_row_1`` and ``next_row_2``.
-    """
+    """Return the kernel that refers two rows to the rotated navigation frame, equations (5), (6) and (43)."""
     build = KernelBuilder()
     rows = [build.input(row) for row in ROWS]
     turn = transition(build, DCM, -build.input(NAVIGATION_ROTATION), order, "n")
@@ -95,13 +71,7 @@ def navigation(order: int | None = None) -> Kernel:
 
 
 def orthonormalized() -> Kernel:
-    """Return two rows made orthonormal to first order, equations (28) to (31).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``row_1`` and ``row_2`` (3,), axes b; outputs ``next_row_1`` and ``next_row_2``.
-    """
+    """Return two rows made orthonormal to first order, equations (28) to (31)."""
     build = KernelBuilder()
     rows = [build.input(row) for row in ROWS]
     half = build.value("half_error", rotations.dot(*rows) / 2, "half the rows' product")
@@ -122,13 +92,7 @@ def orthonormalized() -> Kernel:
 
 
 def matrix() -> Kernel:
-    """Return the direction cosine matrix of two rows, equation (43).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``row_1`` and ``row_2`` (3,), axes b; output ``attitude`` (3, 3), C_b^n.
-    """
+    """Return the direction cosine matrix of two rows, equation (43)."""
     build = KernelBuilder()
     rows = [build.input(row) for row in ROWS]
     attitude = replace(DCM.state, name="attitude")

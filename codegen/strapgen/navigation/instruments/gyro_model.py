@@ -50,19 +50,8 @@ def parameters(number: int) -> dict[str, sp.Symbol]:
 def gyro_torques(W: sp.Matrix, A: sp.Matrix, unbalance: sp.Expr, error: dict[str, sp.Expr]) -> sp.Matrix:
     """Return what the torquers of one gyro measure, equations (4.1) and (4.2).
 
-    Parameters
-    ----------
-    W, A : Matrix, 3 x 1
-        Rate in rad/s and acceleration in m/s^2 in the axes of the gyro: torquers x and y, spin z.
-    unbalance : Expr
-        Mass unbalance in rad/s per m/s^2.
-    error : dict of str to Expr
-        The error parameters by the names in `PARAMETERS`.
-
-    Returns
-    -------
-    Matrix, 2 x 1
-        -My/H and Mx/H in rad/s, which are W + B A about x and y for a gyro without errors.
+    `W, A`: rate in rad/s and acceleration in m/s^2 in the axes of the gyro: torquers x and y, spin z.
+    `unbalance`: mass unbalance in rad/s per m/s^2.
     """
     e, B = error, unbalance + error["dB"]
     M = W + B * A
@@ -96,17 +85,12 @@ def gyro_errors(number: int, W: sp.Matrix, A: sp.Matrix, unbalance: sp.Expr) -> 
 
 @dataclass(frozen=True)
 class ErrorStructure:
-    """The coefficients of the error model (4.9), and where they stand in its matrices.
+    """The coefficients of the error model (4.9), and where they stand in its matrices."""
 
-    Parameters
-    ----------
-    matrices : dict of str to Matrix
-        The matrix of every term by its letter, rows x, y, z: an entry is 0 or a multiple of a coefficient's symbol.
-    forms : dict of Symbol to Expr
-        Each coefficient as a linear form of the error parameters of the gyros.
-    """
-
+    #: The matrix of every term by its letter, rows x, y, z: an entry is 0 or a multiple of a coefficient's
+    #: symbol
     matrices: dict[str, sp.Matrix]
+    #: Each coefficient as a linear form of the error parameters of the gyros
     forms: dict[sp.Symbol, sp.Expr]
 
     def coefficients(self, letter: str) -> tuple[sp.Symbol, ...]:
@@ -158,24 +142,6 @@ def error_structure(gyros: Sequence[TwoAxisGyro], sign: int) -> ErrorStructure:
     The errors of the torques (4.3) go through the separation of the layout. Entries of a matrix that are multiples of
     each other for any errors of the gyros share one coefficient, which is named after the first of them.
 
-    Parameters
-    ----------
-    gyros : sequence of TwoAxisGyro
-        Three gyros.
-    sign : int
-        As in `separation.measurement_matrix`.
-
-    Returns
-    -------
-    ErrorStructure
-
-    Raises
-    ------
-    InputError
-        If the layout is singular, or if its errors hold squares of an element, which (4.9) has no term for.
-
-    Examples
-    --------
     >>> error_structure(diagonal_layout(), 1).matrices["J"]
     Matrix([
     [0, J_xy, J_xz],

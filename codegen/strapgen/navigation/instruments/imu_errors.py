@@ -54,15 +54,7 @@ _NOTES = (
 
 
 class ErrorModel:
-    """The error model (4.9) in increments, under construction in a kernel: its inputs, and the errors of a motion.
-
-    Parameters
-    ----------
-    build : KernelBuilder
-    structure : ErrorStructure
-    constants : mapping of str to Fraction
-        Exact values for coefficients, for instance "K_xx", and for "cycle"; they are no inputs then.
-    """
+    """The error model (4.9) in increments, under construction in a kernel: its inputs, and the errors of a motion."""
 
     def __init__(
         self, build: KernelBuilder, structure: ErrorStructure, constants: Mapping[str, Fraction]
@@ -98,12 +90,7 @@ class ErrorModel:
     def errors(self, d: sp.Matrix, dv: sp.Matrix, suffix: str = "") -> tuple[sp.Matrix, sp.Matrix]:
         """Return the errors of an angle increment in rad and of a velocity increment in m/s.
 
-        Parameters
-        ----------
-        d, dv : Matrix, 3 x 1
-            Increments of the cycle, rad and m/s, body axes.
-        suffix : str
-            End of the names of the stages.
+        `d, dv`: increments of the cycle, rad and m/s, body axes.
         """
         p, r = (
             self.build.stage(
@@ -159,29 +146,8 @@ def imu_compensate(
 ) -> Kernel:
     """Return the compensation of measured increments by the error model (4.9): true = measured - error.
 
-    Parameters
-    ----------
-    passes : int
-        1 for the error at the measured values, as flown; 2 for the error at the result of the first pass.
-    constants : mapping of str to Fraction, optional
-        Exact values of coefficients, as "K_xx", and of "cycle" in s, which take the place of inputs.
-    structure : ErrorStructure, optional
-        Structure of the error model; by default that of the source, Fig. 20.
+    `constants`: exact values of coefficients, as "K_xx", and of "cycle" in s, which take the place of inputs.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``increment`` (3,) in rad and ``velocity_increment`` (3,) in m/s, measured, body axes, ``cycle`` in s,
-        ``cycle_rate`` in 1/s and the coefficients, each with its unit; outputs ``compensated_increment`` and
-        ``compensated_velocity_increment``.
-
-    Raises
-    ------
-    InputError
-        If the number of passes is neither 1 nor 2, or a constant is unknown.
-
-    Examples
-    --------
     >>> imu_compensate().outputs[0].signal.unit
     'rad'
     """
@@ -211,19 +177,7 @@ def imu_compensate(
 def imu_errors(
     constants: Mapping[str, Fraction] | None = None, structure: ErrorStructure | None = None
 ) -> Kernel:
-    """Return the errors of a unit by the error model (4.9): measured = true + error at the true values.
-
-    Parameters
-    ----------
-    constants, structure
-        As for `imu_compensate`.
-
-    Returns
-    -------
-    Kernel
-        Inputs as those of `imu_compensate`, the increments true; outputs ``measured_increment`` and
-        ``measured_velocity_increment``.
-    """
+    """Return the errors of a unit by the error model (4.9): measured = true + error at the true values."""
     build = KernelBuilder()
     d, dv = (build.input(_measured(signal, "true")) for signal in (INCREMENT, VELOCITY_INCREMENT))
     model = ErrorModel(build, structure or source_structure(), constants or {})

@@ -46,25 +46,17 @@ class GyroDescription(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Three gyros with torquer axes and mass unbalances, as a file describes them.
+    """Three gyros with torquer axes and mass unbalances, as a file describes them."""
 
-    Parameters
-    ----------
-    name, title, source : str
-        Name in those of kernels, name in the file, where the layout comes from.
-    sign : int
-        s of M = W + s B A: 1 or -1.
-    gyros : tuple of GyroDescription
-        Axes as exact numbers in body axes.
-    file : str
-        Path of the file.
-    """
-
+    #: Name in those of kernels, name in the file, where the layout comes from
     name: str
     title: str
     source: str
+    #: s of M = W + s B A: 1 or -1
     sign: int
+    #: Axes as exact numbers in body axes
     gyros: tuple[GyroDescription, ...]
+    #: Path of the file
     file: str = field(default="", compare=False, repr=False)
 
     @property
@@ -76,25 +68,11 @@ class Layout:
 def read(path: str | Path) -> Layout:
     """Read a layout from a file and check its axes exactly.
 
-    Parameters
-    ----------
-    path : path
-        A TOML file with the keys `KEYS` and three tables ``[[gyros]]`` with keys of `GYRO_KEYS`. Every number is a
-        whole number or a string, see `coefficients.number`. An axis has three, in body axes. A gyro has its torquer
-        axis ``x`` and either ``y`` or its ``spin`` axis, x cross y; ``turn_deg``, by default 0, turns both torquer
-        axes about the spin axis by an angle in deg. The unbalance is a number in rad/s per m/s^2 or a multiple of a
-        symbol, such as ``"-B"`` or ``"B2/3"``.
-
-    Returns
-    -------
-    Layout
-        Named after its key `name`, in lower case with hyphens.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key or number is wrong, or axes are not of length 1 and perpendicular; the
-        message names the gyro.
+    `path`: a TOML file with the keys `KEYS` and three tables ``[[gyros]]`` with keys of `GYRO_KEYS`. Every
+    number is a whole number or a string, see `coefficients.number`. An axis has three, in body axes. A gyro has
+    its torquer axis ``x`` and either ``y`` or its ``spin`` axis, x cross y; ``turn_deg``, by default 0, turns
+    both torquer axes about the spin axis by an angle in deg. The unbalance is a number in rad/s per m/s^2 or a
+    multiple of a symbol, such as ``"-B"`` or ``"B2/3"``.
     """
     data = toml_files.content(path, "a layout", MOST_BYTES)
     try:

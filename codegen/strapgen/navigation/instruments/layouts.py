@@ -29,8 +29,6 @@ _MOST_CHARACTERS = 30
 def gyros(layout: Layout) -> tuple[TwoAxisGyro, ...]:
     """Return the gyros of a layout.
 
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> from strapgen.navigation.instruments.layout import Unbalance
     >>> one = GyroDescription((1, 0, 0), (0, 1, 0), Fraction(30), Unbalance(-1, "B"))
@@ -41,22 +39,7 @@ def gyros(layout: Layout) -> tuple[TwoAxisGyro, ...]:
 
 
 def separate(layout: Layout) -> Kernel:
-    """Return the separation of rate and acceleration for a layout.
-
-    Parameters
-    ----------
-    layout : Layout
-
-    Returns
-    -------
-    Kernel
-        As `separation.separating_kernel` returns. Its notes state the determinant of the torques and the noise gains.
-
-    Raises
-    ------
-    InputError
-        If the layout is singular; the message names its file and a motion that it does not see.
-    """
+    """Return the separation of rate and acceleration for a layout."""
     kernel = _named(separating_kernel, "separate", "Separation of rate and acceleration", layout)
     described = gyros(layout)
     gains = [_text(gain) for gain in noise_gains(described, layout.sign)]
@@ -72,13 +55,7 @@ def separate(layout: Layout) -> Kernel:
 
 
 def measure(layout: Layout) -> Kernel:
-    """Return the torques of a layout, which `separate` takes apart; parameters and errors are its.
-
-    Returns
-    -------
-    Kernel
-        As `separation.measuring_kernel` returns.
-    """
+    """Return the torques of a layout, which `separate` takes apart; parameters and errors are its."""
     return _named(measuring_kernel, "torques", "Torques of mass-unbalanced gyros", layout)
 
 

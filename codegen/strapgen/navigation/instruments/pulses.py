@@ -38,19 +38,8 @@ def _coefficients(build: KernelBuilder, rate: str, electronics: bool) -> dict[st
 def pulse_compensate(exact_bias: bool = False, sensor: str = "") -> Kernel:
     """Return the compensation of a pulse count, equations (7) to (9).
 
-    Parameters
-    ----------
-    exact_bias : bool
-        Whether the offset of the converter is divided by the scale factor, which inverts (4) to (6) exactly; the
-        source adds it undivided.
-    sensor : str
-        "" for an accelerometer with a converter, "gyro" for a gyro, which has no separate offset of the electronics.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``count`` in m/s (or rad), the raw count times its quantum, ``cycle`` in s, and the coefficients, all
-        scalar, sensor axis; output ``compensated`` in m/s (or rad).
+    `exact_bias`: whether the offset of the converter is divided by the scale factor, which inverts (4) to (6)
+    exactly; the source adds it undivided.
     """
     unit, rate, word, bound = _UNITS[sensor]
     build = KernelBuilder()
@@ -79,19 +68,7 @@ def pulse_compensate(exact_bias: bool = False, sensor: str = "") -> Kernel:
 
 
 def pulse_errors(sensor: str = "") -> Kernel:
-    """Return the count of a sensor, equations (4) to (6), in increments.
-
-    Parameters
-    ----------
-    sensor : str
-        As for `pulse_compensate`.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``increment`` in m/s (or rad), true, ``cycle`` in s, and the coefficients, all scalar, sensor axis;
-        output ``count`` in m/s (or rad), the raw count times its quantum, not rounded to it.
-    """
+    """Return the count of a sensor, equations (4) to (6), in increments."""
     unit, rate, word, bound = _UNITS[sensor]
     build = KernelBuilder()
     meaning = f"true {word} increment, sensor axis"
@@ -117,14 +94,7 @@ def pulse_errors(sensor: str = "") -> Kernel:
 
 
 def temperature_coefficient() -> Kernel:
-    """Return a coefficient at a temperature by two slopes, equation (10).
-
-    Returns
-    -------
-    Kernel
-        Inputs ``nominal``, the coefficient at the nominal temperature, in its unit, ``slope_above`` and
-        ``slope_below`` in that unit per K, and ``difference`` T - TN in K, all scalar; output ``coefficient``.
-    """
+    """Return a coefficient at a temperature by two slopes, equation (10)."""
     build = KernelBuilder()
     nominal, above, below, difference = (
         build.scalar(Signal.scalar(name, unit=unit, meaning=meaning, bound=bound))

@@ -68,26 +68,14 @@ VELOCITY_INCREMENT = Signal.vector(
 class TwoAxisGyro:
     """A gyro with two torquer axes and a mass unbalance along its spin axis.
 
-    Parameters
-    ----------
-    x, y : Matrix, 3 x 1
-        Its torquer axes as unit vectors in body axes; the spin axis is x cross y.
-    unbalance : Expr
-        Its mass unbalance in rad/s per m/s^2: an exact number, or a multiple of `UNBALANCE`.
-
-    Raises
-    ------
-    InputError
-        If the axes are not of length 1 or not perpendicular to each other.
-
-    Examples
-    --------
     >>> TwoAxisGyro(X, Y, 2 * UNBALANCE).spin.T
     Matrix([[0, 0, 1]])
     """
 
+    #: Its torquer axes as unit vectors in body axes; the spin axis is x cross y
     x: sp.Matrix
     y: sp.Matrix
+    #: Its mass unbalance in rad/s per m/s^2: an exact number, or a multiple of `UNBALANCE`
     unbalance: sp.Expr
 
     def __post_init__(self) -> None:
@@ -110,8 +98,6 @@ class TwoAxisGyro:
     def turned(self, angle: Any) -> TwoAxisGyro:
         """Return the gyro with its torquers turned about the spin axis by an exact angle in rad.
 
-        Examples
-        --------
         >>> TwoAxisGyro(X, Y, 0).turned(sp.pi / 2).x.T
         Matrix([[0, 1, 0]])
         """
@@ -137,22 +123,7 @@ def diagonal_layout() -> tuple[TwoAxisGyro, ...]:
 def measurement_matrix(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
     """Return the matrix from rate and acceleration to torques: M = W + s B A on every torquer axis.
 
-    Parameters
-    ----------
-    gyros : sequence of TwoAxisGyro
-        Three gyros.
-    sign : int
-        s: -1 as in section 3.1 of the source, or 1 as in its section 4.
-
-    Returns
-    -------
-    Matrix, 6 x 6
-        Rows are the torquers x and y of gyros 1, 2 and 3; columns the rate and the acceleration in body axes.
-
-    Raises
-    ------
-    InputError
-        If there are not three gyros, or the sign is another number.
+    `sign`: s: -1 as in section 3.1 of the source, or 1 as in its section 4.
     """
     if len(gyros) != 3:
         raise InputError(f"the layout has {len(gyros)} gyros; three are needed")
@@ -166,13 +137,6 @@ def measurement_matrix(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
 def separation_matrix(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
     """Return the inverse of `measurement_matrix`: rate and acceleration from torques.
 
-    Raises
-    ------
-    InputError
-        If the layout is singular; the message names a motion that no torquer measures.
-
-    Examples
-    --------
     >>> separation_matrix(canonical_layout(), -1)[0, :]
     Matrix([[0, 0, 1/2, 0, 0, -1/2]])
     """
@@ -225,8 +189,6 @@ def _gram(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Matrix:
 def determinant(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Expr:
     """Return the magnitude of the determinant of `measurement_matrix`, which the angles of the torquers leave alone.
 
-    Examples
-    --------
     >>> determinant(diagonal_layout(), 1)
     2*B**3
     """
@@ -236,13 +198,8 @@ def determinant(gyros: Sequence[TwoAxisGyro], sign: int) -> sp.Expr:
 def noise_gains(gyros: Sequence[TwoAxisGyro], sign: int) -> tuple[sp.Expr, ...]:
     """Return the noise of rates and accelerations for equal, independent noise of 1 on all torques.
 
-    Returns
-    -------
-    tuple of Expr
-        Three gains of the rates, without unit, and three of the accelerations, in m/s^2 per rad/s.
+    Returns: three gains of the rates, without unit, and three of the accelerations, in m/s^2 per rad/s.
 
-    Examples
-    --------
     >>> noise_gains(canonical_layout(), -1)
     (sqrt(2)/2, 1, 1, sqrt(2)/(2*B), sqrt(2)/B, sqrt(2)/B)
     """
@@ -253,26 +210,10 @@ def noise_gains(gyros: Sequence[TwoAxisGyro], sign: int) -> tuple[sp.Expr, ...]:
 def separating_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxisGyro], sign: int) -> Kernel:
     """Return the kernel that separates rate and acceleration for a layout.
 
-    Parameters
-    ----------
-    name, title, source : str
-        Fields of the kernel.
-    gyros : sequence of TwoAxisGyro
-        Three gyros; their unbalances are exact numbers or multiples of symbols, such as `UNBALANCE`.
-    sign : int
-        As in `measurement_matrix`.
-
-    Returns
-    -------
-    Kernel
-        Input ``torque_increment`` (6,) in rad and, where the unbalances are multiples of B, ``unbalance_reciprocal``
-        1/B in m/s per rad; where they have other symbols or numbers beside B, each symbol itself, as `measuring_kernel`
-        takes it. Outputs ``increment`` (3,) in rad and ``velocity_increment`` (3,) in m/s, body axes.
-
-    Raises
-    ------
-    InputError
-        If the layout is singular.
+    Returns: input ``torque_increment`` (6,) in rad and, where the unbalances are multiples of B,
+    ``unbalance_reciprocal`` 1/B in m/s per rad; where they have other symbols or numbers beside B, each symbol
+    itself, as `measuring_kernel` takes it. Outputs ``increment`` (3,) in rad and ``velocity_increment`` (3,) in
+    m/s, body axes.
     """
     inverse = separation_matrix(gyros, sign)
     build = KernelBuilder()
@@ -303,11 +244,9 @@ def _with_inputs(build: KernelBuilder, matrix: sp.Matrix) -> sp.Matrix:
 def measuring_kernel(name: str, title: str, source: str, gyros: Sequence[TwoAxisGyro], sign: int) -> Kernel:
     """Return the inverse of `separating_kernel`: the torques that true increments make.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``increment`` (3,) in rad, ``velocity_increment`` (3,) in m/s, body axes, and every symbol of the
-        unbalances in rad per m/s: ``unbalance`` for B, ``unbalance_2`` for B2; output ``torque_increment`` (6,) in rad.
+    Returns: inputs ``increment`` (3,) in rad, ``velocity_increment`` (3,) in m/s, body axes, and every symbol
+    of the unbalances in rad per m/s: ``unbalance`` for B, ``unbalance_2`` for B2; output ``torque_increment``
+    (6,) in rad.
     """
     matrix = measurement_matrix(gyros, sign)
     build = KernelBuilder()
@@ -327,15 +266,7 @@ _LAYOUTS = {
 def separate(layout: str) -> Kernel:
     """Return the separation of a layout of the source.
 
-    Parameters
-    ----------
-    layout : str
-        "canonical", section 3.1, or "45", (4.7).
-
-    Returns
-    -------
-    Kernel
-        As `separating_kernel` returns.
+    `layout`: "canonical", section 3.1, or "45", (4.7).
     """
     gyros, sign, words, equations = _LAYOUTS[layout]
     title = f"Separation of rate and acceleration: {words}"
@@ -343,13 +274,7 @@ def separate(layout: str) -> Kernel:
 
 
 def measure(layout: str) -> Kernel:
-    """Return the torques of a layout of the source, which `separate` takes apart; parameters are its.
-
-    Returns
-    -------
-    Kernel
-        As `measuring_kernel` returns.
-    """
+    """Return the torques of a layout of the source, which `separate` takes apart; parameters are its."""
     gyros, sign, words, equations = _LAYOUTS[layout]
     title = f"Torques of mass-unbalanced gyros: {words}"
     return measuring_kernel(f"torques-{layout}", title, f"{MICHELIN}, {equations}", gyros(), sign)

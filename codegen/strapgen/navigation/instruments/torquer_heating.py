@@ -44,20 +44,7 @@ def _torque(name: str, prefix: str, meaning: str, bound: Fraction | None) -> Sig
 
 
 def scale_factor_heating(errors: bool = False) -> Kernel:
-    """Return the scale factor correction of three gyros for the heat of their torquers, equations (6.6) and (6.7).
-
-    Parameters
-    ----------
-    errors : bool
-        Whether the kernel divides true increments by the scale factor instead of correcting indicated ones.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``deviation`` (3,), a state, ``torque_increment`` (6,) in rad about both torquer axes of each gyro,
-        ``decay``, ``heating_gain`` (3,) in (rad/s)^-2 and ``cycle_rate`` in 1/s; outputs ``next_deviation`` (3,) and
-        ``compensated_torque_increment`` (6,) in rad, or ``indicated_torque_increment`` where it makes the errors.
-    """
+    """Return the scale factor correction of three gyros for the heat of their torquers, equations (6.6) and (6.7)."""
     build = KernelBuilder()
     u = build.input(DEVIATION)
     kind = "true" if errors else "indicated"

@@ -18,23 +18,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RestingSensors:
-    """What the sensors of a body at rest measure, whose axes are those of the level frame, z down.
+    """What the sensors of a body at rest measure, whose axes are those of the level frame, z down."""
 
-    Parameters
-    ----------
-    earth_rate : tuple of float, (3,)
-        In rad/s, axes n.
-    gyro_bias : tuple of float, (3,)
-        In rad/s.
-    accelerometer_bias : tuple of float, (3,)
-        In m/s^2.
-    heading, height : float
-        Of the flux valve in rad, and of the air data in m.
-    """
-
+    #: In rad/s, axes n
     earth_rate: tuple[float, float, float] = (7.292115e-5, 0.0, 0.0)
+    #: In rad/s
     gyro_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: In m/s^2
     accelerometer_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: Of the flux valve in rad, and of the air data in m
     heading: float = 0.0
     height: float = 0.0
 
@@ -65,21 +57,7 @@ def run_modes(
 ) -> list[SystemRun]:
     """Run a reference system through modes for some time each, one after the other.
 
-    Parameters
-    ----------
-    runner : SystemRunner
-        Of ``examples/ahrs.toml``, or of a system with the same inputs, at the cycle of the schedule.
-    schedule : LoopSchedule
-    parts : iterable of (LoopMode, Fraction)
-        With the time in s.
-    sensors : RestingSensors
-    memory : SystemMemory, optional
-        By default that of the description.
-
-    Returns
-    -------
-    list of SystemRun
-        One for each mode.
+    `parts`: with the time in s.
     """
     runs: list[SystemRun] = []
     for mode, seconds in parts:

@@ -25,15 +25,7 @@ _INCREMENT = Signal.vector(
 
 
 def body_feedback() -> Kernel:
-    """Return the commanded rate of the level frame in body axes, -C' u, and the increment that has it added.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``increment`` (3,) in rad, body axes, ``attitude`` (3, 3), C_b^n, ``level_rate`` (2,) and
-        ``heading_rate`` in rad/s, axes n, ``cycle`` in s; outputs ``feedback_rate`` (3,) in rad/s and
-        ``corrected_increment`` (3,) in rad, body axes.
-    """
+    """Return the commanded rate of the level frame in body axes, -C' u, and the increment that has it added."""
     build = KernelBuilder()
     increment, C = build.input(_INCREMENT), build.input(replace(DCM.state, name="attitude"))
     level, heading = build.input(LEVEL_RATE), build.scalar(HEADING_RATE)

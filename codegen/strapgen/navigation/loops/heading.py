@@ -25,11 +25,8 @@ from strapgen.navigation.loops.loop_signals import (
 def heading_loop() -> Kernel:
     """Return a cycle of the heading loop: u_z = B + K1 e, B' = K2 e, e the heading less that of the reference.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``heading`` and ``magnetic_heading`` in rad, ``heading_bias`` in rad/s, a state, ``k1`` in 1/s, ``k2`` in
-        1/s^2, ``cycle`` in s; outputs ``next_heading_bias`` and ``heading_rate`` in rad/s.
+    Returns: inputs ``heading`` and ``magnetic_heading`` in rad, ``heading_bias`` in rad/s, a state, ``k1`` in
+    1/s, ``k2`` in 1/s^2, ``cycle`` in s; outputs ``next_heading_bias`` and ``heading_rate`` in rad/s.
     """
     build = KernelBuilder()
     heading, magnetic, bias = map(build.scalar, (HEADING, MAGNETIC_HEADING, HEADING_BIAS))
@@ -57,13 +54,7 @@ def heading_loop() -> Kernel:
 
 
 def heading_of_attitude() -> Kernel:
-    """Return the heading of an attitude whose level frame has z down, atan2(C_21, C_11).
-
-    Returns
-    -------
-    Kernel
-        Input ``attitude`` (3, 3), C_b^n; output ``heading`` in rad, from x of n, positive about down.
-    """
+    """Return the heading of an attitude whose level frame has z down, atan2(C_21, C_11)."""
     build = KernelBuilder()
     C = build.input(replace(DCM.state, name="attitude"))
     build.output(replace(HEADING, bound=None), [sp.atan2(C[1, 0], C[0, 0])])

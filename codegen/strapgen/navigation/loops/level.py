@@ -36,15 +36,10 @@ def level_loop() -> Kernel:
     V' = f - K1 (V - Vr), u_x = V_y/R + K2 (V_y - Vr_y) + B_x, B_x' = K3 (V_y - Vr_y), and with the signs of the
     rates turned about y. The rate belongs to the cycle after the call.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``level_velocity``, ``level_bias`` (2,), states, in m/s and rad/s, ``velocity_change`` (3,) and
-        ``reference_velocity`` (2,) in m/s, all axes n, ``curvature`` 1/R in 1/m, ``k1``, ``k2``, ``k3``, ``cycle`` in
-        s; outputs ``next_level_velocity``, ``next_level_bias`` and ``level_rate`` (2,) in rad/s.
+    Returns: inputs ``level_velocity``, ``level_bias`` (2,), states, in m/s and rad/s, ``velocity_change`` (3,)
+    and ``reference_velocity`` (2,) in m/s, all axes n, ``curvature`` 1/R in 1/m, ``k1``, ``k2``, ``k3``,
+    ``cycle`` in s; outputs ``next_level_velocity``, ``next_level_bias`` and ``level_rate`` (2,) in rad/s.
 
-    Examples
-    --------
     >>> level_loop().outputs[1].expressions[1]
     B_y + cycle*k3*(-V_x + Vr_x)
     """
@@ -71,11 +66,8 @@ def erection() -> Kernel:
 
     V' = f - K1 V, u_x = K2 V_y, u_y = -K2 V_x: earth rate, transport rate and the bias are left out.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``level_velocity`` (2,), a state, and ``velocity_change`` (3,) in m/s, axes n, ``k1``, ``k2`` and
-        ``cycle`` in s; outputs ``next_level_velocity`` and ``level_rate`` (2,) in rad/s.
+    Returns: inputs ``level_velocity`` (2,), a state, and ``velocity_change`` (3,) in m/s, axes n, ``k1``,
+    ``k2`` and ``cycle`` in s; outputs ``next_level_velocity`` and ``level_rate`` (2,) in rad/s.
     """
     build = KernelBuilder()
     V, change = build.input(LEVEL_VELOCITY), build.input(VELOCITY_CHANGE)

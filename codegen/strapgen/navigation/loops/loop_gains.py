@@ -27,28 +27,18 @@ _DIGITS, _MOST_STEPS = 60, 2000
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """A loop with its plant, in error form, as matrices of its gains.
-
-    Parameters
-    ----------
-    states, inputs : tuple of str
-    gains : tuple of Symbol
-    continuous : Matrix
-        A of x' = A x + D d.
-    disturbance : Matrix
-        D, a column for each input.
-    cycle : Matrix
-        Change of the states by a cycle T of the kernel and of the plant, which goes on between the calls.
-    cycle_disturbance : Matrix
-        Change of the states by constant inputs in a cycle.
-    """
+    """A loop with its plant, in error form, as matrices of its gains."""
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     gains: tuple[sp.Symbol, ...]
+    #: A of x' = A x + D d
     continuous: sp.Matrix
+    #: D, a column for each input
     disturbance: sp.Matrix
+    #: Change of the states by a cycle T of the kernel and of the plant, which goes on between the calls
     cycle: sp.Matrix
+    #: Change of the states by constant inputs in a cycle
     cycle_disturbance: sp.Matrix
 
 
@@ -145,19 +135,6 @@ ORDERS = {"level": (3, 2), "erection": (2,), "heading": (2,), "vertical": (3, 2)
 def closed_loop(name: str, order: int | None = None) -> ClosedLoop:
     """Return a loop of a certain order; in a lower one the estimate of the bias is held, and no longer a state.
 
-    Parameters
-    ----------
-    name : str
-        "level", "erection", "heading" or "vertical".
-    order : int, optional
-        By default that of the kernel.
-
-    Returns
-    -------
-    ClosedLoop
-
-    Examples
-    --------
     >>> closed_loop("erection").continuous.tolist()
     [[-k1, g], [-k2, 0]]
     """
@@ -181,17 +158,6 @@ def closed_loop(name: str, order: int | None = None) -> ClosedLoop:
 def symbolic_gains(name: str, order: int | None = None) -> tuple[sp.Expr, ...]:
     """Return the gains that put all poles to -1/tau, as functions of tau, g and R.
 
-    Parameters
-    ----------
-    name : str
-    order : int, optional
-
-    Returns
-    -------
-    tuple of Expr
-
-    Examples
-    --------
     >>> symbolic_gains("erection")
     (2/tau, 1/(g*tau**2))
     """
@@ -210,17 +176,8 @@ def gains(
 ) -> tuple[Fraction, ...]:
     """Return the gains of a time constant, exactly; those of a kernel that an order leaves out are zero.
 
-    Parameters
-    ----------
-    name : str
-    time_constant : Fraction
-        In s.
-    order : int, optional
-    gravity, radius : Fraction
-        In m/s^2 and m.
+    `time_constant`: in s. `gravity, radius`: in m/s^2 and m.
 
-    Examples
-    --------
     >>> gains("heading", Fraction(40))
     (Fraction(1, 20), Fraction(1, 1600))
     """
@@ -242,16 +199,7 @@ def poles_of_a_cycle(
     gravity: Fraction = GRAVITY,
     radius: Fraction = RADIUS,
 ) -> tuple[complex, ...]:
-    """Return the poles in z of the sampled loop with its plant, the one of largest magnitude first.
-
-    Parameters
-    ----------
-    name : str
-    values : tuple of Fraction
-        The gains of the kernel; a last one of zero leaves out the estimate of the bias.
-    cycle_s : Fraction
-    gravity, radius : Fraction
-    """
+    """Return the poles in z of the sampled loop with its plant, the one of largest magnitude first."""
     order = len(values) - (values[-1] == 0)
     loop = closed_loop(name, order if order in ORDERS[name] else None)
     known = dict(zip(loop.gains, values, strict=False)) | {T: cycle_s, g: gravity, R: radius}
@@ -271,13 +219,7 @@ def check_stable(
     gravity: Fraction = GRAVITY,
     radius: Fraction = RADIUS,
 ) -> None:
-    """Refuse gains with which the sampled loop is not stable.
-
-    Raises
-    ------
-    InputError
-        If a pole is not inside of the unit circle.
-    """
+    """Refuse gains with which the sampled loop is not stable."""
     largest = abs(poles_of_a_cycle(name, values, cycle_s, gravity, radius)[0])
     if not largest < 1:
         shown = ", ".join(f"{float(value):.6g}" for value in values)

@@ -23,22 +23,14 @@ KNOT = Fraction(1852, 3600)
 
 @dataclass(frozen=True)
 class LoopSetting:
-    """What a mode makes of a loop.
+    """What a mode makes of a loop."""
 
-    Parameters
-    ----------
-    loop : str
-        "level", "erection", "heading" or "vertical".
-    reference : str
-        One of `REFERENCES`; "open" has no time constant.
-    time_constant_s : Fraction or None
-    order : int or None
-        None for the usual one.
-    """
-
+    #: "level", "erection", "heading" or "vertical"
     loop: str
+    #: One of `REFERENCES`; "open" has no time constant
     reference: str
     time_constant_s: Fraction | None
+    #: None for the usual one
     order: int | None = None
 
     def __post_init__(self) -> None:
@@ -53,25 +45,16 @@ class LoopSetting:
 
 @dataclass(frozen=True)
 class LoopMode:
-    """A mode of the schedule.
-
-    Parameters
-    ----------
-    name : str
-    loops : tuple of LoopSetting
-        Levelling or erection, heading and vertical.
-    duration_s : Fraction or None
-        None for a mode without an end.
-    when : str
-        One of `CONDITIONS`.
-    after_s : Fraction
-        Time without air data after which the mode holds.
-    """
+    """A mode of the schedule."""
 
     name: str
+    #: Levelling or erection, heading and vertical
     loops: tuple[LoopSetting, ...]
+    #: None for a mode without an end
     duration_s: Fraction | None = None
+    #: One of `CONDITIONS`
     when: str = "sequence"
+    #: Time without air data after which the mode holds
     after_s: Fraction = Fraction(0)
 
     def loop(self, name: str) -> LoopSetting:
@@ -81,28 +64,18 @@ class LoopMode:
 
 @dataclass(frozen=True)
 class LoopSchedule:
-    """The modes of a reference system, and its switches.
-
-    Parameters
-    ----------
-    title : str
-    modes : tuple of LoopMode
-        Those in sequence first; only the last of them may have no end.
-    cycle_s : Fraction
-    gravity, radius : Fraction
-        In m/s^2 and m.
-    heading_cutout_deg_s : Fraction or None
-        Rate about down above which the heading loop is open; None for no cut-out.
-    air_data_on_m_s, air_data_off_m_s : Fraction
-        True airspeed above which it becomes the reference of levelling, and below which it ceases to be.
-    """
+    """The modes of a reference system, and its switches."""
 
     title: str
+    #: Those in sequence first; only the last of them may have no end
     modes: tuple[LoopMode, ...]
     cycle_s: Fraction
+    #: In m/s^2 and m
     gravity: Fraction
     radius: Fraction
+    #: Rate about down above which the heading loop is open; None for no cut-out
     heading_cutout_deg_s: Fraction | None = None
+    #: True airspeed above which it becomes the reference of levelling, and below which it ceases to be
     air_data_on_m_s: Fraction = 110 * KNOT
     air_data_off_m_s: Fraction = 100 * KNOT
 
@@ -137,22 +110,7 @@ class LoopSchedule:
     def mode(
         self, time_s: Fraction, without_air_data_s: Fraction = Fraction(0), selected: str = ""
     ) -> LoopMode:
-        """Return the mode that holds.
-
-        Parameters
-        ----------
-        time_s : Fraction
-            Since the start.
-        without_air_data_s : Fraction
-            Since the last valid air data.
-        selected : str
-            Name of a mode that the crew has selected, "" for none.
-
-        Raises
-        ------
-        InputError
-            If the selected mode is none that can be selected.
-        """
+        """Return the mode that holds."""
         if selected:
             names = {mode.name: mode for mode in self.modes if mode.when == "selected"}
             return names[checks.choice("selected mode", selected, names)]
@@ -171,14 +129,7 @@ class LoopSchedule:
         return mode.loop("heading").reference == "open" or (limit is not None and abs(rate_deg_s) > limit)
 
     def air_data_engaged(self, engaged: bool, airspeed_m_s: float) -> bool:
-        """Return whether true airspeed is the reference of levelling, with hysteresis.
-
-        Parameters
-        ----------
-        engaged : bool
-            What it was in the cycle before.
-        airspeed_m_s : float
-        """
+        """Return whether true airspeed is the reference of levelling, with hysteresis."""
         return airspeed_m_s > (self.air_data_off_m_s if engaged else self.air_data_on_m_s)
 
 

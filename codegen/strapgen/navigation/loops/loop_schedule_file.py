@@ -37,18 +37,6 @@ _LOOP_KEYS = ("tau_s", "order", "reference")
 def read(path: str | Path = BUILT_IN) -> LoopSchedule:
     """Read a schedule.
 
-    Parameters
-    ----------
-    path : path
-        A TOML file with ``cycle_s`` and ``[[mode]]`` tables; by default the schedule of 1984.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or a key, a name or a number is not allowed; one line names it.
-
-    Examples
-    --------
     >>> [mode.name for mode in read().sequence]
     ['fast', 'fine', 'normal']
     """

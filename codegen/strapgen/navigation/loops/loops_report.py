@@ -19,19 +19,10 @@ _KEYS = ("loop", "mode", "time_s", "case", "quantity", "unit", "run", "matrix_ex
 
 @dataclass(frozen=True)
 class LoopStudy:
-    """A schedule, the gains of its modes, and the courses of its loops.
-
-    Parameters
-    ----------
-    schedule : LoopSchedule
-    modes : tuple of LoopMode
-        Those that were run.
-    errors : LoopErrors
-    designs : sequence of LoopDesign
-    courses : sequence of LoopCourse
-    """
+    """A schedule, the gains of its modes, and the courses of its loops."""
 
     schedule: LoopSchedule
+    #: Those that were run
     modes: tuple[LoopMode, ...]
     errors: LoopErrors
     designs: Sequence[LoopDesign]

@@ -37,27 +37,18 @@ _LARGEST = {"heading_deg": 180.0}
 
 @dataclass(frozen=True)
 class LoopErrors:
-    """What disturbs the loops of a study, each error by itself.
+    """What disturbs the loops of a study, each error by itself."""
 
-    Parameters
-    ----------
-    rate_deg_h : float
-        Earth rate and gyro bias, about a level axis and about down.
-    tilt_deg, heading_deg : float
-        Errors of the attitude at the start.
-    velocity_m_s : float
-        Error of the reference velocity.
-    acceleration_mg : float
-        Bias of the vertical accelerometer, in thousandths of g.
-    height_m : float
-        Reference height.
-    """
-
+    #: Earth rate and gyro bias, about a level axis and about down
     rate_deg_h: float = 10.0
+    #: Errors of the attitude at the start
     tilt_deg: float = 0.5
+    #: Error of the reference velocity
     velocity_m_s: float = 5.0
     heading_deg: float = 1.0
+    #: Bias of the vertical accelerometer, in thousandths of g
     acceleration_mg: float = 1.0
+    #: Reference height
     height_m: float = 10.0
 
     def __post_init__(self) -> None:
@@ -88,45 +79,28 @@ class LoopErrors:
 
 @dataclass(frozen=True)
 class LoopCourse:
-    """A loop through the schedule.
-
-    Parameters
-    ----------
-    loop : str
-    cases : tuple of str
-    times : array, (K,)
-        In s.
-    run, exact : array, (K, cases, states)
-        States by the kernel and by the matrix exponential, in SI units.
-    ends : tuple of int
-        Records at which the modes end.
-    """
+    """A loop through the schedule."""
 
     loop: str
     cases: tuple[str, ...]
+    #: (K,): in s
     times: Array
+    #: (K, cases, states): states by the kernel and by the matrix exponential, in SI units
     run: Array
     exact: Array
+    #: Records at which the modes end
     ends: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class LoopDesign:
-    """A loop in a mode: gains, and the slowest pole of a cycle as a time constant.
-
-    Parameters
-    ----------
-    mode, loop : str
-    setting : LoopSetting
-    gains : tuple of Fraction
-    slowest_s : float or None
-        None for an open loop.
-    """
+    """A loop in a mode: gains, and the slowest pole of a cycle as a time constant."""
 
     mode: str
     loop: str
     setting: LoopSetting
     gains: tuple[Fraction, ...]
+    #: None for an open loop
     slowest_s: float | None
 
 
@@ -140,13 +114,7 @@ def mode_gains(schedule: LoopSchedule, setting: LoopSetting) -> tuple[Fraction, 
 
 
 def designs(schedule: LoopSchedule) -> list[LoopDesign]:
-    """Return all loops of all modes with their gains.
-
-    Raises
-    ------
-    InputError
-        If one is unstable at the cycle of the schedule, or has an order that it cannot have.
-    """
+    """Return all loops of all modes with their gains."""
     rows = []
     for mode in schedule.modes:
         for setting in mode.loops:
@@ -164,13 +132,7 @@ def designs(schedule: LoopSchedule) -> list[LoopDesign]:
 
 
 def cycles_of_modes(schedule: LoopSchedule, modes: tuple[LoopMode, ...]) -> list[int]:
-    """Return the cycles of each mode.
-
-    Raises
-    ------
-    InputError
-        If a mode has no whole number of cycles, or the run is too long.
-    """
+    """Return the cycles of each mode."""
     counts = []
     for mode in modes:
         count = (mode.duration_s or Fraction(0)) / schedule.cycle_s
@@ -187,21 +149,7 @@ def cycles_of_modes(schedule: LoopSchedule, modes: tuple[LoopMode, ...]) -> list
 def run_loops(
     schedule: LoopSchedule, modes: tuple[LoopMode, ...], errors: LoopErrors, backend: str = "numpy"
 ) -> Iterator[LoopCourse]:
-    """Yield every loop through modes one after the other.
-
-    Parameters
-    ----------
-    schedule : LoopSchedule
-    modes : tuple of LoopMode
-        All with a duration.
-    errors : LoopErrors
-    backend : str
-        One in floating point.
-
-    Yields
-    ------
-    LoopCourse
-    """
+    """Yield every loop through modes one after the other."""
     for loop in LOOPS:
         yield _course(schedule, modes, loop, errors, backend)
 
@@ -260,8 +208,6 @@ def _advance(matrices: tuple[Array, Array], states: Array, inputs: Array, time: 
 def exponential(matrix: Array) -> Array:
     """Return the exponential of a matrix, by its series and repeated squaring.
 
-    Examples
-    --------
     >>> exponential(np.array([[0.0, 1.0], [0.0, 0.0]])).tolist()
     [[1.0, 1.0], [0.0, 1.0]]
     """

@@ -25,12 +25,10 @@ def vertical_loop() -> Kernel:
     h' = V - K1 (h - hr), V' = a + 2 (g/R) h - K2 (h - hr) - B, B' = K3 (h - hr), with h and V up and
     a = -f_z - g from the specific force along down.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``height`` in m, ``climb`` in m/s, ``vertical_bias`` in m/s^2, states, ``velocity_change`` (3,) in m/s,
-        axes n, z down, ``reference_height`` in m, ``gravity`` in m/s^2, ``gravity_gradient`` 2 g/R in 1/s^2, ``k1``,
-        ``k2``, ``k3``, ``cycle`` in s; outputs ``next_height``, ``next_climb`` and ``next_vertical_bias``.
+    Returns: inputs ``height`` in m, ``climb`` in m/s, ``vertical_bias`` in m/s^2, states, ``velocity_change``
+    (3,) in m/s, axes n, z down, ``reference_height`` in m, ``gravity`` in m/s^2, ``gravity_gradient`` 2 g/R in
+    1/s^2, ``k1``, ``k2``, ``k3``, ``cycle`` in s; outputs ``next_height``, ``next_climb`` and
+    ``next_vertical_bias``.
     """
     build = KernelBuilder()
     states = (HEIGHT, CLIMB, VERTICAL_BIAS)

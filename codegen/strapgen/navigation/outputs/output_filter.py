@@ -23,26 +23,14 @@ LOWEST_EDGE = 1e-5
 class OutputFilter:
     """A Butterworth filter of second order, sampled by the bilinear transformation with its edge kept.
 
-    Parameters
-    ----------
-    cutoff_hz : float
-        Edge: the frequency that is damped by 3 dB.
-    sample_hz : float
-        Samples in a second.
-
-    Raises
-    ------
-    InputError
-        If the edge is not above 0 and below half of the sampling rate.
-
-    Examples
-    --------
     >>> edge = OutputFilter(3.2, 50)
     >>> [round(b, 10) for b in edge.numerator], [round(a, 10) for a in edge.denominator]
     ([0.0312389237, 0.0624778474, 0.0312389237], [1.0, -1.4415303099, 0.5664860047])
     """
 
+    #: Edge: the frequency that is damped by 3 dB
     cutoff_hz: float
+    #: Samples in a second
     sample_hz: float
 
     def __post_init__(self) -> None:
@@ -134,8 +122,6 @@ class OutputFilter:
 def decibels(response: complex) -> float:
     """Return the magnitude of a response in dB; -inf for none.
 
-    Examples
-    --------
     >>> decibels(0.1)
     -20.0
     """

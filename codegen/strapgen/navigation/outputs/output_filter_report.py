@@ -25,21 +25,7 @@ def output_filter_report(study: FilterStudy) -> Report:
 
 
 def output_filter_image(study: FilterStudy, path: str | Path) -> bytes:
-    """Return the responses over frequency: analog and digital as lines, measured ones as points.
-
-    Parameters
-    ----------
-    study : FilterStudy
-    path : path
-        File for the image; its ending says which kind.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return the responses over frequency: analog and digital as lines, measured ones as points."""
     edge = study.output_filter
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 4.4))
     axes = grid[0, 0]

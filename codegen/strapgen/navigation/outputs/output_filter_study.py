@@ -27,49 +27,31 @@ _SHORTEST, _LONGEST = 200, 200_000
 
 @dataclass(frozen=True)
 class Measured:
-    """What a back end makes of the filter.
+    """What a back end makes of the filter."""
 
-    Parameters
-    ----------
-    backend, carry : str
-        The error feedback is "" in floating point.
-    responses : tuple of complex
-        Output over input at each frequency.
-    constant : float
-        Largest error of a constant input, once settled, in the unit of the samples.
-    rest : float
-        Largest output after the input has become zero, once settled.
-    bound : float or None
-        Certified bound of the output's error in a run of any length; None in floating point.
-    unit : float or None
-        What a bit of the output is worth; None in floating point.
-    """
-
+    #: The error feedback is "" in floating point
     backend: str
     carry: str
+    #: Output over input at each frequency
     responses: tuple[complex, ...]
+    #: Largest error of a constant input, once settled, in the unit of the samples
     constant: float
+    #: Largest output after the input has become zero, once settled
     rest: float
+    #: Certified bound of the output's error in a run of any length; None in floating point
     bound: float | None
+    #: What a bit of the output is worth; None in floating point
     unit: float | None
 
 
 @dataclass(frozen=True)
 class FilterStudy:
-    """The responses of a filter: analog, digital and measured.
-
-    Parameters
-    ----------
-    output_filter : OutputFilter
-    largest : float
-        Largest magnitude of a sample.
-    frequencies : tuple of float
-        In Hz.
-    measured : tuple of Measured
-    """
+    """The responses of a filter: analog, digital and measured."""
 
     output_filter: OutputFilter
+    #: Largest magnitude of a sample
     largest: float
+    #: In Hz
     frequencies: tuple[float, ...]
     measured: tuple[Measured, ...]
 
@@ -84,13 +66,7 @@ def runs(names: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def check_frequencies(output_filter: OutputFilter, frequencies: Sequence[float]) -> tuple[float, ...]:
-    """Return frequencies that the samples can have.
-
-    Raises
-    ------
-    InputError
-        If there is none, or one is not above 0 and below half of the sampling rate.
-    """
+    """Return frequencies that the samples can have."""
     half = output_filter.sample_hz / 2
     for frequency in frequencies:
         if not 0 < frequency < half:
@@ -120,19 +96,7 @@ def measure(
 ) -> Iterator[Measured]:
     """Run the filter on back ends, its coefficients constants of the code.
 
-    Parameters
-    ----------
-    which : iterable of (str, str)
-        Back ends and error feedback.
-    output_filter : OutputFilter
-    largest : float
-        Largest magnitude of a sample.
-    frequencies : sequence of float
-        In Hz.
-
-    Yields
-    ------
-    Measured
+    `frequencies`: in Hz.
     """
     for name, carry in which:
         evaluator = filter_evaluator(output_filter, largest, name, carry)
@@ -140,16 +104,7 @@ def measure(
 
 
 def filter_evaluator(output_filter: OutputFilter, largest: float, name: str, carry: str = "") -> Evaluator:
-    """Return the filter with its coefficients as constants, on a back end.
-
-    Parameters
-    ----------
-    output_filter : OutputFilter
-    largest : float
-        Largest magnitude of a sample.
-    name, carry : str
-        Back end, and its error feedback; "" in floating point.
-    """
+    """Return the filter with its coefficients as constants, on a back end."""
     chosen = catalogue.choose(KERNEL, constants=output_filter.coefficients)
     entry = run.BACKENDS[name]
     if not entry.fixed:
@@ -193,12 +148,6 @@ def certified_bound(evaluator: Evaluator, output_filter: OutputFilter) -> float:
     """Return by how much the output in fixed point may differ from that of exact arithmetic, in a run of any length.
 
     What a call adds to the errors of the states dies out as the filter forgets, and the sum of that is finite.
-
-    Parameters
-    ----------
-    evaluator : Evaluator
-        Of the kernel, whose coefficients are constants.
-    output_filter : OutputFilter
     """
     errors = [float(max(argument.errors)) for argument in evaluator.interface.outputs]
     first, second = output_filter.accumulated((errors[0], errors[1]))
@@ -218,14 +167,7 @@ def _samples(output_filter: OutputFilter, size: float, frequencies: Sequence[flo
 def run_filter(evaluator: Evaluator, samples: Array) -> Array:
     """Run the filter from rest, its coefficients constants of the code.
 
-    Parameters
-    ----------
-    evaluator : Evaluator
-    samples : array, (cycles, runs, 3)
-
-    Returns
-    -------
-    array, (cycles, runs, 3)
+    `samples` has shape (cycles, runs, 3). Returns (cycles, runs, 3).
     """
     outputs = np.empty(samples.shape)
     rows = evaluator.stored(-1, samples.reshape(-1, 3)).reshape(samples.shape)

@@ -17,22 +17,14 @@ _PART = Fraction(1, 10)
 
 @dataclass(frozen=True)
 class OutputWord:
-    """An output as a binary fraction of its range, in two's complement, the first bit the sign.
+    """An output as a binary fraction of its range, in two's complement, the first bit the sign."""
 
-    Parameters
-    ----------
-    range : Fraction
-        Full scale in `unit`: what the first bit after the sign is half of.
-    unit : str
-    accuracy : Fraction or None
-        Two standard deviations, as printed; None where there is none.
-    turns : bool
-        Whether the output is an angle that goes on beyond its range from the other end.
-    """
-
+    #: Full scale in `unit`: what the first bit after the sign is half of
     range: Fraction
     unit: str
+    #: Two standard deviations, as printed; None where there is none
     accuracy: Fraction | None = None
+    #: Whether the output is an angle that goes on beyond its range from the other end
     turns: bool = False
 
     def quantum(self, bits: int) -> Fraction:
@@ -43,13 +35,6 @@ class OutputWord:
     def bits(self, part: Fraction = _PART) -> int:
         """Return the fewest bits whose rounding, half a quantum, is at most a part of the accuracy.
 
-        Raises
-        ------
-        InputError
-            If the output has no accuracy, or so many bits are more than 32.
-
-        Examples
-        --------
         >>> OUTPUT_WORDS["true_heading"].bits()
         13
         """
@@ -63,8 +48,6 @@ class OutputWord:
     def encoded(self, value: Fraction | float, bits: int) -> int:
         """Return the nearest word to a value in `unit`; an angle turns, and anything else stops at the ends.
 
-        Examples
-        --------
         >>> heading = OUTPUT_WORDS["true_heading"]
         >>> heading.encoded(190, 13), heading.encoded(-170, 13), OUTPUT_WORDS["body_rate"].encoded(200, 11)
         (-3868, -3868, 1023)

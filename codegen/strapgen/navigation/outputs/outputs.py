@@ -75,13 +75,6 @@ def butterworth() -> Kernel:
     (K^2/n) (1 + z^-1)^2/(1 + a1 z^-1 + a2 z^-2), n = 1 + sqrt(2) K + K^2, a1 = 2 (K^2 - 1)/n,
     a2 = (1 - sqrt(2) K + K^2)/n. The states are those of the integrators, so that no cycle lengthens their vector
     while the input is zero, and a constant input passes unchanged whatever the coefficients are rounded to.
-
-    Returns
-    -------
-    Kernel
-        Inputs ``first`` and ``second`` (3,), the states, ``sample`` (3,), all in one unit and frame, and ``loss``,
-        ``coupling``, ``square``, the coefficients 1 - 1/n, K/n and K^2/n; outputs ``next_first``, ``next_second``
-        and ``filtered`` (3,).
     """
     build = KernelBuilder()
     s1, s2, x = map(build.input, (FIRST, SECOND, SAMPLE))
@@ -118,11 +111,8 @@ def _named(prefix: str) -> tuple[str, ...]:
 def variation() -> Kernel:
     """Return the magnetic variation between four points of a grid, Fig. 17.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``variation_1`` to ``variation_4`` in rad, at (0, 0), (1, 0), (0, 1) and (1, 1), and
-        ``first_fraction`` and ``second_fraction``, 0 to 1; output ``variation`` in rad.
+    Returns: inputs ``variation_1`` to ``variation_4`` in rad, at (0, 0), (1, 0), (0, 1) and (1, 1), and
+    ``first_fraction`` and ``second_fraction``, 0 to 1; output ``variation`` in rad.
     """
     build = KernelBuilder()
     v1, v2, v3, v4 = map(build.scalar, _CORNERS)
@@ -141,10 +131,7 @@ def variation() -> Kernel:
 def magnetic_heading() -> Kernel:
     """Return the magnetic heading, that against true north and the variation, without whole turns.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``heading`` and ``variation`` in rad; output ``magnetic_heading`` in rad, -pi to pi.
+    Returns: inputs ``heading`` and ``variation`` in rad; output ``magnetic_heading`` in rad, -pi to pi.
     """
     build = KernelBuilder()
     heading, difference = build.scalar(_HEADING), build.scalar(_VARIATION)
@@ -161,11 +148,8 @@ def magnetic_heading() -> Kernel:
 def track_angle() -> Kernel:
     """Return the direction of the ground velocity and its size.
 
-    Returns
-    -------
-    Kernel
-        Input ``ground_velocity`` (3,) in m/s, axes north, east, down; outputs ``track_angle`` in rad, from north over
-        east, and ``ground_speed`` in m/s.
+    Returns: input ``ground_velocity`` (3,) in m/s, axes north, east, down; outputs ``track_angle`` in rad, from
+    north over east, and ``ground_speed`` in m/s.
     """
     build = KernelBuilder()
     north, east, _ = build.input(_GROUND_VELOCITY)
@@ -190,18 +174,7 @@ def track_angle() -> Kernel:
 
 
 def axes(mounting: str) -> Kernel:
-    """Return the axes ahead, right and down of a unit that is mounted in one of four orientations.
-
-    Parameters
-    ----------
-    mounting : str
-        Where x of the unit points to: "fore", "right", "aft" or "left"; z points down in all.
-
-    Returns
-    -------
-    Kernel
-        Input ``sensed`` (3,), axes of the unit, any unit of measure; output ``body`` (3,), axes ahead, right, down.
-    """
+    """Return the axes ahead, right and down of a unit that is mounted in one of four orientations."""
     build = KernelBuilder()
     sensed = Signal.vector(
         "sensed", "s", unit=ANY, meaning="vector in axes of the unit, as mounted", frame=ANY

@@ -17,20 +17,10 @@ _TURN = 360.0
 class VariationTable:
     """Magnetic variations on a grid of latitude and longitude.
 
-    Parameters
-    ----------
-    latitudes, longitudes : sequence of float
-        Lines of the grid in deg, increasing; longitudes that span a whole turn have their first line again at its end.
-    variations : array_like, (latitudes, longitudes)
-        What is to be added to a true heading, in deg.
+    `latitudes, longitudes`: lines of the grid in deg, increasing; longitudes that span a whole turn have their
+    first line again at its end. `variations` (latitudes, longitudes): what is to be added to a true heading, in
+    deg.
 
-    Raises
-    ------
-    InputError
-        If lines do not increase, there are fewer than two, or the variations have another shape.
-
-    Examples
-    --------
     >>> table = VariationTable([40, 50], [0, 10], [[10, 12], [13, 18]])
     >>> corners, fractions = table.around(46, 2.5)
     >>> [round(math.degrees(corner), 6) for corner in corners], fractions
@@ -57,15 +47,6 @@ class VariationTable:
 
         Corners stand in the order of the kernel: the first fraction goes to the east, the second to the north. Of
         corners on both sides of a half turn, those beyond it from the first have a whole turn added.
-
-        Parameters
-        ----------
-        latitude_deg, longitude_deg : float
-
-        Raises
-        ------
-        InputError
-            If the position is outside of the grid.
         """
         first = float(self.lines[1][0])
         position = (latitude_deg, first + (longitude_deg - first) % _TURN)

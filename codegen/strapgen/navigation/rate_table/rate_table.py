@@ -43,22 +43,15 @@ _TWO_SPEEDS = tuple((name, _FAST_CYCLES) for name in two_speed_sources.ALGORITHM
 
 @dataclass(frozen=True)
 class Row:
-    """The drift of one algorithm on one back end.
-
-    Parameters
-    ----------
-    motion, algorithm, backend : str
-    drift_deg : float or None
-        Largest angle between computed and true attitude over the run, in degrees; None where the run left the range of
-        the back end's numbers.
-    pitch_deg : float or None
-        Largest pitch of the computed attitude, in degrees.
-    """
+    """The drift of one algorithm on one back end."""
 
     motion: str
     algorithm: str
     backend: str
+    #: Largest angle between computed and true attitude over the run, in degrees; None where the run left the
+    #: range of the back end's numbers
     drift_deg: float | None
+    #: Largest pitch of the computed attitude, in degrees
     pitch_deg: float | None
 
     def as_dict(self) -> dict[str, Any]:
@@ -69,19 +62,8 @@ class Row:
 def angles(motion: str, times: Array) -> Array:
     """Return the rotation vector of the table at times in s; its axis is (1, 1, 1).
 
-    Parameters
-    ----------
-    motion : str
-        "linear" or "oscillating".
-    times : array, (N,)
+    `times` has shape (N,). Returns (N, 3): in rad.
 
-    Returns
-    -------
-    array, (N, 3)
-        In rad.
-
-    Examples
-    --------
     >>> angles("linear", np.array([1.0])).round(4)
     array([[1.2217, 1.2217, 1.2217]])
     """
@@ -101,33 +83,12 @@ def stress(
 ) -> Iterator[Row]:
     """Run the test on every algorithm and back end.
 
-    Parameters
-    ----------
-    duration, sample, record : number
-        Duration, time between gyro samples, and time from record to record, in s. The record is a multiple of the
-        sample, and the duration of the record. A step or a slow cycle takes as many samples as its method needs.
-        Attitude steps are orthonormalized at every record; the exact update of the algorithms in two speeds needs no
-        orthonormalization. In fixed point the gyro counts pulses of one unit of the increments.
-    backends : sequence of str, optional
-    algorithms : sequence of str, optional
-        Attitude algorithms, and "two-speed" for both algorithms in two speeds.
-    settings : Settings, optional
-        Settings of fixed point: rounding and error feedback.
-    methods : sequence of str, optional
-        Methods of the attitude steps; by default those of `METHODS`. A step takes as many samples as it needs for the
-        order of its method.
+    `duration, sample, record`: duration, time between gyro samples, and time from record to record, in s. The
+    record is a multiple of the sample, and the duration of the record. A step or a slow cycle takes as many
+    samples as its method needs. Attitude steps are orthonormalized at every record; the exact update of the
+    algorithms in two speeds needs no orthonormalization. In fixed point the gyro counts pulses of one unit of
+    the increments.
 
-    Yields
-    ------
-    Row
-
-    Raises
-    ------
-    InputError
-        If a name or number is not allowed.
-
-    Examples
-    --------
     >>> rows = list(stress(10, "0.01", 1, ["numpy"], ["euler"]))
     >>> [row.algorithm for row in rows if row.motion == "linear"][3:5]
     ['euler-rk4-2', 'euler-magnus4-2']
@@ -166,22 +127,7 @@ Case = tuple[str, str, str, int, str]
 def cases(
     algorithms: Sequence[str], backends: Sequence[str], methods: Sequence[str] | None = None
 ) -> Iterator[Case]:
-    """Yield the cases of the test.
-
-    Parameters
-    ----------
-    algorithms, backends, methods : sequence of str
-        As for `stress`.
-
-    Yields
-    ------
-    Case
-
-    Raises
-    ------
-    InputError
-        If a name is not known.
-    """
+    """Yield the cases of the test."""
     for name in backends:
         checks.choice("backend", name, BACKENDS)
     for name in algorithms:

@@ -18,25 +18,7 @@ _ARCSECOND_DEG = 1 / 3600
 def rate_table_image(rows: Sequence[Row], duration: str, sample: str, path: str | Path) -> bytes:
     """Return the largest drift of every algorithm: a panel for each motion, a line an algorithm, a mark a back end.
 
-    Parameters
-    ----------
-    rows : sequence of Row
-    duration, sample : str
-        Duration of the test, and time between gyro samples, in s.
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
+    `duration, sample`: duration of the test, and time between gyro samples, in s.
     """
     motions = list(dict.fromkeys(row.motion for row in rows))
     algorithms = list(dict.fromkeys(row.algorithm for row in rows))

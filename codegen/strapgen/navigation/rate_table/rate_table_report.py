@@ -13,11 +13,7 @@ from strapgen.results.table import ERROR, Column, TextTable
 def rate_table_text(rows: Sequence[Row], duration: str, sample: str) -> str:
     """Return rows as a table for each motion: a line an algorithm, a column a back end.
 
-    Parameters
-    ----------
-    rows : sequence of Row
-    duration, sample : str
-        Duration of the test, and time between gyro samples, in s.
+    `duration, sample`: duration of the test, and time between gyro samples, in s.
     """
     backends = list(dict.fromkeys(row.backend for row in rows))
     columns = [

@@ -28,16 +28,9 @@ def select(sensors: SensorSet = HEXAD_SET) -> Kernel:
     An equation fails where its parity reaches its trip level. The failed sensor is the one in all equations that fail,
     if only one is. The triad is the one whose sensors are in the fewest; among equals, the one of the least noise.
 
-    Parameters
-    ----------
-    sensors : SensorSet
-
-    Returns
-    -------
-    Kernel
-        Inputs ``parity`` (M,) and ``trip`` (M,), the trip levels of the integer equations, in rad or m/s, and
-        ``excluded`` (N,), 1 for a sensor that no longer counts, else 0; outputs ``detected``, 1 if an equation fails,
-        ``failed`` (N,), 1 for the sensor that is isolated, and ``triad``, the number of the selected triad.
+    Returns: inputs ``parity`` (M,) and ``trip`` (M,), the trip levels of the integer equations, in rad or m/s,
+    and ``excluded`` (N,), 1 for a sensor that no longer counts, else 0; outputs ``detected``, 1 if an equation
+    fails, ``failed`` (N,), 1 for the sensor that is isolated, and ``triad``, the number of the selected triad.
     """
     geometry = sensors.geometry
     labels = [str(number) for number in sensors.all_sensors]

@@ -21,53 +21,32 @@ _EQUAL = 1e-9
 
 @dataclass(frozen=True)
 class FailureVerdict:
-    """What a table says of one status of the parity equations.
+    """What a table says of one status of the parity equations."""
 
-    Parameters
-    ----------
-    failed : int or None
-        The sensor that is declared failed: its failure direction is the most aligned for most of the points.
-    triad : int
-        Number of the triad whose failure directions are the least aligned, in `SensorGeometry.triads`.
-    points : int
-        Points of the scan with this status.
-    """
-
+    #: The sensor that is declared failed: its failure direction is the most aligned for most of the points
     failed: int | None
+    #: Number of the triad whose failure directions are the least aligned, in `SensorGeometry.triads`
     triad: int
+    #: Points of the scan with this status
     points: int
 
 
 @dataclass(frozen=True)
 class FailureTable:
-    """The tables for one state of the sensors.
+    """The tables for one state of the sensors."""
 
-    Parameters
-    ----------
-    removed : tuple of int
-        Sensors that no longer count.
-    equations : tuple of int
-        Numbers of the parity equations that need none of them; a status has a bit for each.
-    verdicts : mapping of tuple of bool to FailureVerdict
-        By status: whether each of these equations fails.
-    """
-
+    #: Sensors that no longer count
     removed: tuple[int, ...]
+    #: Numbers of the parity equations that need none of them; a status has a bit for each
     equations: tuple[int, ...]
+    #: By status: whether each of these equations fails
     verdicts: Mapping[tuple[bool, ...], FailureVerdict]
 
 
 def failure_directions(geometry: SensorGeometry) -> Array:
     """Return the directions of failures in parity space, one for each sensor, of the length that a failure of 1 has.
 
-    Parameters
-    ----------
-    geometry : SensorGeometry
-
-    Returns
-    -------
-    array, (N - 3, N)
-        In orthonormal coordinates of the space that the independent parity equations span.
+    Returns (N - 3, N): in orthonormal coordinates of the space that the independent parity equations span.
     """
     basis = np.array(geometry.parity_basis, float)
     directions: Array = np.linalg.qr(basis.T)[0].T
@@ -79,19 +58,6 @@ def failure_table(geometry: SensorGeometry, removed: tuple[int, ...] = ()) -> Fa
 
     An equation, divided by the length of its vector, fails from the trip level 1 on.
 
-    Parameters
-    ----------
-    geometry : SensorGeometry
-    removed : tuple of int, optional
-        Sensors that no longer count.
-
-    Raises
-    ------
-    InputError
-        If no parity equation is left.
-
-    Examples
-    --------
     >>> from strapgen.navigation.redundancy.geometry import HEXAD
     >>> table = failure_table(HEXAD, (0,))
     >>> len(table.equations), [table.verdicts[status].failed for status in table.verdicts if sum(status) == 4][:2]

@@ -25,19 +25,12 @@ _Elements = tuple[Any, ...]
 
 
 class _Field(NamedTuple):
-    """Rows of numbers in their field, where sums, products and quotients are exact, and the ways there and back.
-
-    Parameters
-    ----------
-    rows : tuple of tuple
-    into : callable
-        Returns the element that a number is; None if it is not in the field.
-    back : callable
-        Returns the number that an element is, always in one form.
-    """
+    """Rows of numbers in their field, where sums, products and quotients are exact, and the ways there and back."""
 
     rows: tuple[_Elements, ...]
+    #: Returns the element that a number is; None if it is not in the field
     into: Callable[[Number], Any]
+    #: Returns the number that an element is, always in one form
     back: Callable[[Any], Number]
 
 
@@ -91,23 +84,15 @@ def _inverse(rows: Sequence[_Elements]) -> tuple[_Elements, ...]:
 
 @dataclass(frozen=True)
 class Triad:
-    """Three sensors and the rate that they measure.
+    """Three sensors and the rate that they measure."""
 
-    Parameters
-    ----------
-    sensors : tuple of int
-        Their numbers.
-    determinant : Fraction or sympy.Expr
-        Of their axes.
-    inverse : tuple of tuple, 3 x 3
-        From the three measurements to components along x, y and z.
-    squared_gains : tuple
-        Squares of the noise in x, y and z for equal, independent noise of 1 on all sensors.
-    """
-
+    #: Their numbers
     sensors: tuple[int, ...]
+    #: Of their axes
     determinant: Number
+    #: From the three measurements to components along x, y and z
     inverse: tuple[Row, ...]
+    #: Squares of the noise in x, y and z for equal, independent noise of 1 on all sensors
     squared_gains: Row
 
     @property
@@ -120,23 +105,11 @@ class Triad:
 class SensorGeometry:
     """Single-axis sensors by what each measures of a vector: its axis, times its scale.
 
-    Parameters
-    ----------
-    axes : tuple of tuple of Fraction or sympy.Expr, (N, 3)
-        Rows of the measurement matrix H in body axes, as `coefficients.number` returns numbers.
-
-    Raises
-    ------
-    InputError
-        If there are too few axes or too many, one is zero, or no three of them are independent; if one sensor is in no
-        parity equation, so that nothing would tell its failure.
-
-    Examples
-    --------
     >>> HEXAD.equations[0]
     (-2, -2, 1, 3, 0, 0)
     """
 
+    #: Rows of the measurement matrix H in body axes, as `coefficients.number` returns numbers
     axes: tuple[Row, ...]
 
     def __post_init__(self) -> None:
@@ -300,13 +273,6 @@ def geometry(axes: Any) -> SensorGeometry:
 
     A row is divided by its length where that is in the field of all their numbers; else it stands as it is.
 
-    Raises
-    ------
-    InputError
-        If there is no list of rows of three numbers, or as `SensorGeometry` does.
-
-    Examples
-    --------
     >>> geometry([[1, 0, 0], [0, 1, 0], [0, 0, 1], ["1/3", "2/3", "2/3"]]).equations
     ((-1, -2, -2, 3),)
     >>> geometry([[1, 0, 0], [0, 1, 0], [0, 0, 2], ["sqrt(3)/2", "1/4", "sqrt(3)/4"]]).equations

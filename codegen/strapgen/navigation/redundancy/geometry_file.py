@@ -27,16 +27,9 @@ _NAME = re.compile(r"[a-z][a-z0-9]{0,7}")
 def read(path: str | Path) -> SensorSet:
     """Read a geometry.
 
-    Parameters
-    ----------
-    path : path
-        A TOML file with ``axes``, rows of three numbers each as `geometry` reads them, and if need be ``name``,
-        ``sensor``, "gyro" or "accelerometer", and ``range``, the largest increment of a cycle in rad or m/s.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, a key, a name or a number is not allowed, or the geometry is none; one line names it.
+    `path`: a TOML file with ``axes``, rows of three numbers each as `geometry` reads them, and if need be
+    ``name``, ``sensor``, "gyro" or "accelerometer", and ``range``, the largest increment of a cycle in rad or
+    m/s.
     """
     place = checks.path("path", path)
     tables = toml_files.content(path, "a geometry", _MOST_BYTES, str)

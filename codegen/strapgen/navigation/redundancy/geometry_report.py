@@ -22,15 +22,7 @@ _TRIADS = (
 
 
 def geometry_report(sensors: SensorSet, tables: Sequence[FailureTable], files: Sequence[str] = ()) -> Report:
-    """Return a geometry as a report.
-
-    Parameters
-    ----------
-    sensors : SensorSet
-    tables : sequence of FailureTable
-    files : sequence of str, optional
-        Files that were written.
-    """
+    """Return a geometry as a report."""
     return Report(
         lambda: "\n".join([*_lines(sensors, tables), *(f"  {name}" for name in files)]) + "\n",
         lambda: {**_data(sensors, tables), "files": list(files)},

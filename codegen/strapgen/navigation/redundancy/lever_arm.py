@@ -32,12 +32,9 @@ PREVIOUS = replace(
 def moment_arm() -> Kernel:
     """Return the velocity increment at the end of a moment arm: a + w' x r + w x (w x r), w' by differences.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``velocity_increment`` (3,) in m/s, ``increment`` and ``previous_increment`` (3,) in rad, ``arm`` (3,)
-        in m, all body axes, and ``cycle_rate`` 1/T in 1/s; outputs ``arm_velocity_increment`` (3,) in m/s and
-        ``next_previous_increment``.
+    Returns: inputs ``velocity_increment`` (3,) in m/s, ``increment`` and ``previous_increment`` (3,) in rad,
+    ``arm`` (3,) in m, all body axes, and ``cycle_rate`` 1/T in 1/s; outputs ``arm_velocity_increment`` (3,) in
+    m/s and ``next_previous_increment``.
     """
     build = KernelBuilder()
     velocity = Signal.vector(
@@ -82,11 +79,9 @@ def moment_arm() -> Kernel:
 def boresight() -> Kernel:
     """Return the mean of the relative attitudes of two units over alignments, (C_B^n)' C_A^n.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``attitude_a`` and ``attitude_b`` (3, 3), C_A^n and C_B^n, ``mean`` (3, 3), a state, and ``share``, 1/k
-        in alignment k; output ``next_mean``. `dcm-orthonormalize-optimal` makes a rotation of the mean.
+    Returns: inputs ``attitude_a`` and ``attitude_b`` (3, 3), C_A^n and C_B^n, ``mean`` (3, 3), a state, and
+    ``share``, 1/k in alignment k; output ``next_mean``. `dcm-orthonormalize-optimal` makes a rotation of the
+    mean.
     """
     build = KernelBuilder()
     attitudes = [

@@ -23,25 +23,16 @@ SEBRING = (
 
 @dataclass(frozen=True)
 class SensorSet:
-    """Sensors of one kind on a geometry.
+    """Sensors of one kind on a geometry."""
 
-    Parameters
-    ----------
-    name : str
-        What the names of its kernels end with.
-    geometry : SensorGeometry
-    sensor : str
-        A key of `KINDS`.
-    range : Fraction
-        Largest increment of a cycle that a sensor measures, in rad or m/s.
-    command : str
-        The command that generates its kernels, if that is not ``strapgen generate``.
-    """
-
+    #: What the names of its kernels end with
     name: str
     geometry: SensorGeometry
+    #: A key of `KINDS`
     sensor: str = "gyro"
+    #: Largest increment of a cycle that a sensor measures, in rad or m/s
     range: Fraction = Fraction(1, 8)
+    #: The command that generates its kernels, if that is not ``strapgen generate``
     command: str = ""
 
     def __post_init__(self) -> None:
@@ -116,13 +107,9 @@ def _source(what: str, sensors: SensorSet) -> str:
 def parity(sensors: SensorSet = HEXAD_SET) -> Kernel:
     """Return the parity equations, which integers make exact in fixed point.
 
-    Returns
-    -------
-    Kernel
-        Input ``measurement`` (N,) in rad or m/s; output ``parity`` (M,) in the same unit, zero without errors.
+    Returns: input ``measurement`` (N,) in rad or m/s; output ``parity`` (M,) in the same unit, zero without
+    errors.
 
-    Examples
-    --------
     >>> parity().outputs[0].expressions[0]
     -2*m_0 - 2*m_1 + m_2 + 3*m_3
     """
@@ -140,11 +127,9 @@ def parity(sensors: SensorSet = HEXAD_SET) -> Kernel:
 def parity_rest(sensors: SensorSet = HEXAD_SET) -> Kernel:
     """Return the removal of biases from parity: their mean at rest, and what is left without it.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``parity`` and ``parity_bias`` (M,), a state, in rad or m/s, and ``share``, 1/k in cycle k of a mean, or
-        0 where the vehicle moves; outputs ``next_parity_bias`` and ``corrected`` (M,), before the update.
+    Returns: inputs ``parity`` and ``parity_bias`` (M,), a state, in rad or m/s, and ``share``, 1/k in cycle k
+    of a mean, or 0 where the vehicle moves; outputs ``next_parity_bias`` and ``corrected`` (M,), before the
+    update.
     """
     build = KernelBuilder()
     p = build.input(sensors.parity)
@@ -181,16 +166,7 @@ def parity_rest(sensors: SensorSet = HEXAD_SET) -> Kernel:
 def triad(number: int, sensors: SensorSet = HEXAD_SET) -> Kernel:
     """Return the vector of a triad.
 
-    Parameters
-    ----------
-    number : int
-        Of the triad in `SensorGeometry.triads`.
-    sensors : SensorSet
-
-    Returns
-    -------
-    Kernel
-        Input ``measurement`` (3,) of its sensors in rad or m/s; output ``increment`` (3,) in body axes.
+    Returns: input ``measurement`` (3,) of its sensors in rad or m/s; output ``increment`` (3,) in body axes.
     """
     one = sensors.geometry.triads[number]
     build = KernelBuilder()
@@ -218,10 +194,7 @@ def gain_text(one: Triad) -> str:
 def all_sensors(sensors: SensorSet = HEXAD_SET) -> Kernel:
     """Return the vector of all sensors by least squares.
 
-    Returns
-    -------
-    Kernel
-        Input ``measurement`` (N,) in rad or m/s; output ``increment`` (3,) in body axes.
+    Returns: input ``measurement`` (N,) in rad or m/s; output ``increment`` (3,) in body axes.
     """
     build = KernelBuilder()
     m = build.input(sensors.measurement(sensors.all_sensors))

@@ -29,35 +29,24 @@ SIZES = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 8.0, 12.0)
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """Errors of the sensors, flight conditions and trip levels of a study; all are choices of the study.
+    """Errors of the sensors, flight conditions and trip levels of a study; all are choices of the study."""
 
-    Parameters
-    ----------
-    cycle_s : float
-        Cycle in s.
-    rate_deg_s, load_g : float
-        Largest rate about an axis and largest load; trials are uniform up to them.
-    noise_arcsec, pulse_arcsec : float
-        Standard deviation of white noise of a cycle, and the quantum of the counts.
-    bias_deg_h, scale_ppm : float
-        Standard deviations.
-    bending_arcmin_g : float
-        Angle by which the second half of the sensors bends against the first, about a random axis, for each g.
-    trip_sigmas : float
-        Trip level in standard deviations of all errors that do not depend on rate.
-    trip_rate : float
-        Part of the trip level for each unit of rate and of rate times bending, in standard deviations too.
-    """
-
+    #: Cycle in s
     cycle_s: float = 0.02
+    #: Largest rate about an axis and largest load; trials are uniform up to them
     rate_deg_s: float = 100.0
     load_g: float = 7.0
+    #: Standard deviation of white noise of a cycle, and the quantum of the counts
     noise_arcsec: float = 1.0
     pulse_arcsec: float = 3.0
+    #: Standard deviations
     bias_deg_h: float = 1.0
     scale_ppm: float = 50.0
+    #: Angle by which the second half of the sensors bends against the first, about a random axis, for each g
     bending_arcmin_g: float = 1.0
+    #: Trip level in standard deviations of all errors that do not depend on rate
     trip_sigmas: float = 5.0
+    #: Part of the trip level for each unit of rate and of rate times bending, in standard deviations too
     trip_rate: float = 3.0
 
     def __post_init__(self) -> None:
@@ -84,28 +73,20 @@ class SensorErrors:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Counts of trials with sensors removed before, and one that fails by a size.
+    """Counts of trials with sensors removed before, and one that fails by a size."""
 
-    Parameters
-    ----------
-    removed : int
-        Sensors that failed before and are excluded.
-    size : float
-        Size of the failure in trip levels; 0 for none.
-    trials, detected, isolated, wrong, selected : int
-        All; those in which an equation fails; the failing sensor isolated; another one isolated; a triad selected
-        without the failing sensor, if one fails.
-    table_isolated, table_wrong, table_selected : int
-        The same by the tables.
-    """
-
+    #: Sensors that failed before and are excluded
     removed: int
+    #: Size of the failure in trip levels; 0 for none
     size: float
+    #: All; those in which an equation fails; the failing sensor isolated; another one isolated; a triad
+    #: selected without the failing sensor, if one fails
     trials: int
     detected: int
     isolated: int
     wrong: int
     selected: int
+    #: The same by the tables
     table_isolated: int
     table_wrong: int
     table_selected: int
@@ -139,25 +120,7 @@ def study_steps(geometry: SensorGeometry) -> list[tuple[int, float]]:
 def redundancy_study(
     sensors: SensorSet, errors: SensorErrors, trials: int, seed: int = 1, backend: str = "numpy"
 ) -> Iterator[Outcomes]:
-    """Yield the counts of every step of the study.
-
-    Parameters
-    ----------
-    sensors : SensorSet
-        Gyros.
-    errors : SensorErrors
-    trials : int
-        In each step.
-    seed : int, optional
-        Of the random numbers.
-    backend : str, optional
-        A key of `strapgen.run.backends.BACKENDS` in floating point.
-
-    Raises
-    ------
-    InputError
-        If the sensors are no gyros, or an increment is beyond their range.
-    """
+    """Yield the counts of every step of the study."""
     if sensors.sensor != "gyro":
         raise InputError(f"the study is one of gyros; the sensors of {sensors.name} are accelerometers")
     largest = np.sqrt(3) * np.radians(errors.rate_deg_s) * errors.cycle_s

@@ -19,24 +19,16 @@ _COUNTER = 4
 
 @dataclass(frozen=True)
 class StageBudget:
-    """What a stage needs for a call.
-
-    Parameters
-    ----------
-    name, kernel : str
-    operations : mapping of str to int
-        Operations of a call by kind.
-    constants : int
-        Different numbers in the code, other than 0, 1 and -1, and in fixed point other than powers of two, which
-        are shifts.
-    executed, code_bytes, stack_bytes : int or None
-        Instructions of a call, bytes of object code and of stack on a processor; None where it was not measured.
-    """
+    """What a stage needs for a call."""
 
     name: str
     kernel: str
+    #: Operations of a call by kind
     operations: Mapping[str, int]
+    #: Different numbers in the code, other than 0, 1 and -1, and in fixed point other than powers of two, which
+    #: are shifts
     constants: int
+    #: Instructions of a call, bytes of object code and of stack on a processor; None where it was not measured
     executed: int | None = None
     code_bytes: int | None = None
     stack_bytes: int | None = None
@@ -44,16 +36,9 @@ class StageBudget:
 
 @dataclass(frozen=True)
 class RateBudget:
-    """What the stages of one rate need in a second.
+    """What the stages of one rate need in a second."""
 
-    Parameters
-    ----------
-    every : int
-        Cycles of the fastest rate from one time to the next.
-    hz : Fraction
-    stages : tuple of StageBudget
-    """
-
+    #: Cycles of the fastest rate from one time to the next
     every: int
     hz: Fraction
     stages: tuple[StageBudget, ...]
@@ -77,27 +62,19 @@ class RateBudget:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a system needs.
+    """What a system needs."""
 
-    Parameters
-    ----------
-    rates : tuple of RateBudget
-        From the fastest.
-    cell_bytes, feedback_bytes, counter_bytes, padding_bytes : int
-        Memory between calls: values, error feedback, counters, and what a compiler puts between members so that each
-        lies at a multiple of its size.
-    constant_bytes : int
-        Bytes of the different constants of all stages, and of initial values that are not zero.
-    cpu : str
-        Processor on which instructions were counted; "" if they were not.
-    """
-
+    #: From the fastest
     rates: tuple[RateBudget, ...]
+    #: Memory between calls: values, error feedback, counters, and what a compiler puts between members so that
+    #: each lies at a multiple of its size
     cell_bytes: int
     feedback_bytes: int
     counter_bytes: int
     padding_bytes: int
+    #: Bytes of the different constants of all stages, and of initial values that are not zero
     constant_bytes: int
+    #: Processor on which instructions were counted; "" if they were not
     cpu: str = ""
 
     @property
@@ -123,14 +100,6 @@ def budget(
     """Return what a system needs whose stages are generated.
 
     The copies of values between calls are not counted, nor are rescalings.
-
-    Parameters
-    ----------
-    fit : Fitted
-    measured : mapping of str to tuple, optional
-        Instructions, bytes of object code and bytes of stack of each stage on a processor, by its name.
-    cpu : str, optional
-        Name of the processor.
     """
     sizes = list(_sizes(fit))
     cells = sum(count * size for kind, count, size in sizes if kind == "cell")

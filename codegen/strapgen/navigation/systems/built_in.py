@@ -13,8 +13,6 @@ _FOLDER = Path(__file__).parent / "built_in_files"
 def names() -> dict[str, str]:
     """Return the names of the built-in systems, with the titles of their files.
 
-    Examples
-    --------
     >>> list(names())
     ['two-speed-dcm', 'two-speed-dcm-1', 'two-speed-euler', 'two-speed-euler-1']
     """
@@ -38,17 +36,6 @@ def is_system(name: object) -> bool:
 def file_of(name: str | Path) -> Path:
     """Return the file of a system: that of a built-in one, or the named file.
 
-    Parameters
-    ----------
-    name : str or path
-
-    Raises
-    ------
-    InputError
-        If a name without folder and ending is neither built in nor a file.
-
-    Examples
-    --------
     >>> file_of("two-speed-dcm").name, str(file_of("mine.toml"))
     ('two-speed-dcm.toml', 'mine.toml')
     """

@@ -26,25 +26,16 @@ from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
 
 @dataclass(frozen=True)
 class Fitted:
-    """The generated stages of a system, and in fixed point the formats of what passes between them.
-
-    Parameters
-    ----------
-    description : Description
-    target : str
-        Target of the stages.
-    settings : Settings or None
-        Word and rounding where a stage states none; None in floating point.
-    sources : mapping of str to Sources
-        Of each stage by its name.
-    arguments : mapping of str to Argument
-        Format and range of cells and of the inputs of the system; empty in floating point.
-    """
+    """The generated stages of a system, and in fixed point the formats of what passes between them."""
 
     description: Description
+    #: Target of the stages
     target: str
+    #: Word and rounding where a stage states none; None in floating point
     settings: Settings | None
+    #: Of each stage by its name
     sources: Mapping[str, Sources]
+    #: Format and range of cells and of the inputs of the system; empty in floating point
     arguments: Mapping[str, Argument] = field(default_factory=dict)
 
     @property
@@ -83,19 +74,6 @@ def fitted(description: Description, target: str, settings: Settings | None = No
 
     In fixed point an input takes the format of what is wired to it, where that holds its range; where it does not, or
     the words differ, the wire is rescaled.
-
-    Parameters
-    ----------
-    description : Description
-    target : str
-        A key of `strapgen.targets.TARGETS`.
-    settings : Settings, optional
-        Word, rounding and drift allowance in fixed point where a stage states nothing else.
-
-    Raises
-    ------
-    InputError
-        If a stage cannot be generated so; the message names it.
     """
     targets.require(target, settings)
     if TARGETS[target].fixed:
@@ -239,13 +217,7 @@ class _Fit:
         return replace(settings, ranges=ranges | wider)
 
     def _counted(self, stage: SystemStage) -> set[str]:
-        """Return the inputs of a stage that are counts of the gyro.
-
-        Raises
-        ------
-        InputError
-            If a gyro's counts meet an input that takes angles.
-        """
+        """Return the inputs of a stage that are counts of the gyro."""
         if self.settings.input_bits is None:
             return set()
         takers = {signal.name for signal in counted(self.description.programs[stage.name])}

@@ -17,23 +17,14 @@ from strapgen.navigation.systems.system_file import StageText
 
 @dataclass
 class Ports:
-    """A stage with its kernel.
-
-    Parameters
-    ----------
-    text : StageText
-    choice : Choice
-    program : Program
-    place : int
-        Place among the stages.
-    known : dict of str to str
-        What "any" stands for, by "unit" and "frame", as far as it is known.
-    """
+    """A stage with its kernel."""
 
     text: StageText
     choice: Choice
     program: Program
+    #: Place among the stages
     place: int
+    #: What "any" stands for, by "unit" and "frame", as far as it is known
     known: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -73,13 +64,7 @@ class Ports:
         return next((state for state, output in self.states.items() if output == signal), None)
 
     def start(self, signal: Signal) -> tuple[Fraction, ...]:
-        """Return what a signal is before the first cycle if the file does not say so: no rotation, or zero.
-
-        Raises
-        ------
-        InputError
-            If it is a state that obeys a constraint, and there is no such start.
-        """
+        """Return what a signal is before the first cycle if the file does not say so: no rotation, or zero."""
         step = self.program.companions
         if step is not None and signal.name == self.program.inputs[0].name:
             return step.identity
@@ -99,14 +84,7 @@ class Ports:
 
 
 def ports(text: StageText, place: int) -> Ports:
-    """Return a stage with its kernel, the constants folded into it.
-
-    Raises
-    ------
-    InputError
-        If the kernel is not known, or an option, a constant or a state does not go with it; the message names the
-        stage.
-    """
+    """Return a stage with its kernel, the constants folded into it."""
     try:
         choice = catalogue.choose(text.kernel, constants=text.constants or None, **text.options)
         program = pipeline.program(choice)

@@ -18,22 +18,6 @@ def radial_error_rate(errors: Sequence[float], times: Sequence[float], factor: f
     Where north and east errors of a rate are normal with one deviation s, n flights estimate s^2 by the sum over 2 n,
     and 95 % of the radial errors are below 2.447747 s.
 
-    Parameters
-    ----------
-    errors : sequence of float
-        Radial position error at the end of each flight, in any unit of length.
-    times : sequence of float
-        Time of each flight.
-    factor : float, optional
-        As printed by default.
-
-    Raises
-    ------
-    InputError
-        If there are no flights, the numbers of errors and times differ, or a time is not above 0.
-
-    Examples
-    --------
     >>> round(radial_error_rate([1.0, 2.0, 3.0], [1.0, 2.0, 1.0]), 6)
     3.317316
     """

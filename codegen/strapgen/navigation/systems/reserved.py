@@ -23,13 +23,6 @@ _USED = re.compile(r"cycles|done|status|np|memcpy|memmove|memset|(u?int\w*|size|
 def check_names(system: str, inputs: Iterable[str], stages: Iterable[str]) -> None:
     """Check that code can have the names of a system, its inputs and its stages.
 
-    Raises
-    ------
-    InputError
-        If one has a meaning there; the message names it.
-
-    Examples
-    --------
     >>> check_names("imu", ["gyro"], ["fast", "slow"])
     >>> check_names("imu", ["int"], ["fast"])
     Traceback (most recent call last):

@@ -25,14 +25,9 @@ _COUNTED = {"angle": ("rad", Fraction(1, 1 << 14)), "velocity": ("m/s", Fraction
 def increment_sum() -> Kernel:
     """Return the sum of the increments of a fast rate for a slower one.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``sum`` (3,), which is zero at the start of every slower cycle, and ``increment`` (3,) of the faster
-        cycle, in any unit and frame that they share; output ``next_sum`` (3,).
+    Returns: inputs ``sum`` (3,), which is zero at the start of every slower cycle, and ``increment`` (3,) of
+    the faster cycle, in any unit and frame that they share; output ``next_sum`` (3,).
 
-    Examples
-    --------
     >>> increment_sum().recursion.begun_anew
     ('sum',)
     """
@@ -51,14 +46,9 @@ def increment_sum() -> Kernel:
 def held_increment() -> Kernel:
     """Return the share of a faster cycle in an increment of a slower one, at a constant rate.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``increment`` (3,) of the slower cycle, in any unit and frame, and ``share``, 1/N for N faster cycles in
-        a slower one; output ``increment_share`` (3,) in the same unit and frame.
+    Returns: inputs ``increment`` (3,) of the slower cycle, in any unit and frame, and ``share``, 1/N for N
+    faster cycles in a slower one; output ``increment_share`` (3,) in the same unit and frame.
 
-    Examples
-    --------
     >>> held_increment().outputs[0].expressions[0]
     d_x*share
     """
@@ -79,19 +69,9 @@ def held_increment() -> Kernel:
 def scaled_counts(what: str) -> Kernel:
     """Return increments from the counts of three sensors of one scale.
 
-    Parameters
-    ----------
-    what : str
-        "angle" or "velocity".
+    Returns: inputs ``count`` (3,), counts of the cycle about or along body axes, and ``scale``, the quantum of
+    a count in rad or m/s; output ``increment`` (3,) in its unit, body axes.
 
-    Returns
-    -------
-    Kernel
-        Inputs ``count`` (3,), counts of the cycle about or along body axes, and ``scale``, the quantum of a count in
-        rad or m/s; output ``increment`` (3,) in its unit, body axes.
-
-    Examples
-    --------
     >>> scaled_counts("velocity").outputs[0].signal.unit
     'm/s'
     """

@@ -8,8 +8,6 @@ from strapgen.ir.program import Operation, Program, Reference
 def copies(program: Program) -> dict[str, str]:
     """Return the states that are copies of inputs of the call before, with these inputs.
 
-    Examples
-    --------
     >>> from strapgen import pipeline
     >>> from strapgen.catalogue import Choice
     >>> copies(pipeline.program(Choice("two-speed-fast-2")))
@@ -26,8 +24,6 @@ def copies(program: Program) -> dict[str, str]:
 def summed(program: Program) -> dict[str, str]:
     """Return the states that add up an input and nothing else until they are reset, with these inputs.
 
-    Examples
-    --------
     >>> from strapgen import pipeline
     >>> from strapgen.catalogue import Choice
     >>> summed(pipeline.program(Choice("two-speed-fast-2")))

@@ -12,109 +12,69 @@ from strapgen.ir.signals import Signal
 
 @dataclass(frozen=True)
 class Cell:
-    """A value that the system stores between calls.
+    """A value that the system stores between calls."""
 
-    Parameters
-    ----------
-    name : str
-        Name in generated code: stage and signal.
-    signal : Signal
-        Shape, unit, frame and meaning.
-    initial : tuple of Fraction
-        The elements before the first cycle, row-major.
-    samples : int
-        Number of samples that it holds, the newest last; 0 for a value that is replaced as a whole.
-    """
-
+    #: Name in generated code: stage and signal
     name: str
+    #: Shape, unit, frame and meaning
     signal: Signal
+    #: The elements before the first cycle, row-major
     initial: tuple[Fraction, ...]
+    #: Number of samples that it holds, the newest last; 0 for a value that is replaced as a whole
     samples: int = 0
 
 
 @dataclass(frozen=True)
 class Wire:
-    """Where an input of a stage comes from.
+    """Where an input of a stage comes from."""
 
-    Parameters
-    ----------
-    input : str
-        Name of the input of the kernel.
-    source : str
-        Name of a cell, or of an input of the system.
-    external : bool
-        Whether the source is an input of the system.
-    """
-
+    #: Name of the input of the kernel
     input: str
+    #: Name of a cell, or of an input of the system
     source: str
+    #: Whether the source is an input of the system
     external: bool = False
 
 
 @dataclass(frozen=True)
 class SystemStage:
-    """A kernel that runs at the end of every so many cycles.
+    """A kernel that runs at the end of every so many cycles."""
 
-    Parameters
-    ----------
-    name : str
-        Name in the description.
-    kernel : str
-        Name of the kernel.
-    every : int
-        Cycles of the fastest rate from one call to the next.
-    wires : tuple of Wire
-        One for each input of the kernel, in its order.
-    results : tuple of (str, str)
-        For each output of the kernel the name of the cell that takes it.
-    word : int or None
-        Bits of a word in fixed point; None for those that the target is generated with.
-    carry : str
-        Error feedback in fixed point, a key of `CARRIES`; "" for that of the settings.
-    """
-
+    #: Name in the description
     name: str
+    #: Name of the kernel
     kernel: str
+    #: Cycles of the fastest rate from one call to the next
     every: int
+    #: One for each input of the kernel, in its order
     wires: tuple[Wire, ...]
+    #: For each output of the kernel the name of the cell that takes it
     results: tuple[tuple[str, str], ...]
+    #: Bits of a word in fixed point; None for those that the target is generated with
     word: int | None = None
+    #: Error feedback in fixed point, a key of `CARRIES`; "" for that of the settings
     carry: str = ""
 
 
 @dataclass(frozen=True)
 class Push:
-    """A sample that is added to a cell that holds several.
-
-    Parameters
-    ----------
-    cell : str
-    source : str
-        Name of a cell, or of an input of the system.
-    external : bool
-        Whether it is an input.
-    """
+    """A sample that is added to a cell that holds several."""
 
     cell: str
+    #: Name of a cell, or of an input of the system
     source: str
+    #: Whether it is an input
     external: bool = False
 
 
 @dataclass(frozen=True)
 class Rate:
-    """What happens at one rate, in this order: samples are stored, stages are called, sums are cleared.
+    """What happens at one rate, in this order: samples are stored, stages are called, sums are cleared."""
 
-    Parameters
-    ----------
-    every : int
-        Cycles of the fastest rate from one time to the next.
-    steps : tuple of Push or SystemStage
-    cleared : tuple of str
-        Cells that are set to zero at the end.
-    """
-
+    #: Cycles of the fastest rate from one time to the next
     every: int
     steps: tuple[Push | SystemStage, ...]
+    #: Cells that are set to zero at the end
     cleared: tuple[str, ...] = ()
 
     @property
@@ -138,32 +98,21 @@ def _external(steps: tuple[Push | SystemStage, ...]) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class DescribedSystem:
-    """Stages with their wires, checked.
+    """Stages with their wires, checked."""
 
-    Parameters
-    ----------
-    name : str
-        Name in generated code, an identifier.
-    title : str
-        One line that says what it computes.
-    sample_hz : Fraction
-        Cycles of the fastest rate in a second.
-    inputs : tuple of Signal
-        What is measured in every cycle of the fastest rate; each has a bound.
-    cells : tuple of Cell
-        What is stored.
-    rates : tuple of Rate
-        From the fastest to the slowest, in the order in which they run when they fall together.
-    outputs : tuple of str
-        Names of the cells that a run records.
-    """
-
+    #: Name in generated code, an identifier
     name: str
+    #: One line that says what it computes
     title: str
+    #: Cycles of the fastest rate in a second
     sample_hz: Fraction
+    #: What is measured in every cycle of the fastest rate; each has a bound
     inputs: tuple[Signal, ...]
+    #: What is stored
     cells: tuple[Cell, ...]
+    #: From the fastest to the slowest, in the order in which they run when they fall together
     rates: tuple[Rate, ...]
+    #: Names of the cells that a run records
     outputs: tuple[str, ...]
 
     @property

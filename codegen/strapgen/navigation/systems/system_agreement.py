@@ -24,26 +24,17 @@ _BLOCK = 20_000
 
 @dataclass(frozen=True)
 class PassAgreement:
-    """How far one pass of a back end is from one of another, from equal memories and samples.
+    """How far one pass of a back end is from one of another, from equal memories and samples."""
 
-    Parameters
-    ----------
-    cycles : int
-        Number of passes that were compared.
-    largest : mapping of str to float
-        Largest difference of an element of a cell, in its unit.
-    certified : mapping of str to float
-        Sum of the error bounds of both back ends, of the worst element.
-    share : mapping of str to float
-        Largest difference of an element as a part of its bound; above 1 would refute the bound.
-    reasons : mapping of str to str
-        Why a cell has no bound.
-    """
-
+    #: Number of passes that were compared
     cycles: int
+    #: Largest difference of an element of a cell, in its unit
     largest: Mapping[str, float]
+    #: Sum of the error bounds of both back ends, of the worst element
     certified: Mapping[str, float]
+    #: Largest difference of an element as a part of its bound; above 1 would refute the bound
     share: Mapping[str, float]
+    #: Why a cell has no bound
     reasons: Mapping[str, str]
 
     @property
@@ -60,21 +51,7 @@ def agreement(
 ) -> PassAgreement:
     """Run a system on one back end, and every single cycle of it on another from the memory before.
 
-    Parameters
-    ----------
-    runner : SystemRunner
-        Of C.
-    reference : SystemRunner
-        On a back end in floating point, or in exact arithmetic.
-    inputs : mapping of str to array_like, (cycles, shape)
-        Samples in SI units.
-    memory : SystemMemory, optional
-        What the run begins with; by default that of the description.
-
-    Raises
-    ------
-    InputError
-        If the runner is none of C, or refuses a sample.
+    `inputs` (cycles, shape): samples in SI units.
     """
     if not isinstance(runner, CompiledSystem):
         raise InputError(f"back end {runner.backend} runs no C; the memory of every cycle is read from C")
@@ -149,10 +126,7 @@ def _differences(
 def distance(signal: Signal, one: Array, other: Array) -> Array:
     """Return how far values are from each other, element by element; angles without whole turns.
 
-    Parameters
-    ----------
-    signal : Signal
-    one, other : array, (..., elements)
+    `one, other` has shape (..., elements).
     """
     apart = one - other
     if signal.unit == "rad":

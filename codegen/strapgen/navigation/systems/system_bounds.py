@@ -24,16 +24,11 @@ class SystemBounds:
 
     The pass is a cycle in which all rates fall together; in every other cycle fewer stages run, and the bounds hold
     for the cells that they write. So a cell that several rates write has the largest bound of them.
-
-    Parameters
-    ----------
-    errors : mapping of str to tuple of Fraction
-        A bound for every element of a cell, in its unit.
-    reasons : mapping of str to str
-        Why there is none, by the name of the cell.
     """
 
+    #: A bound for every element of a cell, in its unit
     errors: Mapping[str, Errors] = field(default_factory=dict)
+    #: Why there is none, by the name of the cell
     reasons: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -42,11 +37,6 @@ def bounds(fit: Fitted) -> SystemBounds:
 
     Every stage has the bound of its own rounding, and passes on the errors of its inputs by at most its derivatives,
     which interval arithmetic bounds over the ranges of its inputs.
-
-    Parameters
-    ----------
-    fit : Fitted
-        The generated stages, in C of any number or as integer model.
     """
     ranges = fit
     if not TARGETS[fit.target].fixed:

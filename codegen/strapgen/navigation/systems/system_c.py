@@ -21,13 +21,7 @@ NULL = 4
 
 @dataclass(frozen=True)
 class Stored:
-    """A value in memory: its type in C, and in fixed point its format.
-
-    Parameters
-    ----------
-    type : str
-    argument : Argument or None
-    """
+    """A value in memory: its type in C, and in fixed point its format."""
 
     type: str
     argument: Argument | None = None
@@ -55,27 +49,7 @@ def whole(
     arguments: Mapping[str, Argument],
     budget: Sequence[str] = (),
 ) -> Sources:
-    """Generate the C of a system.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-    name : str
-        Name of the unit in C.
-    title_and_command : tuple of str
-        A line for the head of the files, and the command line that generates them.
-    stages : mapping of str to Sources
-        The C of each stage.
-    arguments : mapping of str to Argument
-        Formats of cells and inputs; empty in floating point.
-    budget : sequence of str, optional
-        Lines about operations and memory for the header.
-
-    Returns
-    -------
-    Sources
-        The files of the whole, and those of the stages.
-    """
+    """Generate the C of a system."""
     first = stages[system.stages[0].name]
     printer = _Printer(system, name, first.target, stages, arguments)
     files = render_c("system_c", printer.name, **printer.values(*title_and_command), budget=budget)

@@ -20,30 +20,20 @@ from strapgen.run.backends import BACKENDS
 
 @dataclass(frozen=True)
 class OutputComparison:
-    """An output of a system on a back end beside a reference.
-
-    Parameters
-    ----------
-    backend, output, unit : str
-    run : float
-        Largest difference of an element over the run, in the unit.
-    one_pass : float or None
-        Largest difference of an element after one pass from equal memories; None for a back end that runs no C.
-    bound : float or None
-        Certified bound of that difference; None where there is none.
-    share : float or None
-        Largest difference of one pass as a part of its bound.
-    reason : str
-        Why there is no bound.
-    """
+    """An output of a system on a back end beside a reference."""
 
     backend: str
     output: str
     unit: str
+    #: Largest difference of an element over the run, in the unit
     run: float
+    #: Largest difference of an element after one pass from equal memories; None for a back end that runs no C
     one_pass: float | None
+    #: Certified bound of that difference; None where there is none
     bound: float | None
+    #: Largest difference of one pass as a part of its bound
     share: float | None
+    #: Why there is no bound
     reason: str
 
     def as_dict(self) -> dict[str, Any]:
@@ -68,31 +58,7 @@ def compare_system(
 ) -> list[OutputComparison]:
     """Run a system on back ends over the same samples and compare its outputs with those of a reference.
 
-    Parameters
-    ----------
-    description : Description
-    names : iterable of str
-        Keys of `strapgen.run.backends.BACKENDS`.
-    reference : str
-        Such a key; "exact" shows all rounding.
-    inputs : mapping of str to array, (cycles, shape)
-        Samples in SI units.
-    settings : Settings, optional
-        Word, rounding and error feedback in fixed point where a stage states none. With a gyro that counts, all back
-        ends run on its counts.
-    files : mapping of str to RunsSamples, optional
-        What runs files, by their names.
-
-    Returns
-    -------
-    list of OutputComparison
-        By back end and output. Differences add up over a run, and no bound is known for them; every single pass keeps
-        the bound of `strapgen.navigation.systems.system_bounds`.
-
-    Raises
-    ------
-    InputError
-        If a name is not known, or a stage refuses a sample.
+    `inputs` (cycles, shape): samples in SI units.
     """
     if settings is not None and settings.sensor is not None:
         inputs = {**inputs, **_counts(description, inputs, settings.sensor)}

@@ -22,13 +22,7 @@ _SYSTEM_COLUMNS = (
 def system_comparison_report(rows: Sequence[OutputComparison], title: str, reference: str) -> Report:
     """Return the outputs of a described system on several back ends as a report.
 
-    Parameters
-    ----------
-    rows : sequence of OutputComparison
-    title : str
-        The system and its run in words.
-    reference : str
-        Back end that the differences are taken from.
+    `title`: the system and its run in words.
     """
 
     def table() -> TextTable:

@@ -9,22 +9,7 @@ from strapgen.navigation.systems.fitting import Fitted
 
 
 def measured_budget(fit: Fitted, cpu: str) -> Budget:
-    """Return what a system needs, with the instructions of every stage on a processor.
-
-    Parameters
-    ----------
-    fit : Fitted
-        Of a target in C.
-    cpu : str
-        A key of `strapgen.lab.cost.processors.PROCESSORS`.
-
-    Raises
-    ------
-    InputError
-        If the processor is not known, its compiler is not installed, or the target is not C.
-    CompilerError
-        If a stage cannot be measured; the message names it.
-    """
+    """Return what a system needs, with the instructions of every stage on a processor."""
     (name,) = costs.processors(None, [cpu])
     counts = {}
     for stage, sources in fit.sources.items():

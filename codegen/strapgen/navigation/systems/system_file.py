@@ -34,51 +34,31 @@ _STAGE_KEYS = (
 
 @dataclass(frozen=True)
 class InputText:
-    """An input as the file states it.
-
-    Parameters
-    ----------
-    name, unit, frame, meaning : str
-    range : Fraction
-        Largest magnitude of an element, in its unit.
-    """
+    """An input as the file states it."""
 
     name: str
     unit: str
     frame: str
+    #: Largest magnitude of an element, in its unit
     range: Fraction
     meaning: str
 
 
 @dataclass(frozen=True)
 class StageText:
-    """A stage as the file states it.
-
-    Parameters
-    ----------
-    name, kernel : str
-    every : int
-    options : mapping of str to object
-        What `catalogue.choose` takes beside the name.
-    word : int or None
-    carry : str
-    wires, writes : mapping of str to str
-        Sources of inputs, and destinations of outputs that replace the value of another stage.
-    delay : mapping of str to int
-        Cycles by which a wire lags, by the name of the input.
-    constants, initial : mapping of str to tuple of Fraction
-    ranges : mapping of str to Fraction
-    formats : mapping of str to str
-    """
+    """A stage as the file states it."""
 
     name: str
     kernel: str
     every: int
+    #: What `catalogue.choose` takes beside the name
     options: Mapping[str, Any]
     word: int | None
     carry: str
+    #: Sources of inputs, and destinations of outputs that replace the value of another stage
     wires: Mapping[str, str]
     writes: Mapping[str, str]
+    #: Cycles by which a wire lags, by the name of the input
     delay: Mapping[str, int]
     constants: Mapping[str, tuple[Fraction, ...]]
     initial: Mapping[str, tuple[Fraction, ...]]
@@ -88,41 +68,19 @@ class StageText:
 
 @dataclass(frozen=True)
 class SystemText:
-    """A described system as the file states it.
-
-    Parameters
-    ----------
-    name, title : str
-    sample_hz : Fraction
-    inputs : tuple of InputText
-    stages : tuple of StageText
-    outputs : tuple of str
-        Values that a run records; empty for all that no stage takes.
-    """
+    """A described system as the file states it."""
 
     name: str
     title: str
     sample_hz: Fraction
     inputs: tuple[InputText, ...]
     stages: tuple[StageText, ...]
+    #: Values that a run records; empty for all that no stage takes
     outputs: tuple[str, ...] = field(default=())
 
 
 def read(path: str | Path, sample_hz: Fraction | None = None) -> SystemText:
-    """Read the file of a system.
-
-    Parameters
-    ----------
-    path : path
-        A TOML file.
-    sample_hz : Fraction, optional
-        Cycles of the fastest rate in a second, in place of those in the file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or a key, a name or a number is not allowed; the message names it.
-    """
+    """Read the file of a system."""
     place = checks.path("path", path)
     tables = toml_files.content(path, "a system", _MOST_BYTES, _decimal)
     try:
@@ -140,17 +98,7 @@ def _decimal(text: str) -> Fraction | str:
 
 
 def parsed(tables: Mapping[str, Any], name: str = "system", sample_hz: Fraction | None = None) -> SystemText:
-    """Return the description that tables hold.
-
-    Parameters
-    ----------
-    tables : mapping
-        The content of the file.
-    name : str, optional
-        Name of the system if the file states none.
-    sample_hz : Fraction, optional
-        As for `read`.
-    """
+    """Return the description that tables hold."""
     _check_keys("the system", tables, _SYSTEM_KEYS, ("sample_hz", "inputs", "stage"))
     stages = tables["stage"]
     if not isinstance(stages, list) or not stages:

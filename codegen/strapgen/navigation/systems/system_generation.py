@@ -15,16 +15,7 @@ from strapgen.targets import TARGETS, system_targets
 
 
 def unit(fit: Fitted, command: str, budget: Sequence[str] = ()) -> Sources:
-    """Return the C of a system whose stages are generated, or its twin in Python.
-
-    Parameters
-    ----------
-    fit : Fitted
-    command : str
-        The command line that generates it.
-    budget : sequence of str, optional
-        Lines about operations and memory, for the head.
-    """
+    """Return the C of a system whose stages are generated, or its twin in Python."""
     system = fit.description.system
     head = system.title, command
     if TARGETS[fit.target].language == "Python":
@@ -35,22 +26,6 @@ def unit(fit: Fitted, command: str, budget: Sequence[str] = ()) -> Sources:
 def sources(
     description: Description, target: str = "c", settings: Settings | None = None, command: str = ""
 ) -> Sources:
-    """Return the C of a described system, or its twin in Python.
-
-    Parameters
-    ----------
-    description : Description
-    target : str, optional
-        A target of C, "numpy" or "fixed-model".
-    settings : Settings, optional
-        Settings of fixed point for what the stages do not state.
-    command : str, optional
-        The command line that generates it, for the head of the files.
-
-    Raises
-    ------
-    InputError
-        If the target is another, or a stage cannot be generated.
-    """
+    """Return the C of a described system, or its twin in Python."""
     checks.choice("target", target, system_targets())
     return unit(fitted(description, target, settings), command)

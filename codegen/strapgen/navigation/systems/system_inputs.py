@@ -30,20 +30,7 @@ def samples(description: Description, angle: Array, velocity: Array) -> dict[str
     into the next count. Where a stage compensates the errors of a measurement unit, the sensors have these errors: the
     kernel that is its inverse makes them. The navigation frame rests: an input of its rotation is zero.
 
-    Parameters
-    ----------
-    description : Description
-    angle, velocity : array, (cycles, 3)
-        Increments in rad and m/s, body axes.
-
-    Returns
-    -------
-    dict of str to array, (cycles, 3)
-
-    Raises
-    ------
-    InputError
-        If an input is none of these.
+    `angle, velocity` (cycles, 3): increments in rad and m/s, body axes. Returns (cycles, 3).
     """
     system = description.system
     sensed = _sensed(description, angle, velocity)
@@ -88,13 +75,7 @@ def _measured(description: Description, signal: Signal) -> tuple[str, float | No
 
 
 def cycles_of(system: DescribedSystem, seconds: Fraction) -> int:
-    """Return the cycles of the samples in a time.
-
-    Raises
-    ------
-    InputError
-        If the time holds no whole number of cycles of all rates, or too many.
-    """
+    """Return the cycles of the samples in a time."""
     cycles = seconds * system.sample_hz
     if cycles > checks.MOST:
         raise InputError(

@@ -13,19 +13,13 @@ from strapgen.run.evaluators import Array
 
 @dataclass
 class SystemMemory:
-    """What a system stores, in the numbers of its back end.
+    """What a system stores, in the numbers of its back end."""
 
-    Parameters
-    ----------
-    cells : dict of str to array, (runs, elements)
-    feedback : dict of str to array, (runs, number of words)
-        Error feedback of each stage.
-    cycle : int
-        Cycles since all rates last fell together.
-    """
-
+    #: (runs, elements)
     cells: dict[str, Array]
+    #: (runs, number of words): error feedback of each stage
     feedback: dict[str, Array]
+    #: Cycles since all rates last fell together
     cycle: int = 0
 
     def copy(self) -> SystemMemory:
@@ -35,25 +29,17 @@ class SystemMemory:
 
 @dataclass(frozen=True)
 class SystemRun:
-    """The result of a run.
+    """The result of a run."""
 
-    Parameters
-    ----------
-    values : mapping of str to array, (times, shape)
-        What was recorded, by the name of the cell, in SI units.
-    memory : SystemMemory
-        What is stored at the end, from which a next run goes on.
-    """
-
+    #: (times, shape): what was recorded, by the name of the cell, in SI units
     values: Mapping[str, Array]
+    #: What is stored at the end, from which a next run goes on
     memory: SystemMemory = field(repr=False)
 
 
 def rescaled(values: Array, there: Format, here: Format) -> Array:
     """Return integers of one format as those of another: to the nearest, halves up, and at most what the word holds.
 
-    Examples
-    --------
     >>> rescaled(np.array([[3, -3, 40000]]), Format(32, 20), Format(16, 19)).tolist()
     [[2, -1, 20000]]
     """

@@ -25,25 +25,7 @@ def whole(
     arguments: Mapping[str, Argument],
     budget: Sequence[str] = (),
 ) -> Sources:
-    """Generate the Python of a system.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-    title_and_command : tuple of str
-        A line for the head of the module, and the command line that generates it.
-    stages : mapping of str to Sources
-        The module of each stage, for numpy or as integer model.
-    arguments : mapping of str to Argument
-        Formats of cells and inputs; empty in floating point.
-    budget : sequence of str, optional
-        Lines about operations and memory for the head.
-
-    Returns
-    -------
-    Sources
-        The module of the whole, and one for each stage.
-    """
+    """Generate the Python of a system."""
     first = stages[system.stages[0].name]
     printer = _TwinPrinter(system, stages, arguments)
     files = {f"{system.name}.py": printer.module(*title_and_command, budget)}

@@ -38,14 +38,7 @@ _VALUES = (
 
 
 def system_report(fit: Fitted, needs: Budget, errors: SystemBounds) -> Report:
-    """Return a described system as a report.
-
-    Parameters
-    ----------
-    fit : Fitted
-    needs : Budget
-    errors : SystemBounds
-    """
+    """Return a described system as a report."""
     return Report(lambda: _text(fit, needs, errors), lambda: system_data(fit, needs, errors))
 
 

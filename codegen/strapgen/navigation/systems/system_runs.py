@@ -34,13 +34,7 @@ def rate_of(recording: Recording) -> Fraction:
 
 
 def attitude_output(system: DescribedSystem) -> Cell:
-    """Return the first output that is the attitude of the body.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the first output that is the attitude of the body."""
     for name in system.outputs:
         cell = system.cell(name)
         if cell.signal.constraint and cell.signal.frame.startswith("b to ") and cell.signal.size in (4, 9):
@@ -67,16 +61,7 @@ def _parameters(signal: Signal) -> str:
 def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Array]:
     """Return the memory at the start of a run, and the attitude in it as a matrix, (3, 3).
 
-    Parameters
-    ----------
-    runner : SystemRunner
-    start : array, (3, 3), or None
-        Attitude to begin with in place of that of the description.
-
-    Raises
-    ------
-    InputError
-        If that is no rotation.
+    `start` (3, 3): attitude to begin with in place of that of the description.
     """
     memory = runner.begin()
     cell = attitude_output(runner.system)
@@ -91,18 +76,7 @@ def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Arra
 def require_rotations(name: str, values: Array, time: Array) -> None:
     """Refuse attitudes that are no rotations, which have no drift.
 
-    Parameters
-    ----------
-    name : str
-        That of the attitude, for the message.
-    values : array, (N, 3, 3)
-    time : array, (N,)
-        In s.
-
-    Raises
-    ------
-    InputError
-        If the rows of one are far from orthogonal ones of length 1.
+    `values` has shape (N, 3, 3). `time` (N,): in s.
     """
     off = np.abs(values @ np.swapaxes(values, 1, 2) - np.eye(3)).max(axis=(1, 2))
     wrong = np.flatnonzero(~(off < _NO_ROTATION))
@@ -127,29 +101,9 @@ def simulate_system(
     The truth is the attitude of the motion, after `start` if that is stated, whatever the system begins with. The
     navigation frame rests, so that a system that follows the rotation of the earth departs by that rotation.
 
-    Parameters
-    ----------
-    runner : SystemRunner
-    motion : Motion
-        The motion, which supplies exact increments.
-    duration : Fraction
-        In s; a whole number of cycles of the slowest rate.
-    record : Fraction, optional
-        Time from one record to the next in s, a multiple of the cycle of the attitude; by default that cycle.
-    start : array, (3, 3), optional
-        Attitude at the start; by default that of the description.
-    force : tuple of float, optional
-        Specific force in m/s^2, constant in reference axes.
-
-    Returns
-    -------
-    Run
-
-    Raises
-    ------
-    InputError
-        If the system has no attitude among its outputs, an input is no sensor, a time is no such multiple, or a stage
-        refuses a sample.
+    `duration`: in s; a whole number of cycles of the slowest rate. `record`: time from one record to the next
+    in s, a multiple of the cycle of the attitude; by default that cycle. `start` (3, 3): attitude at the start;
+    by default that of the description. `force`: specific force in m/s^2, constant in reference axes.
     """
     system, cell = runner.system, attitude_output(runner.system)
     cycles, interval = cycles_of(system, duration), 1 / system.sample_hz
@@ -178,13 +132,7 @@ def simulate_system(
 
 
 def system_history(runner: SystemRunner, recording: Recording) -> History:
-    """Run a system along recorded increments of gyros, without specific force unless the recording has it.
-
-    Returns
-    -------
-    History
-        The attitude after each of its cycles.
-    """
+    """Run a system along recorded increments of gyros, without specific force unless the recording has it."""
     course = system_course(runner, recording)
     cell = attitude_output(runner.system)
     step = runner.system.every(cell.name) * recording.interval
@@ -197,23 +145,15 @@ def system_history(runner: SystemRunner, recording: Recording) -> History:
 
 @dataclass(frozen=True)
 class SystemCourse:
-    """The outputs of a system along a recording.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-    start, interval : float
-        Time at which the first sample begins, and from sample to sample, in s.
-    values : mapping of str to array, (times, shape)
-        Each output after each of its cycles.
-    unused : int
-        Samples at the end that fill no cycle of the slowest rate.
-    """
+    """The outputs of a system along a recording."""
 
     system: DescribedSystem
+    #: Time at which the first sample begins, and from sample to sample, in s
     start: float
     interval: float
+    #: (times, shape): each output after each of its cycles
     values: dict[str, Array]
+    #: Samples at the end that fill no cycle of the slowest rate
     unused: int
 
     def rows(self) -> tuple[Array, dict[str, Array]]:
@@ -230,23 +170,7 @@ class SystemCourse:
 def system_course(
     runner: SystemRunner, recording: Recording, memory: SystemMemory | None = None
 ) -> SystemCourse:
-    """Run a system along a recording, one increment of the sensors for each cycle of the samples.
-
-    Parameters
-    ----------
-    runner : SystemRunner
-        At the rate of the recording, see `rate_of`.
-    recording : Recording
-        If it has no velocity increments, they are zero.
-    memory : SystemMemory, optional
-        By default that of the description.
-
-    Raises
-    ------
-    InputError
-        If the recording is shorter than a cycle of the slowest rate, an input is no sensor, or a stage refuses a
-        sample.
-    """
+    """Run a system along a recording, one increment of the sensors for each cycle of the samples."""
     cycles, unused = divmod(len(recording.increments), runner.system.cycle)
     if not cycles:
         raise InputError(

@@ -30,17 +30,11 @@ _RADIUS = 6378137.0
 
 @dataclass(frozen=True)
 class NavigationErrors:
-    """How far one back end has gone from another.
-
-    Parameters
-    ----------
-    backend : str
-    attitude, velocity, position : array, (N,)
-        Angle between the attitudes in rad, length of the difference of velocities in m/s, distance of the positions in
-        m, after each of their cycles; empty where the system has no such output.
-    """
+    """How far one back end has gone from another."""
 
     backend: str
+    #: (N,): angle between the attitudes in rad, length of the difference of velocities in m/s, distance of the
+    #: positions in m, after each of their cycles; empty where the system has no such output
     attitude: Array
     velocity: Array
     position: Array
@@ -48,24 +42,15 @@ class NavigationErrors:
 
 @dataclass(frozen=True)
 class SystemStudy:
-    """The result of a study.
-
-    Parameters
-    ----------
-    description : Description
-    seconds : float
-    against_truth : array, (N,)
-        Angle between the attitude of the reference and the true one in rad; empty without an attitude.
-    errors : tuple of NavigationErrors
-        Of every other back end against the reference.
-    needs : mapping of str to Budget
-        Memory and operations of the code of each back end in C.
-    """
+    """The result of a study."""
 
     description: Description
     seconds: float
+    #: (N,): angle between the attitude of the reference and the true one in rad; empty without an attitude
     against_truth: Array
+    #: Of every other back end against the reference
     errors: tuple[NavigationErrors, ...]
+    #: Memory and operations of the code of each back end in C
     needs: Mapping[str, Budget]
 
 
@@ -79,25 +64,7 @@ def study(
 ) -> SystemStudy:
     """Run a system on back ends.
 
-    Parameters
-    ----------
-    description : Description
-        Its inputs are increments or counts of gyros and accelerometers in body axes.
-    vehicle : TurningVehicle
-    seconds : Fraction
-    names : iterable of str
-        Back ends; the reference, C in double, is always run.
-    settings : Settings, optional
-        Settings of fixed point.
-    cpu : str, optional
-        Processor on which the instructions of the C in fixed point are counted; by default they are not.
-
-    Raises
-    ------
-    InputError
-        If the system has other inputs, or a back end refuses a sample.
-    CompilerError
-        If the code cannot be measured on the processor.
+    `description`: its inputs are increments or counts of gyros and accelerometers in body axes.
     """
     inputs = samples(description, vehicle, seconds)
     outputs = Outputs.of(description)
@@ -130,11 +97,6 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
     An input in rad or m/s takes increments. One of counts takes those of the unit that the stage has to which it is
     wired, angle-counts or velocity-counts. Where a stage compensates the errors of a measurement unit, the sensors have
     these errors: the kernel that is its inverse makes them.
-
-    Raises
-    ------
-    InputError
-        If an input is neither, or the time holds no whole cycle of all rates.
     """
     system = description.system
     cycles = system_inputs.cycles_of(system, seconds)

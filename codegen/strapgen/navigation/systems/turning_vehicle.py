@@ -43,19 +43,8 @@ class _Waves:
 class TurningVehicle:
     """A vehicle whose heading swings with turns of a stated rate, in roll and pitch, and which vibrates.
 
-    Parameters
-    ----------
-    latitude : float
-        In rad.
-    turn_rate : float
-        Largest rate of heading in rad/s.
-    spectrum : Spectrum, optional
-        Vibration: angles about x and y, and accelerations along them. By default there is none.
-    seed : int, optional
-        Of the phases of the vibration.
+    `latitude`: in rad. `turn_rate`: largest rate of heading in rad/s.
 
-    Examples
-    --------
     >>> vehicle = TurningVehicle(0.8, 1.2)
     >>> vehicle.attitude(np.zeros(1)).round(6)[0, 2]
     array([ 0.,  0., -1.])

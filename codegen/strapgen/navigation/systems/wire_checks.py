@@ -15,22 +15,14 @@ from strapgen.navigation.systems.ports import Ports
 
 @dataclass(frozen=True)
 class Source:
-    """What a wire comes from: an input of the system, or a value of a stage.
+    """What a wire comes from: an input of the system, or a value of a stage."""
 
-    Parameters
-    ----------
-    name : str
-        As the file writes it.
-    signal : Signal
-    stage : Ports or None
-        The stage; None for an input.
-    sum : bool
-        Whether it is a sum that is cleared when a slower stage has taken it.
-    """
-
+    #: As the file writes it
     name: str
     signal: Signal
+    #: The stage; None for an input
     stage: Ports | None = None
+    #: Whether it is a sum that is cleared when a slower stage has taken it
     sum: bool = False
 
     @property
@@ -43,11 +35,6 @@ def check_order(stages: Sequence[Ports]) -> None:
     """Check that stages stand from the fastest to the slowest, and that each rate divides the next.
 
     The fastest runs in every cycle, unless it is an attitude step that collects the samples of several.
-
-    Raises
-    ------
-    InputError
-        If they do not.
     """
     for before, stage in itertools.pairwise(stages):
         if stage.text.every < before.text.every:
@@ -115,19 +102,7 @@ def check_initial(stage: Ports, name: str, signal: Signal, initial: Sequence[Fra
 
 
 def check_rates(where: str, stage: Ports, signal: Signal, source: Source, samples: int) -> None:
-    """Check that what changes over a cycle passes between stages of one rate.
-
-    Parameters
-    ----------
-    where : str
-        The wire, for an error message.
-    stage : Ports
-    signal : Signal
-        The input.
-    source : Source
-    samples : int
-        Samples of the source that the input collects; 0 for one.
-    """
+    """Check that what changes over a cycle passes between stages of one rate."""
     here, there = stage.text.every, source.every
     step = stage.program.companions
     if samples and step is not None:

@@ -23,24 +23,15 @@ from strapgen.navigation.systems.wire_checks import Source
 
 @dataclass(frozen=True)
 class Description:
-    """A described system: its structure, and what is stated for each stage.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-    choices : mapping of str to Choice
-        The kernel of each stage, with its constants, by the name of the stage.
-    programs : mapping of str to Program
-    ranges : mapping of str to mapping of str to Fraction
-        Stated ranges of inputs, by stage and input.
-    formats : mapping of str to mapping of str to str
-        Stated formats, by stage and argument.
-    """
+    """A described system: its structure, and what is stated for each stage."""
 
     system: DescribedSystem
+    #: The kernel of each stage, with its constants, by the name of the stage
     choices: Mapping[str, Choice]
     programs: Mapping[str, Program]
+    #: Stated ranges of inputs, by stage and input
     ranges: Mapping[str, Mapping[str, Fraction]]
+    #: Stated formats, by stage and argument
     formats: Mapping[str, Mapping[str, str]]
 
     __repr__ = short_repr

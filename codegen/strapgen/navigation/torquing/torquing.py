@@ -28,40 +28,25 @@ class TorqueLoop:
     """Constants of the control law, and of the gyro.
 
     The numbers are those of a fit to the printed responses; gain, quantum, lag and delay are not printed.
-
-    Parameters
-    ----------
-    gain, lag_gain, lag_pole, integral_gain, leak : float
-        K_s, C1, C2, C3 and K_L, see the kernel.
-    quantum_arcsec : float
-        Q_AD, a quantum of the float angle.
-    lag_s : float
-        tau0, time constant of the float.
-    cycle_hz : float
-        Cycles in a second.
-    largest_deg_s : float
-        Largest rate, that of the largest command in every cycle.
-    largest_pulses : int
-        The largest command.
-    delay_cycles : int
-        Cycles from a command to its pulses.
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed.
     """
 
+    #: K_s, C1, C2, C3 and K_L, see the kernel
     gain: float = 9 / 32
     lag_gain: float = 3 / 64
     lag_pole: float = 1 / 2
     integral_gain: float = 1 / 32
     leak: float = 1 / 128
+    #: Q_AD, a quantum of the float angle
     quantum_arcsec: float = 8.0
+    #: tau0, time constant of the float
     lag_s: float = 1 / 3200
+    #: Cycles in a second
     cycle_hz: float = 3200.0
+    #: Largest rate, that of the largest command in every cycle
     largest_deg_s: float = 150.0
+    #: The largest command
     largest_pulses: int = 60
+    #: Cycles from a command to its pulses
     delay_cycles: int = 1
 
     def __post_init__(self) -> None:
@@ -144,13 +129,7 @@ class TorqueLoop:
         return poles[np.argsort(-np.abs(poles))]
 
     def require_stable(self) -> None:
-        """Refuse a loop whose oscillations grow.
-
-        Raises
-        ------
-        InputError
-            If a pole of the linear loop is not inside the unit circle.
-        """
+        """Refuse a loop whose oscillations grow."""
         largest = float(abs(self.poles[0]))
         if largest >= 1:
             raise InputError(
@@ -174,22 +153,8 @@ class TorqueLoop:
     ) -> tuple[Array, Array]:
         """Run the loop.
 
-        Parameters
-        ----------
-        rate_deg_s : callable
-            The rate of the gyro's case in deg/s, from times in s.
-        cycles : int
-        angle_arcsec : float, optional
-            Angle of the float at the start.
-        quantised : bool, optional
-            Whether the angle is read in whole quanta and the command given in whole pulses, up to the largest.
-
-        Returns
-        -------
-        angle : array, (cycles,)
-            Of the float in arcsec at the beginning of each cycle.
-        command : array, (cycles,)
-            In pulses.
+        `rate_deg_s`: the rate of the gyro's case in deg/s, from times in s. Returns (cycles,): of the float in
+        arcsec at the beginning of each cycle. Returns (cycles,): in pulses.
         """
         times = np.arange(cycles) * self.cycle
         rates = rate_deg_s(times) * _ARCSEC + 0 * times

@@ -41,13 +41,6 @@ def pulse_torque() -> Kernel:
     """Return a cycle of the control law: a proportional part less a lag, and a leaking integral.
 
     e = a - f, f' = C1 e + C2 f, i' = (i + C3 a)(1 - K_L), command = K_s (e + i').
-
-    Returns
-    -------
-    Kernel
-        Inputs ``filtered`` and ``integrated``, states, and ``angle``, in quanta, and the constants ``gain``,
-        ``lag_gain``, ``lag_pole``, ``integral_gain`` and ``leak``; outputs ``next_filtered``, ``next_integrated`` and
-        ``command`` in pulses.
     """
     build = KernelBuilder()
     filtered, integrated, angle = map(build.scalar, (FILTERED, INTEGRATED, ANGLE))

@@ -43,17 +43,11 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class TorquingRow:
-    """A quantity of the loop.
+    """A quantity of the loop."""
 
-    Parameters
-    ----------
-    quantity : str
-        A key of `PRINTED`.
-    printed, linear, quantised : float or None
-        What the source prints, the loop without quanta and limit, and with them; None where there is none.
-    """
-
+    #: A key of `PRINTED`
     quantity: str
+    #: What the source prints, the loop without quanta and limit, and with them; None where there is none
     printed: float | None
     linear: float
     quantised: float | None
@@ -84,16 +78,7 @@ def bandwidth(loop: TorqueLoop) -> float:
 
 
 def torquing_rows(loop: TorqueLoop) -> Iterator[TorquingRow]:
-    """Run a loop, and yield every quantity.
-
-    Parameters
-    ----------
-    loop : TorqueLoop
-
-    Yields
-    ------
-    TorquingRow
-    """
+    """Run a loop, and yield every quantity."""
     cycles = round(_STEP_S * loop.cycle_hz)
     steps = [loop.run(np.zeros_like, cycles, STEP, quantised)[0] for quantised in (False, True)]
     rises = [rise(angle, loop) * 1e3 for angle in steps]

@@ -14,27 +14,14 @@ from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 
 
 class LoopFiles:
-    """Three loops at the rates of a described system.
-
-    Parameters
-    ----------
-    loops : TwoSpeed
-    system : DescribedSystem
-        The built-in system of the same loops, which says how many cycles of one make a cycle of the next.
-    """
+    """Three loops at the rates of a described system."""
 
     def __init__(self, loops: TwoSpeed, system: DescribedSystem) -> None:
         self.loops = loops
         self.system = system
 
     def run(self, inputs: Mapping[str, Any]) -> SystemRun:
-        """Run whole navigation cycles, and return the outputs of the system.
-
-        Raises
-        ------
-        InputError
-            If the samples are no whole navigation cycles, or a loop refuses one.
-        """
+        """Run whole navigation cycles, and return the outputs of the system."""
         fast, slow, navigation = self.system.stages
         wired = {w.input: w.source for stage in self.system.stages for w in stage.wires if w.external}
         angles, velocities, turns = (

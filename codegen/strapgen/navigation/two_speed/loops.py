@@ -93,17 +93,8 @@ class Loops:
     def run(self, cycles: Cycles) -> tuple[Array, Array]:
         """Run whole navigation cycles.
 
-        Returns
-        -------
-        attitudes : array, (slow cycles, elements)
-            Attitude after every slow cycle.
-        changes : array, (navigation cycles, 3)
-            Change of velocity over every navigation cycle.
-
-        Raises
-        ------
-        InputError
-            If a loop refuses its input; the message names the loop.
+        Returns (slow cycles, elements): attitude after every slow cycle. Returns (navigation cycles, 3): change of
+        velocity over every navigation cycle.
         """
         if not len(cycles.samples["turn"]):
             return np.empty((0, cycles.start["state"].shape[1])), np.empty((0, 3))

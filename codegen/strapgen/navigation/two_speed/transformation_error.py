@@ -20,17 +20,6 @@ _TERMS = 12
 def along_series(terms: int) -> dict[int, Fraction]:
     """Return the series of the error along the acceleration, by powers of phi.
 
-    Parameters
-    ----------
-    terms : int
-
-    Returns
-    -------
-    dict of int to Fraction
-        Coefficient of each power.
-
-    Examples
-    --------
     >>> along_series(2)
     {2: Fraction(1, 6), 4: Fraction(-1, 120)}
     """
@@ -40,8 +29,6 @@ def along_series(terms: int) -> dict[int, Fraction]:
 def across_series(terms: int) -> dict[int, Fraction]:
     """Return the series of the error across acceleration and rate, as `along_series`.
 
-    Examples
-    --------
     >>> across_series(2)
     {3: Fraction(1, 24), 5: Fraction(-1, 720)}
     """
@@ -51,13 +38,8 @@ def across_series(terms: int) -> dict[int, Fraction]:
 def errors(phi: float) -> tuple[float, float]:
     """Return the errors along and across the acceleration, as parts of the velocity increment.
 
-    Parameters
-    ----------
-    phi : float
-        Angle of the cycle in rad.
+    `phi`: angle of the cycle in rad.
 
-    Examples
-    --------
     >>> print("{:.9e} {:.6e}".format(*errors(0.1)))
     1.665833532e-03 4.165278e-05
     """
@@ -73,25 +55,8 @@ def errors(phi: float) -> tuple[float, float]:
 def slowest_rate(largest_rate: float, error: float) -> float:
     """Return the slow rate at which the error is as stated at the largest rate.
 
-    Parameters
-    ----------
-    largest_rate : float
-        In rad/s.
-    error : float
-        Length of the error, as part of the velocity increment.
+    `largest_rate`: in rad/s. Returned in Hz.
 
-    Returns
-    -------
-    float
-        In Hz.
-
-    Raises
-    ------
-    InputError
-        If the error is not between 0 and 1, or the rate not above 0.
-
-    Examples
-    --------
     >>> round(slowest_rate(1.0, 1e-4), 4)
     40.8246
     """

@@ -25,26 +25,17 @@ _NORMALIZATION = {9: "dcm-orthonormalize-first-order", 4: "euler-normalize-first
 
 @dataclass(frozen=True)
 class Wiring:
-    """The sources and destinations of the loops' arguments.
+    """The sources and destinations of the loops' arguments."""
 
-    Parameters
-    ----------
-    memory : tuple of Signal
-        Values that pass from call to call of a loop, or from loop to loop.
-    samples : tuple of tuple of Signal
-        The other inputs of each loop.
-    results : tuple of tuple of Signal
-        The other outputs of each loop.
-    updates : tuple of mapping of str to str
-        The value of the memory that an output replaces, by the name of the output, for each loop.
-    cleared : tuple of tuple of str
-        Values of the memory that are zero again after a cycle of each loop.
-    """
-
+    #: Values that pass from call to call of a loop, or from loop to loop
     memory: tuple[Signal, ...]
+    #: The other inputs of each loop
     samples: tuple[tuple[Signal, ...], ...]
+    #: The other outputs of each loop
     results: tuple[tuple[Signal, ...], ...]
+    #: The value of the memory that an output replaces, by the name of the output, for each loop
     updates: tuple[Mapping[str, str], ...]
+    #: Values of the memory that are zero again after a cycle of each loop
     cleared: tuple[tuple[str, ...], ...]
 
     def memory_named(self, name: str) -> Signal:
@@ -53,15 +44,7 @@ class Wiring:
 
 
 def wiring(system: DescribedSystem, loops: Sequence[Sources]) -> Wiring:
-    """Return how the arguments of loops are connected.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-        One stage for each loop, at a rate of its own. What a stage takes from another has one name in both.
-    loops : sequence of Sources
-        The fast, slow and navigation loop.
-    """
+    """Return how the arguments of loops are connected."""
     memory: dict[str, Signal] = {}
     samples = []
     for stage, loop in zip(system.stages, loops, strict=True):
@@ -88,26 +71,7 @@ def wiring(system: DescribedSystem, loops: Sequence[Sources]) -> Wiring:
 
 
 def whole(name: str, title: str, command: str, system: DescribedSystem, loops: Sequence[Sources]) -> Sources:
-    """Generate the C of all loops: one function for a cycle of each, and one that runs whole navigation cycles.
-
-    Parameters
-    ----------
-    name : str
-        Name of the algorithm on the command line.
-    title : str
-        A line for the head of the files.
-    command : str
-        The command line that generates the files.
-    system : DescribedSystem
-        How the loops are wired.
-    loops : sequence of Sources
-        The C of the fast, slow and navigation loop; in fixed point in formats that fit together.
-
-    Returns
-    -------
-    Sources
-        The files of the whole, and those of the loops.
-    """
+    """Generate the C of all loops: one function for a cycle of each, and one that runs whole navigation cycles."""
     fast, slow, _ = loops
     numbers, wires = _numbers(fast), wiring(system, loops)
     state = wires.memory_named(slow.function.inputs[0].name)

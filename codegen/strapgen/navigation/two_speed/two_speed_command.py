@@ -113,13 +113,7 @@ class TwoSpeedRequest(NamedTuple):
 
 
 def request(algorithm: str, sculling: str, target: str, fixed: FixedOptions) -> TwoSpeedRequest:
-    """Return what the options ask for.
-
-    Raises
-    ------
-    InputError
-        If options do not go together.
-    """
+    """Return what the options ask for."""
     return TwoSpeedRequest(algorithm, whole("sculling", sculling) or 0, target, _settings(target, fixed))
 
 

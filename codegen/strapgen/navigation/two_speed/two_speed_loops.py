@@ -44,19 +44,7 @@ _TURNED_FRAME = {"dcm": "(5), (6)", "euler": "(15)"}
 
 
 def fast(form: int) -> Kernel:
-    """Return the fast loop: coning and sculling from angle and velocity increments, equations (26) and (55) or (56).
-
-    Parameters
-    ----------
-    form : int
-        Form of the sculling integral: 1 or 2.
-
-    Returns
-    -------
-    Kernel
-        The states ``angle_sum``, ``coning``, ``previous_increment``, ``velocity_sum``, ``sculling`` and the inputs
-        ``increment``, ``velocity_increment``; angles in rad, velocities in m/s, all (3,).
-    """
+    """Return the fast loop: coning and sculling from angle and velocity increments, equations (26) and (55) or (56)."""
     loop = FastLoop()
     beta, coning, past, u, eta, d, dv = map(
         loop.build.input,
@@ -74,22 +62,7 @@ def fast(form: int) -> Kernel:
 
 
 def slow(name: str, form: int) -> Kernel:
-    """Return the slow loop, which updates attitude, velocity in navigation axes and rotation of the frame.
-
-    Parameters
-    ----------
-    name : str
-        "dcm" or "euler".
-    form : int
-        Form of the sculling integral of the fast loop: 1 or 2.
-
-    Returns
-    -------
-    Kernel
-        The states ``state``, ``navigation_velocity``, ``navigation_rotation``, ``previous_turn``; the inputs
-        ``angle_sum``, ``coning``, ``velocity_sum``, ``sculling``, which are sums of the fast loop, and ``turn``, the
-        rate of the navigation frame times the slow cycle in rad.
-    """
+    """Return the slow loop, which updates attitude, velocity in navigation axes and rotation of the frame."""
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state, v, theta, before = map(
@@ -122,19 +95,7 @@ def slow(name: str, form: int) -> Kernel:
 
 
 def navigation(name: str) -> Kernel:
-    """Return the loop of the navigation frame, which corrects attitude and velocity for its rotation.
-
-    Parameters
-    ----------
-    name : str
-        "dcm" or "euler".
-
-    Returns
-    -------
-    Kernel
-        Inputs ``state``, which is a state, ``navigation_rotation`` and ``navigation_velocity``; outputs ``next`` and
-        ``velocity_change`` (3,) in m/s, the integral of the specific force in the rotating navigation axes.
-    """
+    """Return the loop of the navigation frame, which corrects attitude and velocity for its rotation."""
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state, theta, v = map(build.input, (kinematics.state, NAVIGATION_ROTATION, NAVIGATION_VELOCITY))

@@ -22,18 +22,13 @@ from strapgen.run.registry import BACKENDS, evaluator_class
 
 
 class TwoSpeedRun(NamedTuple):
-    """The result of a run.
+    """The result of a run."""
 
-    Parameters
-    ----------
-    attitudes : array, (slow cycles, state shape)
-        Attitude after every slow cycle, and after the navigation cycle that ends with it.
-    velocity_changes : array, (navigation cycles, 3)
-        Integral of the specific force over every navigation cycle in m/s, in the rotating navigation axes. Gravity and
-        Coriolis terms are for the navigation to add.
-    """
-
+    #: (slow cycles, state shape): attitude after every slow cycle, and after the navigation cycle that ends
+    #: with it
     attitudes: Array
+    #: (navigation cycles, 3): integral of the specific force over every navigation cycle in m/s, in the
+    #: rotating navigation axes. Gravity and Coriolis terms are for the navigation to add
     velocity_changes: Array
 
 

@@ -90,18 +90,11 @@ wires = {{ rotation_vector = "vector.rotation_vector" }}
 
 @dataclass(frozen=True, eq=False)
 class TwoSpeedLoops:
-    """An attitude in two speeds, for a brief: see `algorithm.Algorithm`.
+    """An attitude in two speeds, for a brief: see `algorithm.Algorithm`."""
 
-    Parameters
-    ----------
-    state : str
-        "euler" or "dcm".
-    increments : int
-        Fast cycles in a slow one.
-    brief : DesignBrief
-    """
-
+    #: "euler" or "dcm"
     state: str
+    #: Fast cycles in a slow one
     increments: int
     brief: DesignBrief
     #: Samples from before a slow cycle, and from after it.
@@ -305,18 +298,9 @@ class TwoSpeedLoops:
     def propagate(self, increments: Any, record_every: int = 1, initial: Any = None) -> Any:
         """Run several runs side by side in double.
 
-        Parameters
-        ----------
-        increments : array, (runs, cycles, 1 + N, 3)
-            Increments of every slow cycle in rad, after that before it.
-        record_every : int, optional
-            Slow cycles from record to record.
-        initial : array, (runs, state shape), optional
-            Attitude at the start; by default no rotation.
-
-        Returns
-        -------
-        array, (runs, 1 + records, state shape)
+        `increments` (runs, cycles, 1 + N, 3): increments of every slow cycle in rad, after that before it.
+        `initial` (runs, state shape): attitude at the start; by default no rotation. Returns (runs, 1 + records,
+        state shape).
         """
         fast, vector, update = (evaluator(name) for name in (_FAST, _VECTOR, f"{self.state}-update"))
         shape = increments.shape[0], *((3, 3) if self.state == "dcm" else (4,))

@@ -41,20 +41,6 @@ _LEAST = Fraction(1, 2**16)
 def kernels(algorithm: str, sculling: int = 2) -> tuple[str, str, str]:
     """Return the names of the fast, slow and navigation loop.
 
-    Parameters
-    ----------
-    algorithm : str
-        A key of `ALGORITHMS`.
-    sculling : int, optional
-        A key of `SCULLING`.
-
-    Raises
-    ------
-    InputError
-        If one is unknown.
-
-    Examples
-    --------
     >>> kernels("dcm")
     ('two-speed-fast-2', 'dcm-two-speed-slow-2', 'dcm-two-speed-navigation')
     """
@@ -65,8 +51,6 @@ def kernels(algorithm: str, sculling: int = 2) -> tuple[str, str, str]:
 def description(algorithm: str, sculling: int = 2) -> Description:
     """Return the built-in system with the loops of an algorithm; parameters and errors are those of `kernels`.
 
-    Examples
-    --------
     >>> [rate.every for rate in description("dcm").system.rates]
     [1, 64, 320]
     """
@@ -90,20 +74,9 @@ def ranges(
 ) -> dict[str, Fraction]:
     """Return ranges of the loops' inputs that hold the sums of increments up to a stated size, for fixed point.
 
-    Parameters
-    ----------
-    angle, velocity : float
-        Largest magnitude of an element of the angle increments in rad, and of the velocity increments in m/s.
-    fast_cycles, slow_cycles : int, optional
-        As for `TwoSpeed.run`.
+    `angle, velocity`: largest magnitude of an element of the angle increments in rad, and of the velocity
+    increments in m/s.
 
-    Returns
-    -------
-    dict of str to Fraction
-        The `ranges` of `Settings`, by the names of inputs.
-
-    Examples
-    --------
     >>> {name: round(float(value), 4) for name, value in ranges(0.01, 0.1, 4).items() if "velocity" not in name}
     {'increment': 0.0103, 'previous_increment': 0.0103, 'angle_sum': 0.0413, 'coning': 0.0009, 'sculling': 0.017}
     """
@@ -129,24 +102,6 @@ def loops(
     """Return the generated loops; in fixed point the formats of what passes between them match.
 
     The increments have the format of their sums, so that no sum is rounded.
-
-    Parameters
-    ----------
-    algorithm, sculling
-        As for `kernels`.
-    target : str, optional
-        A key of `strapgen.targets.TARGETS`.
-    settings : Settings, optional
-        Word, rounding, and ranges and formats by the names of the loops' inputs, for fixed point.
-
-    Returns
-    -------
-    tuple of Sources
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, or a range or a format does not go with the loops.
     """
     names = kernels(algorithm, sculling)
     targets.require(target, settings)
@@ -220,22 +175,6 @@ def sources(
 ) -> Sources:
     """Return the C of all loops, with one function for each and one that runs them all.
 
-    Parameters
-    ----------
-    algorithm, sculling, target, settings
-        As for `loops`; the target is one of C.
-
-    Returns
-    -------
-    Sources
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, or the target is not C.
-
-    Examples
-    --------
     >>> list(sources("dcm").files)[:2]
     ['dcm_two_speed_2.h', 'dcm_two_speed_2.c']
     """
@@ -261,13 +200,7 @@ def command(algorithm: str, sculling: int, target: str, settings: Settings | Non
 
 
 def _in_ranges(settings: Settings, fast: Program) -> Settings:
-    """Return settings with the largest angle, if one is stated, as the range of the fast loop's increments.
-
-    Raises
-    ------
-    InputError
-        If that range is stated too, or a state that saturates: the loops share one that has room above 1.
-    """
+    """Return settings with the largest angle, if one is stated, as the range of the fast loop's increments."""
     if settings.state:
         raise InputError("an algorithm in two speeds takes no state that saturates")
     ranges = dict(settings.ranges)

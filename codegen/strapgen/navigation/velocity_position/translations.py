@@ -24,20 +24,14 @@ GRAVITY = (0.0, 0.0, -STANDARD_GRAVITY)
 
 @dataclass(frozen=True)
 class Translation:
-    """Velocity and position of a run, from rest at the place of the start.
+    """Velocity and position of a run, from rest at the place of the start."""
 
-    Parameters
-    ----------
-    time : array, (N,)
-        Times in s, the first one 0.
-    velocity, position : array, (N, 3)
-        Computed, in m/s and m, reference axes.
-    true_velocity, true_position : array, (N, 3)
-    """
-
+    #: (N,): times in s, the first one 0
     time: Array
+    #: (N, 3): computed, in m/s and m, reference axes
     velocity: Array
     position: Array
+    #: (N, 3)
     true_velocity: Array
     true_position: Array
 
@@ -65,33 +59,9 @@ def translate(
 ) -> Translation:
     """Run a step of attitude, velocity and position.
 
-    Parameters
-    ----------
-    attitude : Backend
-        The attitude step, of Euler parameters or direction cosines.
-    change : Evaluator
-        The kernel "velocity-position" by the same method on the same samples.
-    motion : Motion
-    force : SpecificForce
-    step, duration : number
-        Step length in s, and duration in s, a multiple of it.
-    gravity : tuple of float, optional
-        In m/s^2, reference axes.
-    truth : tuple of array, optional
-        The true velocity and position without gravity at every sample, `SpecificForce.translation`; computed if not
-        passed in.
+    `step, duration`: step length in s, and duration in s, a multiple of it. `gravity`: in m/s^2, reference
+    axes.
 
-    Returns
-    -------
-    Translation
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed, or a result is not finite.
-
-    Examples
-    --------
     >>> from strapgen import backend
     >>> from strapgen.run.backends import evaluator
     >>> from strapgen.catalogue import choose

@@ -24,12 +24,7 @@ _COLUMNS = (
 def translation_report(standings: Sequence[TranslationStanding], flight: Flight, described: str) -> Report:
     """Return the standings of a study as a report.
 
-    Parameters
-    ----------
-    standings : sequence of TranslationStanding
-    flight : Flight
-    described : str
-        The motion and the force in words.
+    `described`: the motion and the force in words.
     """
 
     def table() -> TextTable:
@@ -73,20 +68,7 @@ def translation_report(standings: Sequence[TranslationStanding], flight: Flight,
 def translation_image(standings: Sequence[TranslationStanding], described: str, path: str | Path) -> bytes:
     """Return the errors of velocity and position over the multiplications for each sample.
 
-    Parameters
-    ----------
-    standings : sequence of TranslationStanding
-    described : str
-        The motion and the force in words, for the title.
-    path : path
-        File for the image; its ending says which kind.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
+    `described`: the motion and the force in words, for the title.
     """
     figure, grid = figures.grid_of_axes(1, 2, (11, 4.6))
     panels = (("error of the velocity, m/s", "velocity"), ("error of the position, m", "position"))

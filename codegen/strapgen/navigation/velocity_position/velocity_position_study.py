@@ -43,45 +43,30 @@ _ROOM = Fraction(9, 8)
 
 @dataclass(frozen=True)
 class TranslationStanding:
-    """What an algorithm costs, and how far its velocity and position are from the true ones.
-
-    Parameters
-    ----------
-    name : str
-    multiply, add : float
-        Multiplications, and additions and subtractions, for each sample: attitude, velocity and position in body axes.
-    velocity, position : float
-        Largest length of the error in m/s and m.
-    """
+    """What an algorithm costs, and how far its velocity and position are from the true ones."""
 
     name: str
+    #: Multiplications, and additions and subtractions, for each sample: attitude, velocity and position in body
+    #: axes
     multiply: float
     add: float
+    #: Largest length of the error in m/s and m
     velocity: float
     position: float
 
 
 @dataclass(frozen=True)
 class Flight:
-    """The motion, the force and the sampling that all algorithms share.
-
-    Parameters
-    ----------
-    motion : Motion
-    force : SpecificForce
-    sample_hz, duration : Fraction
-        Sampling rate in Hz, and duration in s.
-    backend : str
-        A key of `BACKENDS`.
-    carry : str
-        Error feedback of the attitude in fixed point.
-    """
+    """The motion, the force and the sampling that all algorithms share."""
 
     motion: Motion
     force: SpecificForce
+    #: Sampling rate in Hz, and duration in s
     sample_hz: Fraction
     duration: Fraction
+    #: A key of `BACKENDS`
     backend: str = "numpy"
+    #: Error feedback of the attitude in fixed point
     carry: str = "none"
 
     @property
@@ -93,18 +78,6 @@ class Flight:
 def candidates(names: Iterable[str]) -> list[Candidate]:
     """Return the algorithms of a study, checked.
 
-    Parameters
-    ----------
-    names : iterable of str
-        As for `frontier.candidates`, or "two-speed:N" with N samples in a slow cycle.
-
-    Raises
-    ------
-    InputError
-        If a name is not known, or its samples are not allowed.
-
-    Examples
-    --------
     >>> [one.name for one in candidates(["two-speed:4", "window-3-3"])]
     ['two-speed:4', 'window-3-3:1+3+3']
     """
@@ -122,22 +95,7 @@ def candidates(names: Iterable[str]) -> list[Candidate]:
 
 
 def study(several: Sequence[Candidate], flight: Flight) -> Iterator[TranslationStanding]:
-    """Run algorithms along a flight, and yield what each costs and leads to.
-
-    Parameters
-    ----------
-    several : sequence of Candidate
-    flight : Flight
-
-    Yields
-    ------
-    TranslationStanding
-
-    Raises
-    ------
-    InputError
-        If the duration is no multiple of the sampling interval, or a result is not finite.
-    """
+    """Run algorithms along a flight, and yield what each costs and leads to."""
     truth = flight.force.translation(flight.motion, 1 / flight.sample_hz, flight.count)
     for one in several:
         run = _recursion(one, flight, truth) if one.method == TWO_SPEED else _steps(one, flight, truth)

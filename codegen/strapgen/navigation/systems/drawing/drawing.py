@@ -16,17 +16,7 @@ TITLE_CHARACTER, TITLE_LINE, LEGEND_LINE = 11.5, 26, 22
 
 
 def drawing(fit: Fitted) -> str:
-    """Return a drawing of the wiring of a system.
-
-    Parameters
-    ----------
-    fit : Fitted
-
-    Returns
-    -------
-    str
-        SVG of at most 1500 px width, with colours for light and dark backgrounds.
-    """
+    """Return a drawing of the wiring of a system."""
     system = fit.description.system
     placed = plan(system)
     title = textwrap.wrap(system.title, int((placed.width - 2 * MARGIN) / TITLE_CHARACTER)) or [""]

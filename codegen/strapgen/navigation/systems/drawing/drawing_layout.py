@@ -25,17 +25,7 @@ from strapgen.navigation.systems.system import DescribedSystem
 
 
 def plan(system: DescribedSystem) -> Placement:
-    """Return a drawing of a system as places of its parts.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-
-    Returns
-    -------
-    Placement
-        At most 1500 px wide with as many boxes side by side as fit, at most four.
-    """
+    """Return a drawing of a system as places of its parts."""
     for abreast in range(ABREAST, 0, -1):
         placed = _planned(system, abreast)
         if placed.width <= WIDEST:

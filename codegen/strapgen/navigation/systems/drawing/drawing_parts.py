@@ -23,37 +23,22 @@ KINDS = {
 
 
 def shortened(text: str, characters: int) -> str:
-    """Return a text of at most so many characters, with an ellipsis where something is left out.
-
-    Parameters
-    ----------
-    text : str
-    characters : int
-    """
+    """Return a text of at most so many characters, with an ellipsis where something is left out."""
     return text if len(text) <= characters else text[: max(characters - 1, 0)] + "…"
 
 
 @dataclass
 class Port:
-    """A line of a box where a wire begins or ends.
-
-    Parameters
-    ----------
-    name : str
-    unit, frame : str
-    mark : str
-        "sum" if a slower stage clears it, "out" if a run records it, "" for neither.
-    kinds : list of str
-        Kinds of the wires that begin here; each kind begins on a line of its own.
-    x, y : float
-        Where the wire meets the box; for wires that begin here, the middle of their lines.
-    """
+    """A line of a box where a wire begins or ends."""
 
     name: str
     unit: str
     frame: str
+    #: "sum" if a slower stage clears it, "out" if a run records it, "" for neither
     mark: str = ""
+    #: Kinds of the wires that begin here; each kind begins on a line of its own
     kinds: list[str] = field(default_factory=list)
+    #: Where the wire meets the box; for wires that begin here, the middle of their lines
     x: float = 0
     y: float = 0
 
@@ -79,38 +64,24 @@ class Port:
         return (len(self.label) + len(self.about) + 3) * CHARACTER
 
     def start(self, kind: str) -> float:
-        """Return the height at which wires of a kind begin.
-
-        Parameters
-        ----------
-        kind : str
-        """
+        """Return the height at which wires of a kind begin."""
         return self.y + LINE * (self.kinds.index(kind) - (self.lines - 1) / 2)
 
 
 @dataclass
 class Box:
-    """An input or a stage.
+    """An input or a stage."""
 
-    Parameters
-    ----------
-    name, kind : str
-        A line above the ports, and one below it: the kernel, or nothing.
-    every : int
-        Cycles of the fastest rate from one call to the next; 0 for an input.
-    inputs, outputs : list of Port
-    row, column : int
-    x, y, width : float
-        Upper left corner, and width.
-    """
-
+    #: A line above the ports, and one below it: the kernel, or nothing
     name: str
     kind: str
+    #: Cycles of the fastest rate from one call to the next; 0 for an input
     every: int
     inputs: list[Port] = field(default_factory=list)
     outputs: list[Port] = field(default_factory=list)
     row: int = 0
     column: int = 0
+    #: Upper left corner, and width
     x: float = 0
     y: float = 0
     width: float = 0
@@ -159,17 +130,11 @@ class Box:
 
 @dataclass(frozen=True)
 class Link:
-    """A wire between two ports.
-
-    Parameters
-    ----------
-    source, destination : tuple of (Box, Port)
-    kind : str
-        "forward", "delayed" or "shared".
-    """
+    """A wire between two ports."""
 
     source: tuple[Box, Port]
     destination: tuple[Box, Port]
+    #: "forward", "delayed" or "shared"
     kind: str
 
     @property
@@ -188,13 +153,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Lane:
-    """The rows of one rate.
-
-    Parameters
-    ----------
-    label, about : str
-    y, height : float
-    """
+    """The rows of one rate."""
 
     label: str
     about: str
@@ -204,25 +163,14 @@ class Lane:
 
 @dataclass(frozen=True)
 class Way:
-    """The way of a wire, of level and upright lines.
-
-    Parameters
-    ----------
-    link : Link
-    points : tuple of (float, float)
-        From its source to its destination.
-    """
+    """The way of a wire, of level and upright lines."""
 
     link: Link
+    #: From its source to its destination
     points: tuple[tuple[float, float], ...]
 
     def path(self, radius: float = 5) -> str:
-        """Return the commands of an SVG path with round corners.
-
-        Parameters
-        ----------
-        radius : float
-        """
+        """Return the commands of an SVG path with round corners."""
         (x, y), parts = self.points[0], []
         parts.append(f"M{x:.1f} {y:.1f}")
         for (ax, ay), (bx, by), (cx, cy) in zip(self.points, self.points[1:], self.points[2:], strict=False):
@@ -237,33 +185,19 @@ class Way:
 
 @dataclass
 class Placement:
-    """Boxes and wires of a system, placed.
-
-    Parameters
-    ----------
-    boxes : list of Box
-    links : list of Link
-    lanes : list of Lane
-    ways : list of Way
-    strip, width, height : float
-        Width of the strip with the rates of the lanes, and of everything.
-    """
+    """Boxes and wires of a system, placed."""
 
     boxes: list[Box]
     links: list[Link]
     lanes: list[Lane] = field(default_factory=list)
     ways: list[Way] = field(default_factory=list)
+    #: Width of the strip with the rates of the lanes, and of everything
     strip: float = 0
     width: float = 0
     height: float = 0
 
     def kind(self, port: Port) -> str:
-        """Return the kind of the wire that ends at a port.
-
-        Parameters
-        ----------
-        port : Port
-        """
+        """Return the kind of the wire that ends at a port."""
         return next(link.kind for link in self.links if link.destination[1] is port)
 
 

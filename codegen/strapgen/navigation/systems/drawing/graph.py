@@ -8,12 +8,7 @@ from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, Syst
 
 
 class Graph:
-    """Boxes with ports, and the wires between them, before they are placed.
-
-    Parameters
-    ----------
-    system : DescribedSystem
-    """
+    """Boxes with ports, and the wires between them, before they are placed."""
 
     def __init__(self, system: DescribedSystem) -> None:
         self.system = system

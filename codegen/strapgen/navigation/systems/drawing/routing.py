@@ -15,17 +15,6 @@ class Routing:
     """Finds the ways of wires. Gutter k is left of column k, channel k above row k.
 
     All wires of one kind from one port go along one channel, so that they are one line as far as they can be.
-
-    Parameters
-    ----------
-    rows : list of list of Box
-        Boxes with their rows and columns.
-    links : list of Link
-
-    Attributes
-    ----------
-    channel_tops, gutter_sides : dict of float
-        Where the first track of a channel and of a gutter is; the layout sets both.
     """
 
     def __init__(self, rows: list[list[Box]], links: list[Link]) -> None:
@@ -67,12 +56,7 @@ class Routing:
         return sign * source.row, sign * place
 
     def channel_tracks(self, channel: int) -> int:
-        """Return how many tracks a channel has.
-
-        Parameters
-        ----------
-        channel : int
-        """
+        """Return how many tracks a channel has."""
         return max(self._level.get(channel, {}).values(), default=-1) + 1
 
     def choose_gutters(self) -> None:
@@ -97,12 +81,7 @@ class Routing:
         self._upright = {gutter: tracks(some, TRACK) for gutter, some in runs.items()}
 
     def gutter_tracks(self, gutter: int) -> int:
-        """Return how many tracks a gutter has.
-
-        Parameters
-        ----------
-        gutter : int
-        """
+        """Return how many tracks a gutter has."""
         return max(self._upright.get(gutter, {}).values(), default=-1) + 1
 
     def ways(self) -> list[Way]:

@@ -8,53 +8,28 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Straight:
-    """A straight part of wires along a gutter.
+    """A straight part of wires along a gutter."""
 
-    Parameters
-    ----------
-    low, high : float
-        Where it begins and ends, along the gutter.
-    before, after : set of float
-        Where wires leave it towards lower tracks, and towards higher ones.
-    """
-
+    #: Where it begins and ends, along the gutter
     low: float = float("inf")
     high: float = float("-inf")
+    #: Where wires leave it towards lower tracks, and towards higher ones
     before: set[float] = field(default_factory=set)
     after: set[float] = field(default_factory=set)
 
     def reach(self, place: float, is_after: bool) -> None:
-        """Extend it to a place where a wire leaves it.
-
-        Parameters
-        ----------
-        place : float
-        is_after : bool
-            Whether the wire goes towards higher tracks.
-        """
+        """Extend it to a place where a wire leaves it."""
         self.low, self.high = min(self.low, place), max(self.high, place)
         (self.after if is_after else self.before).add(place)
 
     def crossings(self, other: Straight) -> int:
-        """Return how often wires cross if another stretch has a higher track.
-
-        Parameters
-        ----------
-        other : Straight
-        """
+        """Return how often wires cross if another stretch has a higher track."""
         here = sum(other.low <= place <= other.high for place in self.after)
         return here + sum(self.low <= place <= self.high for place in other.before)
 
 
 def tracks(runs: Mapping[Hashable, Straight], apart: float) -> dict[Hashable, int]:
-    """Return a track for each stretch: 0 for the first, and so on; the order stays where no other is better.
-
-    Parameters
-    ----------
-    runs : dict of Straight
-    apart : float
-        Least distance of two stretches on one track.
-    """
+    """Return a track for each stretch: 0 for the first, and so on; the order stays where no other is better."""
     order = _ordered(list(runs), runs)
     numbers: dict[Hashable, int] = {}
     for key in order:
