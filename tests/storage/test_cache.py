@@ -93,6 +93,17 @@ def test_full_disk_is_told_in_words(root):
     assert names(root / "kind") == []
 
 
+def test_an_entry_is_the_folder_that_was_filled_and_appears_at_once(root):
+    filled = []
+
+    def fill(draft: Path) -> None:
+        write("file")(draft)
+        assert not (root / "kind" / "key").exists()
+        filled.append(draft.stat().st_ino)
+
+    assert [cache.entry("kind", "key", fill).stat().st_ino] == filled, "a copy would be seen half-made"
+
+
 def test_first_of_two_wins(root):
     def fill(draft: Path) -> None:
         cache.entry("kind", "key", write("file", "first"))  # another process, in the meantime

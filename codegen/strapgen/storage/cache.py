@@ -273,10 +273,8 @@ def _is_whole(place: Path) -> bool:
     """Return whether an entry is there, the user's alone and undamaged; one that is others' is told of."""
     try:
         with ownership.private_folder(place, _PRIVATE) as folder:
-            manifest = json.loads(folder.read(_MANIFEST))
-            if manifest != {
-                name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST
-            }:
+            hashes = {name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST}
+            if json.loads(folder.read(_MANIFEST)) != hashes:
                 return False
             with suppress(OSError):
                 folder.touch()  # in use: not to be pruned
