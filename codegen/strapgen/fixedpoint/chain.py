@@ -30,9 +30,8 @@ class Chain:
     name: str  # that of the function's value, which is the last link
     known: Mapping[str, Quantity]
     same: dict[Definition, str]  # links of all functions so far, by definition
-    free: Callable[
-        [str], str
-    ]  # returns its argument, or that with a number behind it, as a name that is free
+    #: Returns its argument, or that with a number behind it, as a name that is free.
+    free: Callable[[str], str]
     word: int  # bits
     links: list[Quantity] = field(default_factory=list)
     ranges: dict[str, Interval] = field(default_factory=dict)  # those of the links

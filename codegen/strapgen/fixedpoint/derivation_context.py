@@ -39,9 +39,8 @@ class DerivationContext:
     proper: Samples  # values of the quantities on proper inputs
     anywhere: Samples  # the same anywhere in the ranges of the inputs
     outputs: frozenset[str]  # assignments that hold elements of results
-    same: dict[Definition, str] = field(
-        default_factory=dict
-    )  # links of functions: equal ones are stored once
+    #: Links of functions: equal ones are stored once.
+    same: dict[Definition, str] = field(default_factory=dict)
     items: dict[str, Quantity] = field(init=False)  # those of `quantities`
     assigned: frozenset[str] = field(init=False)  # names of all assignments of the program
 

@@ -101,7 +101,7 @@ class Quantity:
     """A quantity of a fixed-point program, exactly."""
 
     name: str
-    definition: Definition  # the stored part: the quantity less its offset and what stands beside it
+    definition: Definition  # the stored part: the quantity less its offset and the words beside it
     offset: Fraction  # the constant that is not stored
     range: Interval  # proved range of the stored part
     meaning: str = ""  # the comment where a named stage of the algorithm begins; "" elsewhere

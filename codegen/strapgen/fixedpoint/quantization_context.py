@@ -35,9 +35,8 @@ class Quantization:
     values: dict[str, Value] = field(init=False)  # the integers so far, those of the inputs included
     body: list[Value] = field(default_factory=list)  # the integers so far, in the order of the code
     resets: set[str] = field(default_factory=set)  # quantities whose computed value is exact from there on
-    checked: dict[str, Fraction] = field(
-        default_factory=dict
-    )  # largest magnitudes in calls that pass the checks
+    #: Largest magnitudes in calls that pass the checks.
+    checked: dict[str, Fraction] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.word, self.rounding_error = self.settings.word, ROUNDINGS[self.settings.rounding]

@@ -22,20 +22,18 @@ class AngleAccumulation:
     once: Fraction  # rad
     per_step: Fraction  # rad
     input_rounding: Fraction  # rad a step, if increments are rounded to their format first
-    #: Rad a normalization that multiplies the words of the state by one factor and rounds each of them once, and rad
-    #: an orthonormalization of a matrix.
+    #: In rad, of a normalization that multiplies the words of the state by one factor and rounds each of them once; an
+    #: orthonormalization of a matrix has it too.
     per_normalization: Fraction
-    #: More rad an orthonormalization, by the error of an element of its result; None where nothing is proved. It
-    #: multiplies the matrix C by a symmetric expansion of the inverse root of C'C.
+    #: In rad, of an orthonormalization that multiplies the matrix C by a symmetric expansion of the inverse root of
+    #: C'C, per error of an element of its result; None where nothing is proved.
     per_element: Fraction | None
     shortest: Fraction  # length, or singular value, from which the bound holds
     #: Least length of the state from which `proved_steps` counts; of a matrix, least singular value, the largest
     #: being at most the root of 2 - `start`**2.
     start: Fraction
     proved_steps: int  # those in which the state is proved to stay proper
-    beyond: (
-        Fraction  # factor of the bound of a run of more steps in which the state stays proper all the same
-    )
+    beyond: Fraction  # factor of the bound over more steps, if the state stays proper all the same
     orthonormalized: Fraction  # factor of the steps' part of a run with orthonormalizations
     dual_rows_apart: int  # most steps between orthonormalizations by dual rows; 0 where nothing is proved
     dual_rows_growth: Fraction  # such an orthonormalization stretches the error by at most 1 and this

@@ -50,9 +50,8 @@ class IntegerSum:
     coarse: tuple[Term, ...] = ()  # those that are integers at the fraction of the result
     residual: ErrorFeedback | None = None  # the rounding error of the last call, in place of half a unit
     drop: int = 0  # bits below the last one of the error feedback, dropped before it is added
-    in_words: bool = (
-        False  # whether the rounded sum, and every partial sum with coarse terms, fits into a word
-    )
+    #: Whether the rounded sum, and every partial sum with coarse terms, fits into a word.
+    in_words: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,9 +116,8 @@ class Value:
     peak: int  # bound of the magnitude of every partial sum
     guarded: bool = False  # whether the range is checked when the code runs: a call outside returns an error
     meaning: str = ""  # the comment where a named stage of the algorithm begins
-    saturated: bool = (
-        False  # whether the nearer end of the range replaces integers outside; `error` is that before
-    )
+    #: Whether the nearer end of the range replaces integers outside; `error` is that before.
+    saturated: bool = False
 
     @property
     def magnitude(self) -> int:

@@ -34,9 +34,8 @@ class Contract:
     version: str  # of strapgen
     digest: str  # hash of the command, of the requirements and of the formulas
     function: str
-    items: tuple[
-        tuple[str, str], ...
-    ]  # kind and text of the lines "requires", "otherwise", "let" and "ensures"
+    #: Kind and text of the lines "requires", "otherwise", "let" and "ensures", in order.
+    items: tuple[tuple[str, str], ...]
 
     #: The sentence that begins it in a header.
     head: ClassVar[str] = HEAD

@@ -26,11 +26,9 @@ class _ComputedNumber:
 
     range: Interval  # range of the computed number
     error: Fraction  # bound of its distance from the exact value
-    #: The part of the error that is new here: the rounding, and what is of second order in the errors of operands.
-    added: Fraction
-    #: The exponent of a power of two of which the number is a multiple, if one is known.
-    places: int | None = None
-    #: Bounds a and b of the distance, as a times the exact value plus b, if it is known so.
+    added: Fraction  # the new part of the error: r and q
+    places: int | None = None  # the number is a multiple of 2**places, if that is known
+    #: a, b: the distance is at most a times the exact value plus b, if that is known.
     relative: tuple[Fraction, Fraction] | None = None
 
 

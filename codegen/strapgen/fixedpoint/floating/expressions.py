@@ -32,11 +32,8 @@ class Expressions:
     """The operations of a program, each after its operands."""
 
     items: list[Expression] = field(default_factory=list)
-    #: Places of the inputs' elements and of what is assigned to a name.
-    names: dict[str, int] = field(default_factory=dict)
-    labels: dict[int, str] = field(
-        default_factory=dict
-    )  # name of the assignment in which an operation stands
+    names: dict[str, int] = field(default_factory=dict)  # places of elements of inputs and of assignments
+    labels: dict[int, str] = field(default_factory=dict)  # assignments in which operations stand
     results: dict[str, list[int]] = field(default_factory=dict)  # places of the elements of every result
     _places: dict[Expression, int] = field(default_factory=dict)
 

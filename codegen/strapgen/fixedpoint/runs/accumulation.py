@@ -37,15 +37,13 @@ _MOST_TERMS = 1000
 class StepErrors:
     """The errors that one call adds to a run, element by element."""
 
-    #: Error bounds of the elements of the state, less those of the transition and less what is fed back.
-    local: tuple[Fraction, ...]
-    transition: tuple[Fraction, ...]  # error bounds of the elements of the transition, less what is fed back
-    transition_feedback: tuple[Fraction, ...]  # bounds of what is fed back of the elements of the transition
-    state_feedback: Fraction  # bound of what is fed back of an element of the state
-    away: tuple[Fraction, ...]  # bounds of the distance of the transition from the identity
-    #: How far the elements of the transition move when increments are rounded to their format.
-    moves: tuple[Fraction, ...]
-    saturation: Fraction = Fraction(0)  # what a state that saturates loses of an element of 1
+    local: tuple[Fraction, ...]  # of the state, without those of the transition and those fed back
+    transition: tuple[Fraction, ...]  # of the transition, without those fed back
+    transition_feedback: tuple[Fraction, ...]  # of the transition, fed back
+    state_feedback: Fraction  # of an element of the state, fed back
+    away: tuple[Fraction, ...]  # distances of the transition from the identity
+    moves: tuple[Fraction, ...]  # changes of the transition when increments are rounded to their format
+    saturation: Fraction = Fraction(0)  # of an element of 1 in a state that saturates
 
 
 def step_errors(context: Quantization, transition: Result, result: Argument) -> StepErrors | None:
