@@ -122,7 +122,7 @@ def call_vectors(
         The function in C.
     reference : Sources
         In fixed point its integer model, the same kernel and settings for the target "fixed-model"; in floating point
-        its program, see `kernel_sources.ProgramSources`.
+        its program, see `kernel_sources.sources_of_program`.
     command : str
         The command that generates the vectors, for the head of the files.
     count : int, optional
