@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 import strapgen
-from strapgen.run.fixed import FixedBackend
 
 #: What restores a state.
 NORMALIZATIONS = {
@@ -100,7 +99,7 @@ class Adversary:
     def __init__(
         self, algorithm: str, settings: strapgen.Settings, name: str, greedy: bool = True, seed: int = 1
     ) -> None:
-        self.backend: FixedBackend = strapgen.backend(algorithm, "rk4", 2, name, settings=settings)
+        self.backend = strapgen.backend(algorithm, "rk4", 2, name, settings=settings)
         self.exact = strapgen.evaluator(strapgen.choose(algorithm, "rk4", 2), "c")
         self.interface, self.greedy = self.backend.interface, greedy
         self.rng, self.sum = np.random.default_rng(seed), np.zeros(3)
