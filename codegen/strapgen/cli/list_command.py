@@ -6,15 +6,16 @@ from typing import Annotated
 
 import typer
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.ir import checks
+from strapgen.registry import Titles
 
 #: The kinds of names, in the order in which they are listed.
 KINDS = (
     *("algorithms", "methods", "vectors", "kernels"),
-    *(kind for one in reversed(applications.built_in().values()) for kind in one.lists),
+    *(kind for one in reversed(registration.built_in().values()) for kind in one.lists),
     *("targets", "backends"),
 )
 
@@ -41,6 +42,8 @@ def list_names(
         )
     from strapgen.cli.names_report import names_report
 
+    for line in registration.broken():
+        typer.echo(f"strapgen: {line}", err=True)
     parts = _parts()
     shown = parts if kind is None else {kind: parts[kind]}
     short = dict(shown)
@@ -64,21 +67,19 @@ def _parts() -> dict[str, dict[str, str]]:
     }
     return {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
-        "methods": dict(catalogue.METHODS),
+        "methods": {**catalogue.METHODS, **catalogue.INTEGRATORS.taken()},
         "vectors": {
             name: f"{vector.title}; methods {', '.join(vector.methods)}"
             for name, vector in catalogue.VECTORS.items()
         },
         "kernels": {
-            name: recipe.title for name, recipe in {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS}.items()
+            **Titles(catalogue.KERNELS),
+            **Titles(catalogue.LAYOUT_KERNELS),
+            **catalogue.KERNELS.taken(),
         },
-        **{
-            kind: applications.load(place)()
-            for one in reversed(applications.all_applications().values())
-            for kind, place in one.lists.items()
-        },
+        **registration.lists(),
         "targets": titles(),
-        "backends": {name: entry.title for name, entry in BACKENDS.items()},
+        "backends": {**Titles(BACKENDS), **BACKENDS.taken()},
     }
 
 

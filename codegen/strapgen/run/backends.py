@@ -12,10 +12,11 @@ from strapgen.ir import checks, stage_arguments
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
+from strapgen.run.backend_names import Entry
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.kernel_sources import sources_of_choice
 from strapgen.run.protocol import Backend
-from strapgen.run.registry import BACKENDS, DEFAULT_BACKENDS, Entry, backend_class, of_sources
+from strapgen.run.registry import BACKENDS, DEFAULT_BACKENDS, backend_class, of_sources
 from strapgen.run.step_sources import StepSources
 
 __all__ = [

@@ -13,7 +13,7 @@ from strapgen.run import compiler
 from strapgen.run.evaluators import Array, Evaluator
 from strapgen.run.protocol import Backend
 from strapgen.run.step_sources import StepSources
-from strapgen.targets import BUILT_IN
+from strapgen.targets import TARGETS
 
 #: The types of C in numpy.
 _TYPES = {"double": np.float64, "float": np.float32}
@@ -23,7 +23,7 @@ _GROUP = 16
 
 def real_type(target: str) -> tuple[str, Any]:
     """Return the name of the C type of a target's numbers, and the same type in numpy."""
-    name = BUILT_IN[target].number
+    name = TARGETS[target].number
     return name, _TYPES[name]
 
 

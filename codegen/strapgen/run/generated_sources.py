@@ -177,7 +177,7 @@ def sources(
     targets.require(target, settings)
     if naming.option and not targets.TARGETS[target].nameable:
         raise InputError(f"{naming.option} goes with targets in C, C++, Rust and MATLAB, not with {target}")
-    code = targets.registry.identity(target)
+    code = targets.TARGETS.code(target)
     key = cache.digest(
         [
             cache.generator_digest(),

@@ -11,7 +11,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
 from strapgen.run import generated_sources
-from strapgen.targets import BUILT_IN
+from strapgen.targets import TARGETS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +40,9 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
     Returns
     -------
     Sources
-        Generated text where `target` is one of strapgen, else the program itself.
+        Generated text where `target` is one, else the program itself.
     """
-    if target in BUILT_IN:
+    if target in TARGETS:
         return pipeline.generate(program, target, settings)
     return ProgramSources(
         kernel=program.kernel,
@@ -60,7 +60,7 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
     """Return what a back end runs of a chosen kernel, from the cache; parameters are those of `sources_of_program`."""
-    if target in BUILT_IN:
+    if target in TARGETS:
         return generated_sources.sources(choice, target, settings)
     return sources_of_program(generated_sources.program(choice), target)
 
