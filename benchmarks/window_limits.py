@@ -20,7 +20,7 @@ from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.filters import responses
 from strapgen.design.windows.family import FamilyBrief, design
-from strapgen.lab.motions.motions import PROFILES, Motion
+from strapgen.lab.motions.motions import IntegratedMotion, Motion
 from strapgen.lab.simulate.drift import angles, drift, steady_drift
 from strapgen.lab.simulate.runs import Run, attitude, drift_between
 from strapgen.run.backends import Backend
@@ -172,8 +172,8 @@ def _jittered(backend: Backend, motion: Motion, part: float, seed: int) -> float
     def measure(interval: Fraction, first: int, stop: int) -> Array:
         instants = np.arange(first, stop + 1) * float(interval)
         instants += np.random.default_rng(seed).normal(0, part * float(interval), instants.shape)
-        if motion.name in PROFILES:
-            return np.diff(PROFILES[motion.name](**motion.parameters).angle(instants), axis=0)
+        if isinstance(motion, IntegratedMotion):
+            return np.diff(motion.profile.angle(instants), axis=0)
         middles, widths = (instants[1:] + instants[:-1]) / 2, np.diff(instants)
         return strapgen.evaluator("coning-increments")(middles, widths, *motion.parameters.values())
 

@@ -16,13 +16,20 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from strapgen import applications
+from strapgen import registration
 
 ROOT = Path(__file__).resolve().parents[1]
+#: The folders of the package, each above those that it may import.
+LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"][0][
+    "layers"
+]
+#: The applications, each after those that it needs.
+APPLICATIONS = LAYERS[: LAYERS.index("cli")][::-1]
 #: What a copy leaves out.
 LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "_build", "build", "dist")
 
@@ -30,7 +37,7 @@ LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "_build", "build", "dist"
 def gone_with(name: str) -> set[str]:
     """Return an application and all that need it."""
     gone = {name}
-    for other, one in applications.built_in().items():
+    for other, one in registration.built_in().items():
         if gone & {*one.requires}:
             gone.add(other)
     return gone
@@ -66,8 +73,8 @@ def tests_without(gone: set[str]) -> Iterator[str]:
     kernels = [
         f'"{name}'
         for one in gone
-        for table in applications.built_in()[one].kernels
-        for name in applications.load(table)
+        for table in registration.built_in()[one].kernels
+        for name in registration.load(table)
     ]
     for path in sorted(tests.rglob("test_*.py")):
         folder = path.relative_to(tests).parts[0]
@@ -94,7 +101,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="applications; by default all")
     parser.add_argument("--tests", action="store_true", help="run the tests too")
     options = parser.parse_args()
-    for name in options.names or reversed(applications.built_in()):
+    for name in options.names or reversed(APPLICATIONS):
         gone = gone_with(name)
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "strapgen"

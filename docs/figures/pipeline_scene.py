@@ -12,7 +12,7 @@ from typing import Any
 from canvas import Drawing, Point
 
 import strapgen
-from strapgen.applications import built_in
+from strapgen.registration import built_in
 
 _BOX: Point = (154, 92)
 _GAP = 74
@@ -47,6 +47,13 @@ def stages(root: Path) -> dict[str, tuple[str, str]]:
     return {name: (result, words) for name, result, words in rows}
 
 
+def applications(root: Path) -> dict[str, str]:
+    """Return the applications that the page on the architecture lists, with their own titles, the lowest first."""
+    page, _, _ = (root / "docs" / "architecture.md").read_text().partition("| the compiler |")
+    names = re.findall(r"^\| `(\w+)/` \|", page, re.MULTILINE)
+    return {name: one.title for name, one in built_in().items() if name in names}
+
+
 def result(stage: Callable[..., Any]) -> str:
     """Return the name of the class that a stage returns, from its annotation."""
     return str(inspect.signature(stage).return_annotation)
@@ -64,7 +71,7 @@ def pipeline(root: Path) -> Drawing:
             raise ValueError(f"{name} returns {returned}; the page or the drawing has {kind}")
     drawing = Drawing(_WIDTH, _HEIGHT, "The two storeys of strapgen: applications on a compiler")
     _storey(drawing, _APPLICATIONS, "applications: each a question that a user asks")
-    _rooms(drawing)
+    _rooms(drawing, applications(root))
     _storey(drawing, _COMPILER, "the compiler: from a choice to code that runs")
     words = {kind: text for kind, text in listed.values()} | _OTHERS
     for kind in _PLACES:
@@ -88,15 +95,14 @@ def _box(
         drawing.text((middle, corner[1] + 43 + 17 * k), line, size=13.5, anchor="middle")
 
 
-def _rooms(drawing: Drawing) -> None:
+def _rooms(drawing: Drawing, rooms: dict[str, str]) -> None:
     """Draw the applications, those above that need others."""
-    rooms = built_in()
     width = (_WIDTH - 2 * _EDGE - (_COLUMNS - 1) * _SPACE) / _COLUMNS
     rows = -(-len(rooms) // _COLUMNS)
-    for k, (name, room) in enumerate(rooms.items()):
+    for k, (name, title) in enumerate(rooms.items()):
         row = rows - 1 - k // _COLUMNS
         corner = (_EDGE + k % _COLUMNS * (width + _SPACE), _FIRST_ROOM + row * (_ROOM + _SPACE))
-        _box(drawing, corner, (width, _ROOM), name, room.title, ("sand", "orange"))
+        _box(drawing, corner, (width, _ROOM), name, title, ("sand", "orange"))
 
 
 def _corner(kind: str) -> Point:

@@ -100,8 +100,8 @@ def test_every_synonym_leads_to_a_name_that_exists():
     from strapgen.targets import TARGETS
 
     names = {
-        "algorithm": catalogue.RESERVED,
-        "kernel": catalogue.RESERVED,
+        "algorithm": catalogue.reserved(),
+        "kernel": catalogue.reserved(),
         "method": catalogue.METHODS,
         "motion": catalogue.MOTIONS,
         "target": TARGETS,

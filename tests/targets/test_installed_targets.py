@@ -9,9 +9,11 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import installed_packages
 import numpy as np
 import pytest
 from derived import program, tells_more
+from installed_packages import as_in_a_new_process, importable
 
 import strapgen
 from strapgen import catalogue, pipeline, targets
@@ -25,12 +27,7 @@ EULER = Choice("euler", "rk4", 2)
 
 
 def install(folder: Path, entries: dict[str, str], name: str = "toy") -> None:
-    """Write what pip leaves of a package that has entry points, for Python to find it in a folder of its path."""
-    info = folder / f"{name}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    lines = [f"[{registry.GROUP}]", *(f"{entry} = {value}" for entry, value in entries.items())]
-    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    installed_packages.install(folder, registry.GROUP, entries, name)
 
 
 @pytest.fixture
@@ -38,13 +35,8 @@ def site(tmp_path, monkeypatch):
     """An empty folder on Python's path; its modules are forgotten after the test."""
     folder = tmp_path / "site"
     folder.mkdir()
-    monkeypatch.syspath_prepend(folder)
-    before = {*sys.modules}
-    yield folder
-    registry._loaded.cache_clear()
-    for module in {*sys.modules} - before:
-        if str(getattr(sys.modules[module], "__file__", "")).startswith(str(folder)):
-            del sys.modules[module]
+    with importable(folder, monkeypatch):
+        yield folder
 
 
 @pytest.fixture
@@ -103,7 +95,7 @@ def test_the_example_is_short():
 
 def test_sources_are_cached_until_a_file_of_the_package_changes(toy, monkeypatch):
     def generated() -> str:
-        registry._loaded.cache_clear()  # as in a new process
+        as_in_a_new_process()
         (text,) = pipeline.compile(EULER, "plain-python").files.values()
         return text
 
@@ -120,8 +112,8 @@ def test_sources_are_cached_until_a_file_of_the_package_changes(toy, monkeypatch
 
 def test_the_identity_of_a_target_covers_its_distribution(toy, site):
     def identity() -> str:
-        registry._loaded.cache_clear()  # as in a new process
-        return registry.identity("plain-python")
+        as_in_a_new_process()
+        return targets.TARGETS.code("plain-python")
 
     (info,) = site.glob("*.dist-info")
     (info / "RECORD").write_text("beside.py,,\ngone.py,,\n")
@@ -167,7 +159,7 @@ BROKEN = {
     "syntax": ("def TARGET(:", ", broken.py, line 1: SyntaxError: invalid syntax"),
     "lacking": ("", "AttributeError: module 'broken' has no attribute 'TARGET'"),
     "ending": ("import sys\nsys.exit(0)", " ends the program with sys.exit; it must define a Target"),
-    "type": ("TARGET = 'c'", " is of type str; a strapgen.Target is needed"),
+    "type": ("TARGET = 'c'", " is of type str; a strapgen.targets.registry.Target is needed"),
     "title": (
         "from strapgen import Target\nTARGET = Target(3, print)",
         ": title of a Target is no text of one line",

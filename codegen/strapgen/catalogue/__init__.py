@@ -9,25 +9,17 @@ from __future__ import annotations
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
 from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
+from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
 from strapgen.catalogue.method_names import (
     ALGORITHMS,
     INTEGRATORS,
     METHODS,
     STANDARD_METHODS,
     VECTORS,
-    Integrator,
     StepVector,
 )
-from strapgen.catalogue.names import (
-    KERNELS,
-    LAYOUT_KERNELS,
-    MOST_BESIDE,
-    MOST_INCREMENTS,
-    MOTIONS,
-    RESERVED,
-    TWO_SPEED,
-    UPDATE_ORDERS,
-)
+from strapgen.catalogue.methods.integrators import Integrator
+from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_BESIDE, MOST_INCREMENTS, reserved
 from strapgen.ir.recipe import Recipe
 
 __all__ = [
@@ -39,7 +31,6 @@ __all__ = [
     "MOST_BESIDE",
     "MOST_INCREMENTS",
     "MOTIONS",
-    "RESERVED",
     "STANDARD_METHODS",
     "TWO_SPEED",
     "UPDATE_ORDERS",
@@ -57,6 +48,7 @@ __all__ = [
     "nodes",
     "orthonormalizations",
     "previous",
+    "reserved",
     "rounding",
     "standard",
     "with_constants",

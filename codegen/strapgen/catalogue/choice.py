@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from strapgen.catalogue.constants import Constants, options
+from strapgen.catalogue.method_names import INTEGRATORS
 from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
 from strapgen.catalogue.user_kernel import UserKernel
-from strapgen.ir import packages
 from strapgen.ir.notebook_display import full_text, short_repr
 from strapgen.ir.recipe import Description
 
@@ -122,10 +122,16 @@ class Choice:
             return f"{self.kernel} {self.user_kernel.text}"
         if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {full_text(self.method)} {self.method.file}"
-        words = [self.kernel, options(self.constants), _code(self.name)]
+        words = [self.kernel, options(self.constants), *self._code_of_packages()]
         if self.layout is not None:
             words += [full_text(self.layout), self.layout.file]
         return " ".join(filter(None, words))
+
+    def _code_of_packages(self) -> Iterator[str]:
+        """Yield hashes of the code of installed packages that derives the kernel."""
+        yield KERNELS.code(self.name) or LAYOUT_KERNELS.code(self.name)
+        if self.method is not None:
+            yield INTEGRATORS.code(str(self.method))
 
     @property
     def increments_per_step(self) -> int:
@@ -172,15 +178,3 @@ def orthonormalizations(algorithm: str) -> list[str]:
     """Return the kernels that orthonormalize the state of an algorithm of the catalogue."""
     starts = (f"{algorithm}-orthonormalize", f"{algorithm}-normalize")
     return [name for name in KERNELS if name.startswith(starts)]
-
-
-def _code(name: str) -> str:
-    """Return a hash of the code of an installed package's kernel; "" for one of strapgen."""
-    recipe = KERNELS.brought(name) or LAYOUT_KERNELS.brought(name)
-    return "" if recipe is None else _digest(recipe.module)
-
-
-@cache
-def _digest(module: str) -> str:
-    """Return a hash of all files of a module's package."""
-    return hashlib.sha256(repr(packages.contents(module)).encode()).hexdigest()

@@ -8,22 +8,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
-from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
+from strapgen.catalogue.methods.integrators import TAYLOR
+from strapgen.catalogue.methods.shaped_coning import SHAPES, ShapedConing, named_shape
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
-from strapgen.catalogue.methods.windows import EXACT, named_window
+from strapgen.catalogue.methods.windows import EXACT, WINDOWS, named_window
 from strapgen.catalogue.names import (
     KERNELS,
     LAYOUT_KERNELS,
     LEAST_WHOLE,
     MOST_BESIDE,
     MOST_INCREMENTS,
-    RESERVED,
+    reserved,
 )
 from strapgen.catalogue.user import loading
 from strapgen.ir import checks
@@ -117,7 +118,7 @@ def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Cho
         others = ", ".join(name for name in KERNELS if name.startswith(f"{choice.name}-"))
         raise InputError(f"{choice.name} needs the file of a layout; kernels of built-in ones are {others}")
     if isinstance(layout, str | os.PathLike):
-        read: Callable[[str | os.PathLike[str]], Description] = applications.load(
+        read: Callable[[str | os.PathLike[str]], Description] = registration.load(
             LAYOUT_KERNELS[choice.name].reader
         )
         layout = read(layout)
@@ -140,9 +141,9 @@ def _choose(
         name = os.fspath(name)
     if not isinstance(name, str):
         raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
-    if name.endswith(".py") or (name not in RESERVED and name in loading.installed()):
+    if name.endswith(".py") or (name not in reserved() and name in loading.installed()):
         return _choose_users(name, method, increments, rates, previous, ahead)
-    if name not in RESERVED:
+    if name not in reserved():
         shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
         names = [*_algorithms(), *VECTORS, *shown, *KERNELS, *LAYOUT_KERNELS]
         checks.choice("algorithm", name, dict.fromkeys(names), _FILE, "kernels")
@@ -159,6 +160,8 @@ def _choose(
                 takers = ", ".join([*ALGORITHMS, *VECTORS])
                 raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
         return Choice(name)
+    if isinstance(method, str) and method in TABLEAUX and method not in TABLEAUX.own:
+        method = TABLEAUX[method]
     if isinstance(method, (str, Window)):
         window = named_window(method)
         if window is not None:
@@ -210,9 +213,9 @@ def _require_whole_rate(method: str, samples: int) -> None:
     allowed = [
         name
         for name, integrator in INTEGRATORS.items()
-        if integrator.module == "taylor" and (samples < LEAST_WHOLE or integrator.order >= samples)
+        if integrator.module == TAYLOR and (samples < LEAST_WHOLE or integrator.order >= samples)
     ]
-    if method not in INTEGRATORS or INTEGRATORS[method].module != "taylor" or method in allowed:
+    if method not in INTEGRATORS or INTEGRATORS[method].module != TAYLOR or method in allowed:
         return
     series = f"{allowed[0]} to {allowed[-1]} and fit-exact keep" if len(allowed) > 1 else "fit-exact keeps"
     raise InputError(
@@ -249,7 +252,7 @@ def _choose_window(
         raise InputError(
             f"a window called {window.name} would make the kernel {name}-{window.name}, which exists"
         )
-    method = window if window.file or named_window(window.name) != window else window.name
+    method = window if window.file or named_window(window.name, WINDOWS.own) != window else window.name
     return Choice(name, method, window.increments, window.previous, window.ahead)
 
 
@@ -267,7 +270,7 @@ def _choose_shape(
     for (what, value), needed in zip(stated.items(), (shape.samples, shape.previous, 0), strict=True):
         if value is not None and checks.count(what, value, smallest=0) != needed:
             raise InputError(f"{what} is {value}; a step of {shape.name} has {needed}")
-    method = shape if shape.file or named_shape(shape.name) != shape else shape.name
+    method = shape if shape.file or SHAPES.own.get(shape.name) != shape else shape.name
     return Choice(name, method, shape.samples, shape.previous)
 
 

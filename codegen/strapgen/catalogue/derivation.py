@@ -16,7 +16,6 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_INCREMENTS
-from strapgen.ir import packages
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -89,26 +88,24 @@ def _known(choice: Choice) -> Kernel:
 def _of_catalogue(choice: Choice) -> Kernel:
     if choice.method is None:
         described = choice.layout is not None
-        recipe = LAYOUT_KERNELS[choice.name] if described else KERNELS[choice.name]
-        function = getattr(import_module(recipe.module), recipe.function)
+        registry = LAYOUT_KERNELS if described else KERNELS
+        recipe = registry[choice.name]
         arguments = (choice.layout,) if described else recipe.arguments
-        if (LAYOUT_KERNELS if described else KERNELS).brought(choice.name) is None:
-            kernel: Kernel = function(*arguments)
-            return kernel
-        with packages.guarded(f"kernel {choice.name}", "return a Kernel", packages.belongs_to(recipe.module)):
-            kernel = function(*arguments)
+        with registry.guarded(choice.name, "return a Kernel"):
+            kernel: Kernel = getattr(import_module(recipe.module), recipe.function)(*arguments)
         return kernel
-    if choice.name in VECTORS:
-        vector = VECTORS[choice.name]
-        function = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)
-        ahead = {"ahead": choice.ahead} if choice.ahead else {}
-        derived: Kernel = function(_method(choice.method), choice.increments, choice.previous, **ahead)
-        return derived
-    from strapgen.catalogue.kernels.attitude_step import step
-    from strapgen.catalogue.kinematics import KINEMATICS
+    with INTEGRATORS.guarded(str(choice.method), "derive a step"):
+        method = _method(choice.method)
+        if choice.name in VECTORS:
+            vector = VECTORS[choice.name]
+            function = getattr(import_module(f"{_PACKAGE}.kernels.{vector.module}"), vector.function)
+            ahead = {"ahead": choice.ahead} if choice.ahead else {}
+            derived: Kernel = function(method, choice.increments, choice.previous, **ahead)
+            return derived
+        from strapgen.catalogue.kernels.attitude_step import step
+        from strapgen.catalogue.kinematics import KINEMATICS
 
-    method = _method(choice.method)
-    return step(KINEMATICS[choice.name], method, choice.increments, choice.previous, choice.ahead)
+        return step(KINEMATICS[choice.name], method, choice.increments, choice.previous, choice.ahead)
 
 
 def companion(kernel: Kernel, name: str) -> Kernel:
@@ -141,7 +138,6 @@ def _method(method: AnyMethod) -> Method:
         return runge_kutta.method(tableau)
     name = str(method)
     family = INTEGRATORS[name]
-    integrator: Method = import_module(f"{_PACKAGE}.methods.{family.module}").method(
-        *(family.arguments or (family.order,))
-    )
+    with INTEGRATORS.guarded(name, "return a Method"):
+        integrator: Method = import_module(family.module).method(*(family.arguments or (family.order,)))
     return integrator

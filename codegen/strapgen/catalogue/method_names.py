@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
+from strapgen.catalogue.methods.integrators import Integrator
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.tableaux import TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
+from strapgen.registry import Merged, Registry, Titles
+
+#: The folder of the modules that derive methods.
+_METHODS = "strapgen.catalogue.methods"
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -15,85 +21,11 @@ ALGORITHMS = {
     "cayley-klein": "Cayley-Klein parameters, scalar first",
 }
 
-
-class Integrator(NamedTuple):
-    """A method without a tableau; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
-
-    title: str
-    module: str
-    order: int
-    takes_rates: bool = True
-    arguments: tuple[str, ...] = ()
-    takes_ahead: bool = True
-
-
-#: Integration methods that have no tableau.
-INTEGRATORS = {
-    **{
-        f"taylor{order}": Integrator(
-            f"Taylor series of order {order} of the transition", "taylor", order, False
-        )
-        for order in range(1, 21)
-    },
-    **{
-        f"magnus{order}": Integrator(f"Magnus series of order {order}", "magnus", order)
-        for order in (2, 4, 6)
-    },
-    "fit-exact": Integrator(
-        "polynomial through the increments, integrated exactly", "fit_exact", 16, takes_rates=False
-    ),
-    "munthe-kaas4": Integrator("Runge-Kutta-Munthe-Kaas method of order 4", "munthe_kaas", 4),
-    "crouch-grossman3": Integrator("Crouch-Grossman method of order 3", "crouch_grossman", 3),
-    "coning-least-squares": Integrator(
-        "compressed coning coefficients, by least squares over a band",
-        "frequency_shaping",
-        2,
-        takes_rates=False,
-        takes_ahead=False,
-    ),
-    "coning-compressed": Integrator(
-        "compressed coning coefficients, made for coning", "coning", 4, False, ("compressed",), False
-    ),
-    "coning-uncompressed": Integrator(
-        "uncompressed coning coefficients, made for polynomial rates",
-        "coning",
-        4,
-        False,
-        ("uncompressed",),
-        False,
-    ),
-    "coning-combined": Integrator(
-        "coning coefficients for both, with the terms of third and fourth order",
-        "coning",
-        6,
-        False,
-        ("combined",),
-        False,
-    ),
-    "coning-exact-rest": Integrator(
-        "coning coefficients for both, with all other terms of the polynomial through the increments",
-        "exact_rest",
-        16,
-        False,
-        takes_ahead=False,
-    ),
-    "coning-polynomial": Integrator(
-        "uncompressed coning coefficients, with the terms of third and fourth order",
-        "coning",
-        6,
-        False,
-        ("polynomial",),
-        False,
-    ),
-}
+#: Integration methods without files of coefficients.
+INTEGRATORS = Registry("methods", Integrator)
 
 #: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
-METHODS = {
-    **TITLES,
-    **{name: integrator.title for name, integrator in INTEGRATORS.items()},
-    **SHAPE_TITLES,
-    **WINDOW_TITLES,
-}
+METHODS: Mapping[str, str] = Merged(TITLES, Titles(INTEGRATORS), SHAPE_TITLES, WINDOW_TITLES)
 
 #: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")
@@ -127,7 +59,7 @@ _VECTORS = {
         "rotation vector of a step",
         "attitude_step",
         "rotation_vector",
-        ("magnus", "munthe_kaas", "coning"),
+        (f"{_METHODS}.magnus", f"{_METHODS}.munthe_kaas", f"{_METHODS}.coning"),
         "coning-combined",
         True,
     ),
@@ -135,7 +67,7 @@ _VECTORS = {
         "sculling term of a step, by duality with coning",
         "sculling_term",
         "sculling",
-        ("coning",),
+        (f"{_METHODS}.coning",),
         "coning-combined",
     ),
     "velocity-position": StepVector(

@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import typer
 
-from strapgen import applications
-from strapgen.applications import Command
+from strapgen import registration
 from strapgen.cli import version_option
 from strapgen.cli.help import PlainCommand, PlainGroup, explanation
 from strapgen.ir.exceptions import InputError, StrapgenError
+from strapgen.registration import Command
 from strapgen.run.processes import prepare_for_derivations
 
 #: Headings of ``strapgen --help`` in their order.
 HEADINGS = ("Derive", "Generate", "Run", "Analyse", "Reproduce")
-#: The commands of the compiler; the others are those of the applications.
-_COMPILER = {
-    "list": Command("strapgen.cli.list_command:list_names", "Derive"),
-    "derive": Command("strapgen.cli.derive_command:derive", "Derive"),
-    "generate": Command("strapgen.cli.generate_command:generate", "Generate"),
-}
 
 #: With which shells ask for the words that may follow.
 _COMPLETING = "_STRAPGEN_COMPLETE"
@@ -54,39 +48,32 @@ def headings() -> dict[str, list[str]]:
     return _Strapgen.headings
 
 
-def _add(commands: Mapping[str, Command]) -> None:
-    """Add commands to the program, those of a group after the group."""
-    for name, command in commands.items():
-        function = applications.load(command.function)
-        group, _, member = name.rpartition(" ")
-        if isinstance(function, typer.Typer):
-            app.add_typer(function, name=name)
-            _groups[name] = function
-        else:
-            to = _groups[group] if group else app
-            to.command(member, cls=PlainCommand, hidden=command.hidden)(function)
-        if command.heading:
-            _Strapgen.headings.setdefault(command.heading, []).append(name)
+def _add(name: str, command: Command, function: Any) -> None:
+    """Add a command to the program; one of a group comes after the group."""
+    group, _, member = name.rpartition(" ")
+    if isinstance(function, typer.Typer):
+        app.add_typer(function, name=name)
+        _groups[name] = function
+    else:
+        to = _groups[group] if group else app
+        to.command(member, cls=PlainCommand, hidden=command.hidden)(function)
+    if command.heading:
+        _Strapgen.headings.setdefault(command.heading, []).append(name)
 
 
-def _names() -> set[str]:
-    return {*_COMPILER}.union(*(one.commands for one in applications.built_in().values()))
+#: The commands of strapgen by name.
+_OWN = {name: command for one in registration.built_in().values() for name, command in one.commands.items()}
 
 
 def _add_installed() -> None:
-    known = _names()
-    for label, application in applications.installed().items():
-        for name in application.commands:
-            if name in known:
-                raise InputError(
-                    f"application {label}: strapgen has a command {name}; another name is needed"
-                )
-        _add(application.commands)
+    """Add the commands of installed packages that can be used."""
+    for name, command, function in registration.installed_commands():
+        if not isinstance(function, InputError):
+            _add(name, command, function)
 
 
-_add(_COMPILER)
-for _application in applications.built_in().values():
-    _add(_application.commands)
+for _name, _command in _OWN.items():
+    _add(_name, _command, registration.load(_command.function))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -97,12 +84,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     prepare_for_derivations()
     words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
-        if words[0] in _groups or words[0] not in _names():
+        if words[0] in _groups or words[0] not in _OWN:
             _add_installed()
         status = app(words, prog_name="strapgen", standalone_mode=False)
         sys.stdout.flush()
     except StrapgenError as error:
-        _fail(str(error))
+        # A name that is not known may be that of a package that cannot be used.
+        unusable = registration.broken() if getattr(error, "unknown_name", False) else []
+        _fail("; ".join([*unusable, str(error)]))
     except BrokenPipeError:  # the reader has gone, as `head` does
         _drop_output()
         sys.exit(1)
@@ -117,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stderr.write("strapgen: interrupted\n")
         sys.exit(130)
     except Exception as error:
-        if hasattr(error, "format_message") and (unusable := applications.broken()):
+        if hasattr(error, "format_message") and (unusable := registration.broken()):
             _fail(unusable[0])
         # Typer's errors of usage share no public base class over the releases that are allowed.
         if not hasattr(error, "format_message"):

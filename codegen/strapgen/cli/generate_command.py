@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, listed, option
@@ -132,7 +132,7 @@ def request(
 
 def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
     """Return the files that build and test the C, unless a file of the user is in their place."""
-    writer = applications.extension("generate.project", "--project")
+    writer = registration.extension("generate.project", "--project")
     files: dict[str, str] = writer.project_files(task.choice, task.target, task.settings, task.naming)
     if not output.check:
         writer.refuse_changed(output.out or Path(), files, output.force)

@@ -39,7 +39,9 @@ class PlainCommand(TyperCommand):
         try:
             return super().invoke(ctx)
         except StrapgenError as error:
-            raise type(error)(_in_options(self, str(error))) from error
+            told = type(error)(_in_options(self, str(error)))
+            vars(told).update(vars(error))
+            raise told from error
 
 
 class PlainGroup(TyperGroup):

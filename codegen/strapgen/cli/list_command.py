@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.ir import checks
+from strapgen.registry import Titles
 
 if TYPE_CHECKING:
     from strapgen.results.report import Report
@@ -20,7 +21,7 @@ _Meanings = Mapping[str, str]
 #: The kinds of names, in the order in which they are listed.
 KINDS = (
     *("algorithms", "methods", "vectors", "kernels"),
-    *(kind for one in reversed(applications.built_in().values()) for kind in one.lists),
+    *(kind for one in reversed(registration.built_in().values()) for kind in one.lists),
     *("targets", "backends"),
 )
 
@@ -45,6 +46,8 @@ def list_names(
         kind = checks.choice(
             "kind", kind if kind in KINDS else f"{kind}s" if f"{kind}s" in KINDS else kind, KINDS
         )
+    for line in registration.broken():
+        typer.echo(f"strapgen: {line}", err=True)
     parts = _parts()
     shown = parts if kind is None else {kind: parts[kind]}
     short = dict(shown)
@@ -67,21 +70,19 @@ def _parts() -> dict[str, dict[str, str]]:
     }
     return {
         "algorithms": {**catalogue.ALGORITHMS, **installed},
-        "methods": dict(catalogue.METHODS),
+        "methods": {**catalogue.METHODS, **catalogue.INTEGRATORS.taken()},
         "vectors": {
             name: f"{vector.title}; methods {', '.join(vector.methods)}"
             for name, vector in catalogue.VECTORS.items()
         },
         "kernels": {
-            name: recipe.title for name, recipe in {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS}.items()
+            **Titles(catalogue.KERNELS),
+            **Titles(catalogue.LAYOUT_KERNELS),
+            **catalogue.KERNELS.taken(),
         },
-        **{
-            kind: applications.load(place)()
-            for one in reversed(applications.all_applications().values())
-            for kind, place in one.lists.items()
-        },
+        **registration.lists(),
         "targets": titles(),
-        "backends": {name: entry.title for name, entry in BACKENDS.items()},
+        "backends": {**Titles(BACKENDS), **BACKENDS.taken()},
     }
 
 

@@ -30,7 +30,9 @@ def choice(what: str, value: str, allowed: Iterable[str], also: str = "", sectio
     """Return `value` if it is one of `allowed`; `also` and `section` complete the message of a refusal."""
     names = allowed if isinstance(allowed, Container) else list(allowed)  # a mapping may know other names
     if not isinstance(value, str) or value not in names:
-        raise InputError(unknown(what, value, list(names), also, section))
+        error = InputError(unknown(what, value, list(names), also, section))
+        error.unknown_name = True
+        raise error
     return value
 
 

@@ -8,6 +8,9 @@ class StrapgenError(Exception):
 class InputError(StrapgenError, ValueError):
     """A name, number, shape or file that strapgen cannot use."""
 
+    #: Whether a name is not known; a package that cannot be used may have it.
+    unknown_name = False
+
 
 class InputTypeError(StrapgenError, TypeError):
     """A value of a type that strapgen cannot use."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from strapgen import applications
+from strapgen import registration
 
 
 class DescribedAlgorithms(NamedTuple):
@@ -20,4 +20,4 @@ class DescribedAlgorithms(NamedTuple):
 
 def described(name: Any) -> DescribedAlgorithms | None:
     """Return what runs an algorithm that another application describes; None for any other."""
-    return next((kind for kind in applications.extensions("lab.described") if kind.covers(name)), None)
+    return next((kind for kind in registration.extensions("lab.described") if kind.covers(name)), None)

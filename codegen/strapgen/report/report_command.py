@@ -72,10 +72,10 @@ class ReportRuns:
 
     def conditions(self) -> Conditions:
         """Return the motion, the sampling rate and the duration of the runs, checked."""
-        from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+        from strapgen.lab.motions.motion_names import MOTIONS
         from strapgen.report.conditions import Conditions
 
-        check_motion(self.motion, RUN_MOTIONS)
+        check_motion(self.motion, MOTIONS)
         if self.motion is None and self.settings:
             raise InputError("--set goes with --motion")
         numbers = {"sample_hz": self.sample_hz, "duration": self.duration}

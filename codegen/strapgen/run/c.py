@@ -14,7 +14,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
 from strapgen.run.evaluators import Array, Evaluator, Loop
-from strapgen.targets import BUILT_IN
+from strapgen.targets import TARGETS
 
 #: The types of floating-point targets in numpy.
 _TYPES: dict[str, np.dtype[Any]] = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
@@ -24,7 +24,7 @@ _GROUP = 16
 
 def real_type(target: str) -> np.dtype[Any]:
     """Return the type of the numbers that go in and out of the code of a target: doubles in fixed point."""
-    return _TYPES.get(BUILT_IN[target].number, np.dtype(np.float64))
+    return _TYPES.get(TARGETS[target].number, np.dtype(np.float64))
 
 
 @cache

@@ -12,7 +12,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Function, Sources
-from strapgen.targets import BUILT_IN
+from strapgen.targets import TARGETS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +23,8 @@ class _ProgramSources(Sources):
 
 
 def sources_of_program(program: Program, target: str, settings: Settings | None = None) -> Sources:
-    """Return what a back end runs of a program: generated text for a target of strapgen, else the program itself."""
-    if target in BUILT_IN:
+    """Return what a back end runs of a program: generated text where `target` is one, else the program itself."""
+    if target in TARGETS:
         return pipeline.generate(program, target, settings)
     return _ProgramSources(
         kernel=program.kernel,
@@ -42,7 +42,7 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
     """Return what a back end runs of a chosen kernel, from the cache, see `sources_of_program`."""
-    if target in BUILT_IN:
+    if target in TARGETS:
         return pipeline.compile(choice, target, settings)
     return sources_of_program(pipeline.program(choice), target)
 

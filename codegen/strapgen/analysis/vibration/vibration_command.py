@@ -313,7 +313,7 @@ def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
 
     if algorithm in names or algorithm.endswith(".py") or algorithm in loading.installed():
         return
-    if algorithm not in catalogue.RESERVED:
+    if algorithm not in catalogue.reserved():
         checks.choice("algorithm", algorithm, names, "a Python file")
     raise InputError(
         f"algorithm {algorithm!r} has no rate under vibration; allowed: {', '.join(names)}, or a Python file"

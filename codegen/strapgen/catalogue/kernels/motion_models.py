@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from strapgen.catalogue.kernels.kernel_names import MOTIONS as MOTION_PARAMETERS
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
-from strapgen.catalogue.names import MOTIONS as MOTION_PARAMETERS
 from strapgen.ir.signals import Signal
 from strapgen.kernel import rotations
 from strapgen.kernel.kernel import Kernel, KernelBuilder

@@ -1,16 +1,20 @@
-"""Entries of files of exact coefficients: keys, rationals, and the name that a title gives."""
+"""Reads what files of exact coefficients hold: keys, rationals, the name that a title gives; those of packages."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from fractions import Fraction
-from typing import Any
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from strapgen.catalogue.methods import coefficients
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.registry import Registry
+
+T = TypeVar("T")
 
 _FRACTION = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
 #: Most characters of a fraction; those of filters for a gyro are long.
@@ -93,3 +97,29 @@ def gyro(table: Any) -> GyroResponse | None:
         if not value:
             raise InputError(f"gyro {key} is 0; a number above 0 is needed")
     return GyroResponse(*values)
+
+
+class InstalledFiles(Mapping[str, T], Generic[T]):
+    """Coefficients in files of installed packages, by the names of the files; each is checked when it is used."""
+
+    def __init__(self, files: Registry[Path], read: Callable[[Path, str], T]) -> None:
+        self._files, self._read = files, read
+        self._known: dict[tuple[Path, int], T] = {}
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self:
+            raise KeyError(name)
+        path = self._files[name]
+        key = path, path.stat().st_mtime_ns
+        if key not in self._known:
+            self._known[key] = self._read(path, name)
+        return self._known[key]
+
+    def __contains__(self, name: object) -> bool:
+        return name not in self._files.own and name in self._files
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._files if name not in self._files.own)
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))

@@ -18,13 +18,14 @@ from typing import Any
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files
-from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, rational
+from strapgen.catalogue.methods.coefficient_files import InstalledFiles, band, entries, gyro, rational
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.ir.suggestions import counted
+from strapgen.registry import Merged, Registry, Titles
 
 #: Keys of a file, and those of them that are optional.
 KEYS = (
@@ -118,10 +119,10 @@ class ShapedConing:
 
 
 class _BuiltInShapes(Mapping[str, ShapedConing]):
-    """The coefficients of a folder by name; a file is read when it is first used."""
+    """The coefficients of strapgen by name; a file is read when it is first used."""
 
-    def __init__(self, folder: Path) -> None:
-        self._files = {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    def __init__(self, files: Mapping[str, Path]) -> None:
+        self._files = files
         self._shapes: dict[str, ShapedConing] = {}
 
     @cached_property
@@ -144,11 +145,18 @@ class _BuiltInShapes(Mapping[str, ShapedConing]):
         return len(self._files)
 
 
-_BUILT_IN = _BuiltInShapes(Path(__file__).resolve().parent / "coning_shapes")
+def _installed(path: Path, name: str) -> ShapedConing:
+    """Read the coefficients of an installed package, which have the name of their file."""
+    return replace(read(path), name=name, file="")
 
-#: The coefficients that come with the package, by name, and their titles.
-SHAPES: Mapping[str, ShapedConing] = _BUILT_IN
-SHAPE_TITLES: Mapping[str, str] = _BUILT_IN.titles
+
+_FILES = Registry("coning_shapes", Path)
+_BUILT_IN = _BuiltInShapes(_FILES.own)
+_INSTALLED = InstalledFiles(_FILES, _installed)
+
+#: The coefficients of strapgen and of installed packages, by name, and their titles.
+SHAPES: Merged[ShapedConing] = Merged(_BUILT_IN, _INSTALLED)
+SHAPE_TITLES: Mapping[str, str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
 
 
 def named_shape(method: Any) -> ShapedConing | None:
@@ -187,7 +195,7 @@ def read(path: str | Path) -> ShapedConing:
     try:
         coefficient_files.check_keys(data, KEYS, OPTIONAL)
         name = coefficient_files.slug(data["name"])
-        if name in SHAPES or name in WINDOWS:
+        if name in _BUILT_IN or name in WINDOWS:
             raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
         shape = _shape(data, name)
         verify(shape)

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
-from strapgen.catalogue.methods.coefficient_files import entries
+from strapgen.catalogue.methods.coefficient_files import InstalledFiles, entries
 from strapgen.catalogue.methods.coefficients import short_text
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.suggestions import counted, needed
+from strapgen.registry import Merged, Registry, Titles
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.coefficients import Number
@@ -42,7 +43,7 @@ MOST_BYTES = 200_000
 
 
 class _BuiltIn(Mapping[str, Tableau]):
-    """The tableaux of a folder by name; each file is read when its tableau is first used.
+    """The tableaux of strapgen by name; each file is read when its tableau is first used.
 
     They are sorted by order, with those of the thesis first within an order. Tests verify the files.
     """
@@ -52,14 +53,14 @@ class _BuiltIn(Mapping[str, Tableau]):
     def _in_words(self) -> str:
         return ", ".join(self)
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, files: Mapping[str, Path]) -> None:
+        self._files = files
         self._tableaux: dict[str, Tableau] = {}
 
     @cached_property
     def titles(self) -> dict[str, str]:
         """Names in the literature, by name; no coefficient is read for them."""
-        files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in self._folder.glob("*.toml")}
+        files = {name: tomllib.loads(path.read_text("utf-8")) for name, path in self._files.items()}
 
         def place(name: str) -> tuple[int, bool, int, str]:
             return files[name]["order"], not name.startswith("rk"), len(files[name]["nodes"]), name
@@ -70,8 +71,8 @@ class _BuiltIn(Mapping[str, Tableau]):
         if name not in self._tableaux:
             if name not in self.titles:
                 raise KeyError(name)
-            path = self._folder / f"{name}.toml"
-            self._tableaux[name] = _tableau(tomllib.loads(path.read_text("utf-8")), name)
+            text = self._files[name].read_text("utf-8")
+            self._tableaux[name] = _tableau(tomllib.loads(text), name)
         return self._tableaux[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -81,13 +82,20 @@ class _BuiltIn(Mapping[str, Tableau]):
         return len(self.titles)
 
 
-_BUILT_IN = _BuiltIn(Path(__file__).resolve().parent / "butcher_tableaux")
+def _installed(path: Path, name: str) -> Tableau:
+    """Read the tableau of an installed package, which has the name of its file."""
+    return replace(read(path), name=name, file="")
 
-#: The tableaux that come with the package, by name.
-TABLEAUX: Mapping[str, Tableau] = _BUILT_IN
+
+_FILES = Registry("tableaux", Path)
+_BUILT_IN = _BuiltIn(_FILES.own)
+_INSTALLED = InstalledFiles(_FILES, _installed)
+
+#: The tableaux of strapgen and of installed packages, by name.
+TABLEAUX: Merged[Tableau] = Merged(_BUILT_IN, _INSTALLED)
 
 #: Their names in the literature.
-TITLES: Mapping[str, str] = _BUILT_IN.titles
+TITLES: Mapping[str, str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
 
 
 def read(path: str | Path) -> Tableau:
@@ -123,7 +131,7 @@ def from_data(data: Mapping[str, Any], file: str = "") -> Tableau:
     """Return the tableau of a file's content, checked; errors are those of `read`."""
     _check_keys(data)
     name = coefficient_files.slug(data["name"])
-    if name in TABLEAUX:
+    if name in _BUILT_IN:
         raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
     tableau = replace(_tableau(data, name), file=file)
     verify(tableau)

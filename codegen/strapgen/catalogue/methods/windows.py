@@ -16,13 +16,21 @@ from typing import Any
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, window_conditions
-from strapgen.catalogue.methods.coefficient_files import band, entries, gyro, not_negative, rational
+from strapgen.catalogue.methods.coefficient_files import (
+    InstalledFiles,
+    band,
+    entries,
+    gyro,
+    not_negative,
+    rational,
+)
 from strapgen.catalogue.methods.coefficients import short_text
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.suggestions import counted
+from strapgen.registry import Merged, Registry, Titles
 
 #: Keys of a file, and those of them that are optional.
 KEYS = (
@@ -49,7 +57,7 @@ MOST_BYTES = 4_000_000
 
 
 class _BuiltInWindows(Mapping[str, Window]):
-    """The windows of a folder by name, each family followed by its one-sided filters; a file is read when first used.
+    """The windows of strapgen by name, each family followed by its one-sided filters; a file is read when first used.
 
     A file is called window-P-L, so that the names are known without reading it.
     """
@@ -59,16 +67,14 @@ class _BuiltInWindows(Mapping[str, Window]):
     def _in_words(self) -> str:
         return ", ".join(self.titles)
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, files: Mapping[str, Path]) -> None:
+        self._files = files
         self._windows: dict[str, Window] = {}
 
     @cached_property
     def families(self) -> dict[str, str]:
         """The name of the family of every window, by name."""
-        sizes = [
-            (int(p), int(a)) for p, a in (path.stem.split("-")[1:] for path in self._folder.glob("*.toml"))
-        ]
+        sizes = [(int(p), int(a)) for p, a in (name.split("-")[1:] for name in self._files)]
         return {
             f"window-{before}-{after}": f"window-{previous}-{ahead}"
             for previous, ahead in sorted(sizes)
@@ -80,15 +86,14 @@ class _BuiltInWindows(Mapping[str, Window]):
         """The titles of the families, by name; no filter is read for them."""
         titles = {}
         for name in dict.fromkeys(self.families.values()):
-            head, _, _ = (self._folder / f"{name}.toml").read_text("utf-8").partition("\nfilters")
+            head, _, _ = self._files[name].read_text("utf-8").partition("\nfilters")
             titles[name] = str(tomllib.loads(head)["name"])
         return titles
 
     def __getitem__(self, name: str) -> Window:
         if name not in self._windows:
             family = self.families[name]
-            path = self._folder / f"{family}.toml"
-            window = _family(tomllib.loads(path.read_text("utf-8")), family)
+            window = _family(tomllib.loads(self._files[family].read_text("utf-8")), family)
             self._windows |= {one.name: one for one in (window, *window.one_sided)}
         return self._windows[name]
 
@@ -129,20 +134,27 @@ def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]
     return sizes[:ahead] if ideal and previous == ahead else sizes
 
 
-_BUILT_IN = _BuiltInWindows(Path(__file__).resolve().parent / "window_filters")
+def _installed(path: Path, name: str) -> Window:
+    """Read the family of an installed package, which has the name of its file."""
+    return _read(path, name)
 
-#: The windows that come with the package, by name.
-WINDOWS: Mapping[str, Window] = _BUILT_IN
+
+_FILES = Registry("windows", Path)
+_BUILT_IN = _BuiltInWindows(_FILES.own)
+_INSTALLED = InstalledFiles(_FILES, _installed)
+
+#: The windows of strapgen and of installed packages, by name.
+WINDOWS: Merged[Window] = Merged(_BUILT_IN, _INSTALLED)
 
 #: The titles of their families.
-WINDOW_TITLES: Mapping[str, str] = _BUILT_IN.titles
+WINDOW_TITLES: Mapping[str, str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
 
 #: Ending of the name of a window whose rotation is exact, and the terms of its power series.
 EXACT, EXACT_TERMS = "-exact", 16
 
 
-def named_window(method: str | Window) -> Window | None:
-    """Return the window that a method is or names; None for the name of any other method.
+def named_window(method: str | Window, among: Mapping[str, Window] = WINDOWS) -> Window | None:
+    """Return the window that a method is or names among some; None for the name of any other method.
 
     >>> named_window("window-7-7-exact").rotation, named_window("rk4")
     ('exact', None)
@@ -150,9 +162,9 @@ def named_window(method: str | Window) -> Window | None:
     if isinstance(method, Window):
         return method
     name = method.removesuffix(EXACT)
-    if name not in WINDOWS:
+    if name not in among:
         return None
-    return WINDOWS[name] if name == method else with_exact_rotation(WINDOWS[name])
+    return among[name] if name == method else with_exact_rotation(among[name])
 
 
 def with_exact_rotation(window: Window) -> Window:
@@ -183,21 +195,27 @@ def read(path: str | Path) -> Window:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
-    data = toml_files.content(path, "a family of filters", MOST_BYTES)
-    try:
-        coefficient_files.check_keys(data, KEYS, OPTIONAL)
-        name = coefficient_files.slug(data["name"])
-        if name in WINDOWS:
-            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
-        window = _family(data, name)
-        verify(window)
-        file = checks.text("the name of the file", str(path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    window = _read(path)
+    file = checks.text("the name of the file", str(path))
     one_sided, start = (
         tuple(replace(one, file=file) for one in some) for some in (window.one_sided, window.start)
     )
     return replace(window, file=file, one_sided=one_sided, start=start)
+
+
+def _read(path: str | Path, name: str = "") -> Window:
+    """Return the family of a file under its own name or another one."""
+    data = toml_files.content(path, "a family of filters", MOST_BYTES)
+    try:
+        coefficient_files.check_keys(data, KEYS, OPTIONAL)
+        name = name or coefficient_files.slug(data["name"])
+        if name in _BUILT_IN:
+            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
+        window = _family(data, name)
+        verify(window)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return window
 
 
 def verify(window: Window) -> None:

@@ -11,7 +11,7 @@ import sympy as sp
 
 from strapgen.catalogue.derivation import companion as derived_companion
 from strapgen.catalogue.methods.samples import beside
-from strapgen.catalogue.names import RESERVED
+from strapgen.catalogue.names import reserved
 from strapgen.ir import checks
 from strapgen.ir.attitude_step import Companions, Order
 from strapgen.ir.exceptions import InputError
@@ -44,7 +44,7 @@ def require(kernel: Kernel) -> None:
     _require_unknowns(kernel)
     for each in (kernel, *kernel.own):
         _require_names(each)
-        _require_functions(each, {*RESERVED, *names})
+        _require_functions(each, {*reserved(), *names})
         _require_texts(each)
         _require_formulas(each)
     if repeated := next((name for name in names if names.count(name) > 1), None):
@@ -53,7 +53,7 @@ def require(kernel: Kernel) -> None:
         )
     _require_step(kernel)
     for role, name in _companions(kernel):
-        if name not in names[1:] and name not in RESERVED:
+        if name not in names[1:] and name not in reserved():
             _refuse(kernel, f"its {role} {name!r} is neither in the catalogue nor its own")
         _require_shapes(kernel, role, derived_companion(kernel, name))
 
@@ -68,7 +68,7 @@ def _require_names(kernel: Kernel) -> None:
         raise InputError(
             f"kernel {name!r} has no name for generated code; a-z, 0-9 and hyphens between them are allowed"
         )
-    if name in RESERVED or re.match(
+    if name in reserved() or re.match(
         r"(dcm|euler|cayley-klein)-.*-(\d+|rates)(-previous\d+)?(-ahead\d+)?$", name
     ):
         raise InputError(

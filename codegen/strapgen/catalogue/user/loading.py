@@ -95,9 +95,11 @@ def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Use
 
 @contextlib.contextmanager
 def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isolation.Record]:
-    """Begin a session; the modules that strapgen needs in it are imported before."""
+    """Begin a session; the modules and the names that strapgen needs in it are read before."""
+    from strapgen.catalogue.names import reserved
     from strapgen.catalogue.user import admission  # noqa: F401
 
+    reserved()
     with isolation.session(folder, anew) as record:
         yield record
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
+from strapgen.catalogue.kernels.kernel_names import EXACT_DEGREES, LEGENDRE_DEGREES
 from strapgen.catalogue.methods import window_conditions
 from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.catalogue.methods.windows import EXACT_TERMS
-from strapgen.catalogue.names import EXACT_DEGREES, LEGENDRE_DEGREES
 from strapgen.design.commit_late import lost_samples
 from strapgen.design.commit_late.lost_samples import REACH, Restoration
 from strapgen.ir.exceptions import InputError

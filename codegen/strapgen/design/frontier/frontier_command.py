@@ -123,9 +123,9 @@ def frontier(
 def _motions(name: str | None, settings: list[str] | None) -> Motions:
     """Return the motion of the options by its name; those of the study without one."""
     from strapgen.design.frontier import frontier as study
-    from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+    from strapgen.lab.motions.motion_names import MOTIONS
 
-    check_motion(name, RUN_MOTIONS)
+    check_motion(name, MOTIONS)
     if name is None and settings:
         raise InputError("--set goes with --motion")
     return study.MOTIONS if name is None else {name: (name, pairs(settings or []))}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from strapgen import applications, catalogue
+from strapgen import catalogue, registration
 from strapgen.catalogue import METHODS, Choice
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.catalogue.methods.window import GyroResponse
@@ -119,7 +119,7 @@ def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[C
         if method not in _REFERENCES and not _is_long_taylor(method)
         for samples in _SAMPLES.get(method) or [_own_samples(method)]
     ]
-    if any(applications.extensions("design.two-speed")):
+    if any(registration.extensions("design.two-speed")):
         several += [Contender(TWO_SPEED, cycles) for cycles in _CYCLES]
     if isinstance(brief.environment, SpectralEnvironment) and _has_coning(brief.environment):
         several += [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.design.brief import DesignBrief
 from strapgen.design.selection.algorithm import Algorithm, AttitudeStep
 from strapgen.design.selection.candidates import TWO_SPEED, Contender
@@ -28,7 +28,7 @@ def algorithm_of(contender: Contender, state: str, brief: DesignBrief, path: str
         If the state has no such step.
     """
     if contender.method == TWO_SPEED:
-        loops: Algorithm = applications.extension("design.two-speed", f"method {TWO_SPEED}")(
+        loops: Algorithm = registration.extension("design.two-speed", f"method {TWO_SPEED}")(
             state, contender.increments, brief
         )
         return loops

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from strapgen import applications, pipeline
+from strapgen import pipeline, registration
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design.brief import DesignBrief
 from strapgen.design.coning import coning_file
@@ -51,7 +51,7 @@ def firmware_files(
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         choice = replace(choice, method=replace(choice.method, file=COEFFICIENTS))
     files = dict(pipeline.compile(choice, "c-fixed", settings).step_files)
-    files |= applications.extension("generate.project", "--out").project_files(choice, "c-fixed", settings)
+    files |= registration.extension("generate.project", "--out").project_files(choice, "c-fixed", settings)
     if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
         files[COEFFICIENTS] = coning_file.written(choice.method, command)
     return files | {REPORT: report}

@@ -203,10 +203,10 @@ def _kind(annotation: Any) -> Any:
 
 def _require_named(algorithm: str, algorithms: Iterable[str]) -> None:
     """Refuse a user's algorithm, which runs as a program, unless the command line names it too."""
-    from strapgen.catalogue.names import RESERVED
+    from strapgen.catalogue.names import reserved
     from strapgen.catalogue.user import loading
 
-    if algorithm in RESERVED or not (algorithm.endswith(".py") or algorithm in loading.installed()):
+    if algorithm in reserved() or not (algorithm.endswith(".py") or algorithm in loading.installed()):
         return
     if not any(algorithm == name or _same(algorithm, name) for name in algorithms):
         raise InputError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import (
@@ -160,7 +160,7 @@ def _of_files(requests: Mapping[Path, Request], choice: Choice, run_differing: b
 
 def _source_files() -> Any:
     """Return what reads generated files."""
-    return applications.extension("lab.source-files", "--source")
+    return registration.extension("lab.source-files", "--source")
 
 
 def _fail_above(kernels: list[ComparedKernel], most: float | None, said: str) -> None:

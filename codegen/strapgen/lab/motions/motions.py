@@ -7,6 +7,7 @@ a closed form is integrated, see `reference_attitudes`.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -15,27 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen import catalogue
+from strapgen import registration
 from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.parameters import parameters as settings_of
-from strapgen.lab.motions.rate_profiles import PROFILES, RUN_MOTIONS, RateProfile
+from strapgen.lab.motions.motion_names import MOTIONS, MotionEntry
+from strapgen.lab.motions.rate_profiles import RateProfile
 from strapgen.lab.motions.reference_attitudes import ReferenceAttitude
+from strapgen.registry import Titles
 from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows
 
 Array = NDArray[np.float64]
 
-#: Motions that runs can have, and the unit of each of their parameters.
-MOTIONS = {**catalogue.MOTIONS, **RUN_MOTIONS}
-#: Parameters that can be left out as long as another one is set, by motion, and their values in SI units.
-_DEFAULTS: dict[str, dict[str, float]] = {
-    **{name: dict.fromkeys(catalogue.MOTIONS[name], 0.0) for name in ("constant", "polynomial")},
-    "cone": {"spin": 0.0},
-    "slew": {"rate": math.radians(300)},
-    "ramps": {"rate": math.radians(300)},
-    "vibration": {"gyro": math.inf},
-}
 #: Endings of the keys of a parameter by its unit, and the factor of each to SI units.
 _ENDINGS = {
     "rad/s": {"deg_s": math.radians(1), "rad_s": 1.0},
@@ -51,9 +45,14 @@ def keys(name: str) -> dict[str, dict[str, float]]:
     >>> sorted(keys("sinusoidal")["b"])
     ['b_deg_s', 'b_rad_s']
     """
-    parameters = MOTIONS[checks.choice("motion", name, MOTIONS)]
+    parameters = MOTIONS[checks.choice("motion", name, MOTIONS)].parameters
     if name == "polynomial":
         return {parameter: {parameter: math.radians(1)} for parameter in parameters}
+    for parameter, unit in parameters.items():
+        if unit not in _ENDINGS:
+            raise InputError(
+                f"motion {name}: unit of {parameter} is {unit!r}; allowed: {', '.join(_ENDINGS)}"
+            )
     return {
         p: {f"{p}_{ending}": factor for ending, factor in _ENDINGS[unit].items()}
         for p, unit in parameters.items()
@@ -62,7 +61,11 @@ def keys(name: str) -> dict[str, dict[str, float]]:
 
 def titles() -> dict[str, str]:
     """Return the motions by name, with the keys that set their parameters."""
-    return {name: ", ".join(" or ".join(choices) for choices in keys(name).values()) for name in MOTIONS}
+
+    def line(name: str, entry: MotionEntry) -> str:
+        return ", ".join(" or ".join(choices) for choices in keys(name).values())
+
+    return {**Titles(MOTIONS, line), **MOTIONS.taken()}
 
 
 @dataclass(frozen=True)
@@ -179,13 +182,16 @@ class IntegratedMotion(Motion):
     """
 
     @cached_property
-    def _profile(self) -> RateProfile:
-        return PROFILES[self.name](**self.parameters)
+    def profile(self) -> RateProfile:
+        """Its rate, and the integral of it."""
+        made = _made(self.name, self.parameters)
+        assert isinstance(made, RateProfile), "`motion` makes no other"
+        return made
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
         """Return exact angle increments of some sampling intervals, see `Motion.samples`."""
         edges = np.arange(first, stop + 1) * float(interval)
-        increments: Array = np.diff(self._profile.angle(edges), axis=0)
+        increments: Array = np.diff(self.profile.angle(edges), axis=0)
         return increments
 
     def attitude(self, time: Any) -> Array:
@@ -194,17 +200,29 @@ class IntegratedMotion(Motion):
 
     def rate(self, time: Any) -> Array:
         """Return the body rate, see `Motion.rate`."""
-        return self._profile.rate(time)
+        return self.profile.rate(time)
 
 
 @lru_cache(maxsize=16)
 def _reference(name: str, parameters: tuple[tuple[str, float], ...]) -> ReferenceAttitude:
     """Return the attitude of a motion, which all runs on it share."""
-    profile = PROFILES[name](**dict(parameters))
+    profile = IntegratedMotion(name, dict(parameters)).profile
     return ReferenceAttitude(profile.rate, profile.substeps)
 
 
-def _cone(half_angle: float, frequency: float, spin: float) -> Motion:
+def _made(name: str, parameters: Mapping[str, float]) -> Motion | RateProfile:
+    """Return what the function of a motion makes of parameters, which it refuses if it cannot use them."""
+    with MOTIONS.guarded(name, "define a motion"):
+        made = registration.load(MOTIONS[name].function)(**parameters)
+    if not isinstance(made, Motion | RateProfile):
+        raise InputError(
+            f"motion {name} ({MOTIONS[name].function}) returned {type(made).__name__}; a Motion, or a profile "
+            "with rate, angle and substeps is needed"
+        )
+    return made
+
+
+def cone(half_angle: float, frequency: float, spin: float) -> Motion:
     """Return the coning motion whose axis y goes round a cone while the body spins about it."""
     # Round the cone's axis y turns at b + spin; a and b + g are the components of that rate across y and along it.
     turning = 2 * math.pi * frequency
@@ -240,13 +258,11 @@ def motion(name: str, /, **settings: float | str | Fraction) -> Motion:
     >>> motion("coning", a_deg_s=10, b_rad_s=0.5, g_deg_s=0).parameters["b"]
     0.5
     """
-    parameters = settings_of(f"motion {name}", keys(name), settings, _DEFAULTS.get(name, {}))
-    if name == "cone":
-        return _cone(**parameters)
-    if name not in PROFILES:
+    parameters = settings_of(f"motion {name}", keys(name), settings, MOTIONS[name].defaults)
+    if not MOTIONS[name].function:
         return Motion(name, parameters)
-    PROFILES[name](**parameters)  # refuses parameters that it cannot use
-    return IntegratedMotion(name, parameters)
+    made = _made(name, parameters)
+    return made if isinstance(made, Motion) else IntegratedMotion(name, parameters)
 
 
 #: A motion whose rate changes direction and size, of about 1 rad/s: settings of coning.

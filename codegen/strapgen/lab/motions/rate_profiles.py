@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ _LINES = np.linspace(2, 30, 40)
 _LOWEST_BANDWIDTH = 1e-3
 
 
+@runtime_checkable
 class RateProfile(Protocol):
     """A body rate whose integral is in closed form."""
 
@@ -264,20 +265,3 @@ def _fractions(roots: tuple[int, ...], number: NDArray[np.int_]) -> Array:
     """Return the fractional parts of multiples of square roots, (3, K)."""
     fractions: Array = np.outer(np.sqrt(roots), number) % 1
     return fractions
-
-
-#: Motions without kernels, which only runs know, and the unit of each of their parameters.
-RUN_MOTIONS = {
-    "cone": {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
-    "random": {"rate": "rad/s"},
-    "slew": {"onset": "s", "rate": "rad/s"},
-    "ramps": {"onset": "s", "rate": "rad/s"},
-    "vibration": {"angle": "rad", "gyro": "Hz"},
-}
-#: The profiles by the name of their motion, as functions of its parameters in SI units.
-PROFILES: dict[str, Callable[..., RateProfile]] = {
-    "random": random_rate,
-    "slew": slew,
-    "ramps": ramps,
-    "vibration": vibration_rate,
-}

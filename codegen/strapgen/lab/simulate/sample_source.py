@@ -169,9 +169,9 @@ class SampleSource:
         felt = of_system or self.errors is not None
         if self.specific_force is not None and not (felt and self.motion is not None):
             raise InputError("--specific-force goes with a described system or --errors, and with --motion")
-        from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+        from strapgen.lab.motions.motion_names import MOTIONS
 
-        check_motion(self.motion, RUN_MOTIONS)
+        check_motion(self.motion, MOTIONS)
         sources = {
             "--motion": self.motion,
             "--increments-csv": self.increments_csv,
@@ -337,14 +337,14 @@ def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
             raise InputError(f"{name} goes with {owner}, not with {chosen}")
 
 
-def check_motion(name: str | None, further: Mapping[str, Any] | None = None) -> None:
-    """Check that a motion, if one is named, is of the catalogue or a file."""
+def check_motion(name: str | None, among: Mapping[str, Any] | None = None) -> None:
+    """Check that a motion, if one is named, is among some, by default those with a closed form, or a file."""
     from strapgen.ir import checks
 
     if name is not None and not is_file(name):
         from strapgen.catalogue import MOTIONS
 
-        checks.choice("motion", name, {**MOTIONS, **(further or {})})
+        checks.choice("motion", name, MOTIONS if among is None else among)
 
 
 def pairs(settings: list[str], option: str = "--set") -> dict[str, str]:

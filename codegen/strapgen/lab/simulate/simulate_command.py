@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm, one
@@ -185,7 +185,7 @@ def _on_recording(
     with waiting(f"running {backend.kernel}"):
         options = (intervals.orthonormalize, intervals.record, pulse)
         whole = (
-            one for one in applications.extensions("lab.whole-recordings") if one.covers(choice, backend.name)
+            one for one in registration.extensions("lab.whole-recordings") if one.covers(choice, backend.name)
         )
         if (runner := next(whole, None)) is not None:
             history = runner.propagate_whole(choice, backend.name, data, *options)

@@ -132,9 +132,9 @@ def word_length(
     from strapgen import catalogue
 
     checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
-    from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+    from strapgen.lab.motions.motion_names import MOTIONS
 
-    check_motion(motion, RUN_MOTIONS)
+    check_motion(motion, MOTIONS)
     count, cluster = workers.count(), workers.workers()
     if settings is None and motion != "coning" and not is_file(motion):
         raise InputError(f"--motion {motion} needs --set; strapgen list motions shows the keys")

@@ -41,7 +41,7 @@ def compared_system(
     refuse_options(methods, fixed, stated)
     output.check(name, *source.files)
     source.check(of_system=True)
-    from strapgen import applications
+    from strapgen import registration
     from strapgen.cli.progress import waiting
     from strapgen.lab.compare.file_counts import counted
     from strapgen.navigation.systems.system_comparison import compare_system
@@ -52,7 +52,7 @@ def compared_system(
     with waiting(f"running {name}"):
         runners = {}
         for path in files[0] or ():
-            reader = applications.extension("navigation.source-files", "--source")
+            reader = registration.extension("navigation.source-files", "--source")
             runners[path] = reader(path, description, [name], files[1])
         settings = counted(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
         of_files = {str(path): runner for path, (runner, _) in runners.items()}

@@ -12,7 +12,7 @@ from strapgen.navigation.systems.wiring import Description
 from strapgen.run.backends import fitted as fitted_settings
 from strapgen.run.kernel_sources import sources_of_choice
 from strapgen.run.registry import BACKENDS
-from strapgen.targets import BUILT_IN
+from strapgen.targets import TARGETS
 
 __all__ = ["SystemMemory", "SystemRun", "SystemRunner", "system_runner"]
 
@@ -40,9 +40,9 @@ def system_runner(
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     chosen = fitted_settings(backend, settings)
-    if entry.target not in BUILT_IN:
+    if entry.target not in TARGETS:
         sources = {name: sources_of_choice(c, entry.target) for name, c in description.choices.items()}
         return SystemRunner(Fitted(description, entry.target, None, sources), backend)
     fit = fitted(description, entry.target, chosen)
-    compiled = BUILT_IN[entry.target].compiled
+    compiled = TARGETS[entry.target].compiled
     return (CompiledSystem if compiled else SystemRunner)(fit, backend)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from strapgen import applications
+from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
@@ -58,7 +58,7 @@ def two_speed(
     sources = two_speed_sources.sources(*task)
     files = sources.files if output.with_runs else sources.step_files
     if output.project:
-        writer = applications.extension("two-speed.project", "--project")
+        writer = registration.extension("two-speed.project", "--project")
         added = writer.project_files(*task)
         if not output.check:
             writer.refuse_changed(output.out or Path(), added, output.force)

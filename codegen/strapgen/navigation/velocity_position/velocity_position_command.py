@@ -109,7 +109,7 @@ def study_velocity_position(
     --force oscillation --force-set swing_y_g=1 frequency_hz=10 z_g=1 --backend c
     """
     output.check()
-    from strapgen.lab.motions.rate_profiles import RUN_MOTIONS
+    from strapgen.lab.motions.motion_names import MOTIONS
     from strapgen.lab.motions.specific_forces import force
     from strapgen.lab.motions.users_motions import any_motion
     from strapgen.navigation.velocity_position import velocity_position_study as experiment
@@ -121,7 +121,7 @@ def study_velocity_position(
 
     one("--backend", backend)
     checks.choice("backend", backend, BACKENDS)
-    check_motion(flight.motion, RUN_MOTIONS)
+    check_motion(flight.motion, MOTIONS)
     motion_settings, force_settings = flight.stated()
     several = experiment.candidates(experiment.DEFAULT if methods is None else listed("--method", methods))
     course = experiment.Flight(

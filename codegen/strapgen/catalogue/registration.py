@@ -1,0 +1,14 @@
+"""What the folder brings."""
+
+from __future__ import annotations
+
+from strapgen.registration import Registration
+
+REGISTRATION = Registration(
+    "the algorithms: steps, methods and kernels",
+    kernels=(f"{__package__}.kernels.kernel_names:KERNELS",),
+    methods=(f"{__package__}.methods.integrators:INTEGRATORS",),
+    tableaux=(f"{__package__}.methods:butcher_tableaux",),
+    windows=(f"{__package__}.methods:window_filters",),
+    coning_shapes=(f"{__package__}.methods:coning_shapes",),
+)

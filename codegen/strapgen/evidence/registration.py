@@ -1,0 +1,13 @@
+"""What the folder brings."""
+
+from __future__ import annotations
+
+from strapgen.registration import Command, Registration
+
+REGISTRATION = Registration(
+    "verification of generated C with independent tools",
+    commands={
+        "evidence": Command(f"{__package__}.evidence_command:evidence", "Generate"),
+    },
+    requires=("lab", "navigation", "firmware"),
+)

@@ -1,0 +1,21 @@
+"""What the folder brings."""
+
+from __future__ import annotations
+
+from strapgen.registration import Command, Registration
+
+REGISTRATION = Registration(
+    "test vectors, projects, verification of files, checks of code by others",
+    commands={
+        "vectors": Command(f"{__package__}.vectors.vectors_command:vectors", "Generate"),
+        "verify": Command(f"{__package__}.verify.verify_command:verify", "Generate"),
+        "check": Command(f"{__package__}.check_code.check_command:check", "Analyse"),
+    },
+    extensions={
+        "generate.project": f"{__package__}.project:project",
+        "lab.source-files": f"{__package__}.verify:source_files",
+        "navigation.source-files": f"{__package__}.verify.system_files:runner_of_file",
+        "two-speed.project": f"{__package__}.project:two_speed_project",
+    },
+    requires=("lab", "navigation", "design"),
+)

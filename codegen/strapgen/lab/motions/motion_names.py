@@ -1,0 +1,56 @@
+"""The motions by name, as plain data: what sets a motion, and the function that makes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from strapgen import catalogue
+from strapgen.registry import Registry
+
+_PROFILES = f"{__package__}.rate_profiles"
+
+
+class MotionEntry(NamedTuple):
+    """A motion of the table.
+
+    Parameters
+    ----------
+    parameters : mapping of str to str
+        Its parameters and the unit of each: "rad/s", "rad", "s" or "Hz".
+    function : str
+        "module:function": takes the parameters in SI units by name, and returns the `RateProfile` of the motion, or the
+        motion itself. "" for a motion in closed form, which the kernels NAME-truth and NAME-increments compute.
+    defaults : mapping of str to float
+        Parameters in SI units that can be left out as long as another one is set.
+    """
+
+    parameters: Mapping[str, str]
+    function: str = ""
+    defaults: Mapping[str, float] = {}
+
+
+#: The motions of strapgen: those in closed form, then those that only runs know.
+TABLE = {
+    **{
+        name: MotionEntry(
+            units, defaults=dict.fromkeys(units, 0.0) if name in ("constant", "polynomial") else {}
+        )
+        for name, units in catalogue.MOTIONS.items()
+    },
+    "cone": MotionEntry(
+        {"half_angle": "rad", "frequency": "Hz", "spin": "rad/s"},
+        f"{__package__}.motions:cone",
+        {"spin": 0.0},
+    ),
+    "random": MotionEntry({"rate": "rad/s"}, f"{_PROFILES}:random_rate"),
+    "slew": MotionEntry({"onset": "s", "rate": "rad/s"}, f"{_PROFILES}:slew", {"rate": math.radians(300)}),
+    "ramps": MotionEntry({"onset": "s", "rate": "rad/s"}, f"{_PROFILES}:ramps", {"rate": math.radians(300)}),
+    "vibration": MotionEntry(
+        {"angle": "rad", "gyro": "Hz"}, f"{_PROFILES}:vibration_rate", {"gyro": math.inf}
+    ),
+}
+
+#: Motions that runs can have, by name.
+MOTIONS = Registry("motions", MotionEntry)

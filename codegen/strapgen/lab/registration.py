@@ -1,0 +1,22 @@
+"""What the folder brings."""
+
+from __future__ import annotations
+
+from strapgen.registration import Command, Registration
+
+REGISTRATION = Registration(
+    "runs against truth: simulation, comparison, convergence, recordings, sensor errors, cost",
+    commands={
+        "simulate": Command(f"{__package__}.simulate.simulate_command:simulate", "Run"),
+        "compare": Command(f"{__package__}.compare.compare_command:compare", "Run"),
+        "converge": Command(f"{__package__}.converge.converge_command:converge", "Analyse"),
+        "cost": Command(f"{__package__}.cost.cost_command:cost", "Analyse"),
+        "study": Command(f"{__package__}.word_length.study_command:app", "Reproduce"),
+        "study sensor-errors": Command(
+            f"{__package__}.sensor_error_study.sensor_errors_command:study_sensor_errors"
+        ),
+        "study monte-carlo": Command(f"{__package__}.monte_carlo.monte_carlo_command:study_monte_carlo"),
+    },
+    motions=(f"{__package__}.motions.motion_names:TABLE",),
+    lists={"motions": f"{__package__}.motions.motions:titles"},
+)

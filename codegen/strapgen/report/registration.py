@@ -1,0 +1,13 @@
+"""What the folder brings."""
+
+from __future__ import annotations
+
+from strapgen.registration import Command, Registration
+
+REGISTRATION = Registration(
+    "a report on an algorithm as one file",
+    commands={
+        "report": Command(f"{__package__}.report_command:report", "Analyse"),
+    },
+    requires=("lab", "design", "evidence", "thesis"),
+)

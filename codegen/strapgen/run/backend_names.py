@@ -1,0 +1,96 @@
+"""The back ends by name, as plain data: listing them imports none of their classes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from strapgen.targets import TARGETS
+
+
+class Entry(NamedTuple):
+    """A back end of the table.
+
+    Parameters
+    ----------
+    title : str
+        One line that says what it is.
+    target : str
+        The target whose text it runs; a name that is no target where it runs the program itself.
+    evaluator : str
+        The class that runs a kernel, and the loop over its steps, "module:name".
+    word : int or None
+        Bits of a word in fixed point; None where the user chooses them, or in floating point.
+    slow : bool
+        Whether Python executes every single operation. A run on all back ends leaves such a one out by default.
+    many_digits : bool
+        Whether it computes in so many digits that rounding cannot be seen; the class then has methods that return them.
+    by_default : bool
+        Whether a run on all back ends takes it by default; not those that compute the bits of another back end.
+    """
+
+    title: str
+    target: str
+    evaluator: str
+    word: int | None = None
+    slow: bool = False
+    many_digits: bool = False
+    by_default: bool = True
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it computes in fixed point, and so takes settings."""
+        target = TARGETS.get(self.target)
+        return target is not None and target.fixed
+
+
+_C = f"{__package__}.c:CEvaluator"
+
+#: Back ends by name.
+BACKENDS = {
+    "numpy": Entry(
+        "generated numpy code in double",
+        "numpy",
+        f"{__package__}.numpy_evaluator:NumpyEvaluator",
+    ),
+    "c": Entry("generated C in double, compiled", "c", _C),
+    "c-float": Entry("generated C in float, compiled", "c-float", _C),
+    "c-fixed32": Entry("generated C in 32-bit fixed point, compiled", "c-fixed", _C, word=32),
+    "c-fixed16": Entry("generated C in 16-bit fixed point, compiled", "c-fixed", _C, word=16),
+    "cpp": Entry("generated C++ in double, compiled", "cpp", _C, by_default=False),
+    "cpp-float": Entry("generated C++ in float, compiled", "cpp-float", _C, by_default=False),
+    "cpp-fixed32": Entry(
+        "generated C++ in 32-bit fixed point, compiled",
+        "cpp-fixed",
+        _C,
+        word=32,
+        by_default=False,
+    ),
+    "rust": Entry("generated Rust in double, compiled", "rust", _C, by_default=False),
+    "rust-float": Entry("generated Rust in float, compiled", "rust-float", _C, by_default=False),
+    "rust-fixed32": Entry(
+        "generated Rust in 32-bit fixed point, compiled",
+        "rust-fixed",
+        _C,
+        word=32,
+        by_default=False,
+    ),
+    "octave": Entry(
+        "generated MATLAB in double, run by GNU Octave",
+        "matlab",
+        f"{__package__}.octave:OctaveEvaluator",
+        by_default=False,
+    ),
+    "fixed-model": Entry(
+        "integer model of the fixed-point C in Python, any word",
+        "fixed-model",
+        f"{__package__}.fixed:ModelEvaluator",
+        slow=True,
+    ),
+    "exact": Entry(
+        "arithmetic of 40 digits in Python, rounded to double at the end",
+        "exact",
+        f"{__package__}.exact:ExactEvaluator",
+        slow=True,
+        many_digits=True,
+    ),
+}
