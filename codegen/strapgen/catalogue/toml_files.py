@@ -14,7 +14,7 @@ from strapgen.ir.exceptions import InputError
 def content(
     path: str | Path, what: str, most_bytes: int, parse_float: Callable[[str], Any] = float
 ) -> dict[str, Any]:
-    """Return the content of a TOML file of at most `most_bytes`; `what` it holds and `parse_float` as for tomllib."""
+    """Return the content of a TOML file of at most `most_bytes`; error messages say `what` it holds."""
     place = checks.path("path", path)
     try:
         with place.open("rb") as file:

@@ -18,12 +18,8 @@ _KEYWORD = Parameter.KEYWORD_ONLY
 class Shown(NamedTuple):
     """The options of a group that a command has, in the annotation of the command's parameter."""
 
-    only: tuple[
-        str, ...
-    ] = ()  # fields, in the order of the help; the others keep their defaults. Empty for all
-    before: str = (
-        ""  # field or parameter before which the help shows these; empty for the place of the parameter
-    )
+    only: tuple[str, ...] = ()  # fields in the order of the help, others keep their defaults; () for all
+    before: str = ""  # the field or parameter that the help shows after these; "" for the parameter's place
 
 
 def grouped(command: Command) -> Command:

@@ -20,12 +20,8 @@ class Report:
 
     text: Callable[[], str]
     data: Callable[[], Any]  # of plain JSON
-    table: Callable[[], TextTable] | None = (
-        None  # for comma-separated values and Markdown; None for what is no table
-    )
-    markdown: Callable[[], TextTable] | None = (
-        None  # another table for Markdown, with the columns of the text
-    )
+    table: Callable[[], TextTable] | None = None  # for comma-separated values, and for Markdown
+    markdown: Callable[[], TextTable] | None = None  # for Markdown, with the columns of the text
     latex: Callable[[], str] | None = None  # by default the table of Markdown, if there is one
     indented: bool = True  # whether an object of JSON has a line for each of its parts
 

@@ -48,9 +48,7 @@ class Column:
     least: int = 0  # width in characters
     gap: int = 2  # spaces before the column
     missing: str = "-"  # for None
-    group: str = (
-        ""  # title above neighbouring columns of the same group, in their middle; aligned above a single one
-    )
+    group: str = ""  # title above neighbouring columns of the same group; centred above several
 
     def cell(self, value: Any) -> str:
         """Return a value as text of the column."""
@@ -64,9 +62,7 @@ class TextTable:
     """Rows of values under columns."""
 
     columns: Sequence[Column]
-    rows: Sequence[
-        Sequence[Any]
-    ]  # text stays as it is, a number has the format of its column, None is missing
+    rows: Sequence[Sequence[Any]]  # text as it is, a number in the format of its column, None if missing
 
     def lines(self, indent: str = "") -> list[str]:
         """Return the table as lines of text, each column as wide as its widest cell."""

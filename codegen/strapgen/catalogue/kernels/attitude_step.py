@@ -22,8 +22,8 @@ def step(
 ) -> Kernel:
     """Derive a step from angle increments, or from rates times the step at nodes if `increments` is None, all in rad.
 
-    The method is applied to the identity, which gives the transition: the step is linear in the state. The step length
-    cancels, since increments and rates differ by it alone.
+    The method is applied to the identity, which gives the transition: the step is linear in the state. The
+    step length cancels, since increments and rates differ by it alone.
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)

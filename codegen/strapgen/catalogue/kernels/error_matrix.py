@@ -12,8 +12,8 @@ from strapgen.kernel.kernel import Kernel, KernelBuilder
 def error_matrix() -> Kernel:
     """Derive E = C_computed C_true' - I and its parts, reference axes, in rad.
 
-    Scale is the diagonal, skew the symmetric part off the diagonal, and drift the skew-symmetric part. If C_computed =
-    exp(skew(eps)) C_true, the drift is -eps to first order.
+    Scale is the diagonal, skew the symmetric part off the diagonal, and drift the skew-symmetric part. If
+    C_computed = exp(skew(eps)) C_true, the drift is -eps to first order.
     """
     build = KernelBuilder()
     computed = build.input(

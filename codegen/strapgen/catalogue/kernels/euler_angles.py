@@ -81,9 +81,9 @@ def followed_angles(
 def euler_angles_from_dcm() -> Kernel:
     """Derive the Euler angles of a direction cosine matrix, equations (61) to (63).
 
-    Equation (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of heading
-    - roll. It is used at steep pitch, so that heading - roll (or their sum) is as accurate as the matrix even where
-    neither angle is by itself. If the pitch is vertical to the last digit, roll does not change.
+    Equation (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of
+    heading - roll. It is used at steep pitch, so that heading - roll (or their sum) is as accurate as the matrix even
+    where neither angle is by itself. If the pitch is vertical to the last digit, roll does not change.
     """
     build = KernelBuilder()
     C = build.input(replace(DCM.state, frame=ANY))

@@ -81,7 +81,7 @@ def jacobians(name: str, method: Method, counts: tuple[int, int, int]) -> Kernel
 
 
 def error_state(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:
-    """Derive the propagation of a small attitude error through a step, and what errors of K increments add: F, R, L.
+    """Derive the matrices F, R, L by which attitude errors, and errors of K increments, go through a step.
 
     With the right error r, C_true = C (I + [r x]) in body axes, r+ = A^T r + R e for errors e (3 K,) of the increments,
     where A turns from the body axes at the end of the step to those at its start and F = A^T. With the left error l,
@@ -120,9 +120,7 @@ class _Turn:
 
     kinematics: Kinematics
     value: sp.Matrix  # the transition
-    parts: Sequence[
-        sp.Matrix
-    ]  # its derivatives along some directions, which take the state before they are summed
+    parts: Sequence[sp.Matrix]  # its derivatives along directions; they take the state before they are summed
     sums: Sequence[Sequence[sp.Expr]]  # weights of these directions, for every element of the increments
     build: KernelBuilder
 

@@ -26,12 +26,9 @@ class MotionModel:
     name: str
     title: str
     rate: Formula  # rate(t, *parameters) in rad/s, body axes
-    increment: (
-        Formula  # increment(m, d, *parameters), the integral of the rate over [m - d/2, m + d/2] in rad
-    )
-    attitude: (
-        Formula  # attitude(t, *parameters), direction cosine matrix, body to reference; the identity at t = 0
-    )
+    increment: Formula  # increment(m, d, *parameters), integral of the rate over [m - d/2, m + d/2] in rad
+    #: attitude(t, *parameters), direction cosine matrix, body to reference; the identity at t = 0
+    attitude: Formula
     #: turning(*parameters), the constant vector n in rad/s about which a rate of constant length rotates uniformly: the
     #: body rate is that of time 0 rotated by -n t, and the attitude is the rotation by (rate at time 0 + n) t times the
     #: rotation by -n t. None for other motions.

@@ -85,8 +85,8 @@ def _symmetric(build: KernelBuilder, name: str, meaning: str, A: sp.Matrix) -> s
 def dcm_optimal() -> Kernel:
     """Derive the rotation nearest to the computed matrix, C (C'C)^(-1/2).
 
-    Let G = C'C and let i1, i2, i3 be the invariants of U = G^(1/2). The theorem of Cayley and Hamilton leads to U (G +
-    i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G follow from the
+    Let G = C'C and let i1, i2, i3 be the invariants of U = G^(1/2). The theorem of Cayley and Hamilton leads to
+    U (G + i2 I) = i1 G + i3 I, so the inverse root is (G + i2 I) (i1 G + i3 I)^-1. The eigenvalues of G follow from the
     trigonometric solution of the cubic, which atan2 makes regular at equal eigenvalues.
     """
     build = KernelBuilder()

@@ -29,7 +29,7 @@ def velocity_and_position(method: Method, increments: int, previous: int = 0, ah
 
 
 def jacobian(kernel: Kernel) -> Kernel:
-    """Derive ``<output>_by_<input>`` for every pair: a row for each element of the output, a column of the input.
+    """Derive ``<output>_by_<input>`` for every pair: rows are elements of the output, columns of the input.
 
     The expressions of the kernel must have derivatives everywhere.
     """

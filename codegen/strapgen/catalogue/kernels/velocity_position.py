@@ -1,11 +1,11 @@
 """Change of velocity and of position over a step, from the attitude step of the same method.
 
-Rigid motions are rotations in dual numbers a + b eps with eps^2 = 0 (Kotelnikov's principle of transference). Put w + f
-eps in place of the body rate w, with the specific force f: the step that turned by p turns by p + q eps, and v = 2 q p*
-is the integral of R f over the step, R the rotation since its beginning. So every method for the attitude has one for
-the velocity, of its order, and no formula is derived a second time. In the rotation vector phi the dual part is nu, the
-change of phi when the increments change by those of the velocity; then v = J(phi) nu with the left Jacobian J(phi) nu =
-nu + (1 - cos x)/x^2 phi x nu + (x - sin x)/x^3 phi x (phi x nu), x = |phi|.
+Rigid motions are rotations in dual numbers a + b eps with eps^2 = 0 (Kotelnikov's principle of transference). Put
+w + f eps in place of the body rate w, with the specific force f: the step that turned by p turns by p + q eps, and
+v = 2 q p* is the integral of R f over the step, R the rotation since its beginning. So every method for the attitude
+has one for the velocity, of its order, and no formula is derived a second time. In the rotation vector phi the dual
+part is nu, the change of phi when the increments change by those of the velocity; then v = J(phi) nu with the left
+Jacobian J(phi) nu = nu + (1 - cos x)/x^2 phi x nu + (x - sin x)/x^3 phi x (phi x nu), x = |phi|.
 
 The position changes by the integral of (1 - t) R f times the step: it is the velocity for the force (1 - t) f, whose
 samples are linear in those of f.

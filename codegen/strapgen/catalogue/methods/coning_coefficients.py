@@ -86,8 +86,8 @@ class _ResidualDrift:
 
     The rotation vector of the body is alpha (cos omega t, sin omega t, 0); samples are T apart, and lambda = omega T.
     Over a slow cycle of N samples the second-order term is alpha^2 (N lambda - sin(N lambda)) / 2 about the third axis.
-    The cross product of two samples m apart is 2 alpha^2 (1 - cos lambda) sin(m lambda). The drift in rad/s is alpha^2
-    / (N T) times the sum of c_m sin(m lambda), minus N lambda / 2.
+    The cross product of two samples m apart is 2 alpha^2 (1 - cos lambda) sin(m lambda). The drift in rad/s is
+    alpha^2 / (N T) times the sum of c_m sin(m lambda), minus N lambda / 2.
     """
 
     samples: int  # N

@@ -61,9 +61,9 @@ def _legendre_moment(samples: Samples, degree: int) -> list[sp.Expr]:
 def _second_order(samples: Samples, first: int) -> sp.Matrix:
     """Return the term of second order in the rate, for its Legendre polynomials from the even degree `first` on.
 
-    With the integrals m_k of the rate times the Legendre polynomial P_k the term is half the sum of m_k x m_(k+1): the
-    integral of P_k is a difference of P_(k+1) and P_(k-1), so that all other products vanish. Two products that share
-    the vector of odd degree are taken as one, (m_(k-1) - m_(k+1)) x m_k.
+    With the integrals m_k of the rate times the Legendre polynomial P_k the term is half the sum of m_k x m_(k+1):
+    the integral of P_k is a difference of P_(k+1) and P_(k-1), so that all other products vanish. Two products that
+    share the vector of odd degree are taken as one, (m_(k-1) - m_(k+1)) x m_k.
     """
     total = sp.zeros(3, 1)
     for odd in range(first + 1, samples.fit.degree + 1, 2):

@@ -9,9 +9,9 @@ order. In the exact solution, a series of iterated integrals (Peano and Baker), 
 
     int_0^1 s_1^k_1 int_0^s_1 s_2^k_2 ... int_0^s_(m-1) s_m^k_m ds_m ... ds_1 = prod_i 1 / sum_(j >= i) (k_j + 1)
 
-and in the method it is b' C^k_1 A C^k_2 A ... C^k_m 1 with the diagonal matrix C of the nodes; a factor 1/(k_1! ...
-k_m!) is common to both. Attitude kinematics is linear. In the form x' = x A all products are reversed on both sides,
-and the conditions are the same.
+and in the method it is b' C^k_1 A C^k_2 A ... C^k_m 1 with the diagonal matrix C of the nodes; a factor
+1/(k_1! ... k_m!) is common to both. Attitude kinematics is linear. In the form x' = x A all products are reversed on
+both sides, and the conditions are the same.
 """
 
 from __future__ import annotations

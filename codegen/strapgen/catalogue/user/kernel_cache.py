@@ -25,9 +25,9 @@ _KERNEL, _HEAD, _RECORD = "kernel.pickle", "head.pickle", "record.json"
 
 
 def kernel(what: list[str], folder: Path | None, derive: Callable[[], tuple[Kernel, Record]]) -> UserKernel:
-    """Return a user's kernel from the cache, or derive and store it.
+    """Return a user's kernel from the cache, or derive and store it; the file lies in `folder`.
 
-    The key is `what`: kind, name, content or entry point, and options; `folder` is that of the file.
+    The key is `what`: kind, name, content of the file or entry point, and options.
     """
     key = cache.digest([cache.generator_digest(), sys.version, *_installed(), *what])
     with contextlib.suppress(InputError):  # no cache folder: derived every time

@@ -137,8 +137,10 @@ def short_latex(kernel: Kernel) -> str | None:
 def _in_vectors(kernel: Kernel) -> str | None:
     """Return a step as its program computes it, or the stages of a kernel, in vectors; None if there are none."""
     form = None if kernel.unknowns else vector_form(kernel)
+    if form is None:
+        return stages_latex(kernel)
     state = kernel.inputs[0].elements[0].partition("_")[0]  # the letter of its elements
-    return stages_latex(kernel) if form is None else vectors_latex(form, state)
+    return vectors_latex(form, state)
 
 
 def elements_latex(kernel: Kernel) -> str:
