@@ -14,7 +14,7 @@ import pytest
 from strapgen.cli import main
 from strapgen.firmware.verify import header_command, verification
 from strapgen.ir.exceptions import InputError
-from strapgen.run.generated_files import command_of
+from strapgen.run.generated_files import command_of, text_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAME = "euler_rk4_2_w32"
@@ -121,6 +121,23 @@ def test_differing_file_is_neither_compiled_nor_loaded(folder, capsys):
     assert victim.exists(), "the test would notice that it runs"
 
 
+@pytest.mark.parametrize(
+    ("make", "ending"),
+    [(os.mkfifo, "h"), (os.mkdir, "c"), (lambda path: path.symlink_to("nowhere"), "h")],
+    ids=["pipe", "folder", "link"],
+)
+def test_loops_that_are_no_files_are_named(make, ending, folder, capsys):
+    make(path := folder / f"{NAME}_runs.{ending}")
+    status, out, _ = says(["verify", str(folder / f"{NAME}.c"), "--format", "json"], capsys)
+    assert status == 1 and f"{path}: is empty or not there" in json.loads(out)["differences"]
+
+
+def test_file_of_the_kernel_is_not_waited_for(tmp_path):
+    """A read of /proc/kmsg waits for what the kernel says next; like every file there it has no size."""
+    (tmp_path / "whole.h").symlink_to("/proc/self/environ")
+    assert text_of(tmp_path / "whole.h") == ""
+
+
 def test_changed_line_ends_are_a_difference(folder, capsys):
     path = folder / f"{NAME}.c"
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
@@ -144,8 +161,6 @@ def test_error_above_the_certified_bound_fails(folder, capsys, monkeypatch):
 
 
 def read_of(folder: Path) -> header_command.HeaderCommand:
-    from strapgen.run.generated_files import text_of
-
     return header_command.read(command_of(text_of(folder / f"{NAME}.h")) or "")
 
 

@@ -36,8 +36,8 @@ def difference(folder: Path, files: Mapping[str, str]) -> str:
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a file with its line endings as they are."""
-    return path.read_bytes().decode(errors="replace")
+    """Return the text of a file with its line endings as they are; "" of one without size, on which a read can wait."""
+    return path.read_bytes().decode(errors="replace") if path.stat().st_size else ""
 
 
 def unified(old: str, new: str, old_name: str, new_name: str) -> Iterator[str]:

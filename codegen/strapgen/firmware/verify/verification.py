@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -143,7 +144,7 @@ def _read(file: Path, request: Request) -> tuple[Sources, dict[str, str]]:
 def present_runs(folder: Path, sources: Sources) -> dict[str, str]:
     """Return the text of the loops over runs in a folder, "" for one that is missing beside others; none if all are."""
     runs = {name: folder / name for name in sources.runs}
-    if not any(path.is_file() for path in runs.values()):
+    if not any(os.path.lexists(path) for path in runs.values()):
         return {}
     return {name: text_of(path) if path.is_file() else "" for name, path in runs.items()}
 
