@@ -23,7 +23,6 @@ from shared_results import shared_results  # noqa: F401
 import strapgen
 from strapgen.catalogue import METHODS, Choice
 from strapgen.catalogue.kinematics import SAVAGE
-from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.cli import app, main
 from strapgen.run import octave_process, standard_tree
@@ -33,7 +32,6 @@ PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "paths").glob("
 #: The pages by their names below docs/, without the ending.
 DOCS = {path.relative_to(ROOT / "docs").with_suffix("").as_posix(): path.read_text() for path in PAGES}
 README = (ROOT / "README.md").read_text()
-CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
 #: A newcomer decides in so many lines of the README whether to read on.
 FIRST_SCREEN = 60
 
@@ -602,27 +600,6 @@ def helpers() -> set[str]:
     for path in (ROOT / "generated" / "c_fixed").glob("*.c"):
         ends |= set(re.findall(rf"^static .*?\b{path.stem}(_\w+)\(", path.read_text(), flags=re.MULTILINE))
     return ends
-
-
-# How to add something
-
-
-def test_the_tableau_to_add_satisfies_its_order_conditions(tmp_path):
-    (block,) = blocks(CONTRIBUTING, "toml")
-    (tmp_path / "heun3.toml").write_text(block)
-    assert tableaux.read(tmp_path / "heun3.toml").order == 3
-
-
-def test_the_kernel_and_the_command_to_add_run(capsys):
-    kernel, command = blocks(CONTRIBUTING, "python")
-    exec(compile(kernel, "inverse.py", "exec"), added := {})
-    inverse = added["euler_inverse"]()
-    assert f'"{inverse.name}": Recipe("{inverse.title}", "inverse", "euler_inverse"),' in CONTRIBUTING
-    values = inverse.expand(dict(zip(inverse.inputs[0].elements, (1, 5, 7, 5), strict=True)))
-    assert [*values["inverse"]] == [-1, -5, -7, 5]
-    exec(compile(command, "steps.py", "exec"), added := {})
-    added["steps"]("euler")
-    assert capsys.readouterr().out == "euler-rk4-2: 38 multiply, 30 add\n"
 
 
 #: Scripts that compile or derive many kernels.
