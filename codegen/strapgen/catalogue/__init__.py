@@ -7,7 +7,7 @@ loaded when it is derived.
 from __future__ import annotations
 
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
-from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
+from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.method_names import (
     ALGORITHMS,
@@ -18,11 +18,10 @@ from strapgen.catalogue.method_names import (
     Integrator,
     StepVector,
 )
+from strapgen.catalogue.methods.method_spec import MOST_BESIDE, MOST_INCREMENTS
 from strapgen.catalogue.names import (
     KERNELS,
     LAYOUT_KERNELS,
-    MOST_BESIDE,
-    MOST_INCREMENTS,
     MOTIONS,
     RESERVED,
     TWO_SPEED,
@@ -59,5 +58,4 @@ __all__ = [
     "previous",
     "rounding",
     "standard",
-    "with_constants",
 ]

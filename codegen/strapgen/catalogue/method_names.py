@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar, NamedTuple
 
-from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
-from strapgen.catalogue.methods.tableaux import TITLES
-from strapgen.catalogue.methods.windows import WINDOW_TITLES
+from strapgen.catalogue.methods.method_spec import Asked, MethodSpec, StepSamples, through_samples
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES, SHAPES
+from strapgen.catalogue.methods.tableaux import TABLEAUX, TITLES
+from strapgen.catalogue.methods.windows import WINDOW_TITLES, named_window
+from strapgen.ir.exceptions import InputError
+
+#: From so many samples on a Taylor series has to keep every power of time of the polynomial through them.
+LEAST_WHOLE = 4
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -16,8 +23,9 @@ ALGORITHMS = {
 }
 
 
-class Integrator(NamedTuple):
-    """A method without a tableau; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
+@dataclass(frozen=True)
+class Integrator:
+    """A method by its name; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
 
     title: str
     module: str
@@ -25,6 +33,50 @@ class Integrator(NamedTuple):
     takes_rates: bool = True
     arguments: tuple[str, ...] = ()
     takes_ahead: bool = True
+    name: str = ""
+
+    file: ClassVar = ""
+    kind: ClassVar = "method"
+    own_samples: ClassVar = None
+
+    @property
+    def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
+        """Module, function and arguments that make a `Method` of it."""
+        if self.module == "tableaux":
+            return TABLEAUX[self.name].recipe
+        return self.module, "method", self.arguments or (self.order,)
+
+    @property
+    def tolerance(self) -> Fraction:
+        """Largest residual of a condition that the rounding of published coefficients explains."""
+        return TABLEAUX[self.name].tolerance if self.module == "tableaux" else Fraction(0)
+
+    def keeps(self, samples: int) -> bool:
+        """Tell whether it is no Taylor series, or keeps every power of the rate's polynomial through the samples."""
+        return self.module != "taylor" or samples < LEAST_WHOLE or self.order >= samples
+
+    def select(self, asked: Asked) -> tuple[Integrator, StepSamples]:
+        """Return the method for the samples that are asked for, and the samples.
+
+        A Taylor series that ends before the rate's polynomial through many samples does is refused: the powers of time
+        that it leaves out are of first order in the increments, and the step does not turn by their sum.
+        """
+        increments, previous, ahead = through_samples(
+            self.name, asked, takes_rates=self.takes_rates, takes_ahead=self.takes_ahead
+        )
+        samples = (increments or 0) + previous + ahead
+        if not self.keeps(samples):
+            allowed = [
+                name for name, one in INTEGRATORS.items() if one.module == "taylor" and one.keeps(samples)
+            ]
+            series = (
+                f"{allowed[0]} to {allowed[-1]} and fit-exact keep" if len(allowed) > 1 else "fit-exact keeps"
+            )
+            raise InputError(
+                f"method {self.name} leaves out part of the rate through {samples} samples, those beside the step "
+                f"included; {series} all of it"
+            )
+        return self, (increments, previous, ahead)
 
 
 #: Integration methods that have no tableau.
@@ -86,6 +138,24 @@ INTEGRATORS = {
         False,
     ),
 }
+
+INTEGRATORS = {name: replace(one, name=name) for name, one in INTEGRATORS.items()}
+
+
+def named_method(method: str | MethodSpec) -> MethodSpec | None:
+    """Return the method of a name, None where there is none; what is a method already is returned as it is.
+
+    Examples
+    --------
+    >>> named_method("window-7-7").own_samples, named_method("rk4").title, named_method("rk5")
+    (1, 'Kutta (1901), the classical method', None)
+    """
+    if not isinstance(method, str):
+        return method if isinstance(method, MethodSpec) else None
+    if method in TITLES:
+        return Integrator(TITLES[method], "tableaux", 0, name=method)  # read when it is needed
+    return INTEGRATORS.get(method) or SHAPES.get(method) or named_window(method)
+
 
 #: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
 METHODS = {

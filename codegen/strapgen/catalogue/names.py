@@ -14,13 +14,6 @@ from strapgen.ir.recipe import Recipe
 #: The folder of the modules that derive the kernels of the catalogue.
 _PACKAGE = "strapgen.catalogue.kernels"
 
-#: Largest number of angle increments in a step, and of increments beside them, from before the step and from after it.
-MOST_INCREMENTS = 8
-MOST_BESIDE = 32
-
-#: From so many samples on a Taylor series has to keep every power of time of the polynomial through them.
-LEAST_WHOLE = 4
-
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {
     "constant": dict.fromkeys("xyz", "rad/s"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -213,32 +212,26 @@ class MethodOptions:
         for path, read in readers.values():
             if path is not None:
                 method = read(path)
-        choose = catalogue.choose_step if step else self._chooser()
         one("--method", self.method)
         count = whole("increments", self.increments)
         before, after = whole("previous", self.previous), whole("ahead", self.ahead)
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-            return self._with_constants(choose(algorithm, method, count, self.rates, before, after))
+            rest = method, count, self.rates, before, after, self._constants()
+            if step:
+                return catalogue.choose_step(algorithm, *rest)
+            return catalogue.choose(algorithm, *rest, layout=getattr(self, "layout", None))
 
-    def _with_constants(self, choice: Choice) -> Choice:
-        """Return a choice with the constants of the options."""
+    def _constants(self) -> dict[str, list[str]] | None:
+        """Return the numbers of each constant as they are written; None if none is stated."""
         if not self.constant:
-            return choice
-        from strapgen import catalogue
-
+            return None
         constants: dict[str, list[str]] = {}
         for text in self.constant:
             name, numbers = pair("--constant", text)
             if name in constants:
                 raise InputError(f"--constant {name} is given twice; one is needed")
             constants[name] = [number.strip() for number in numbers.split(",")]
-        return catalogue.with_constants(choice, constants)
-
-    def _chooser(self) -> Callable[..., Choice]:
-        """Return the function that chooses a kernel, which need be no attitude step."""
-        from strapgen import catalogue
-
-        return catalogue.choose
+        return constants
 
 
 @dataclass(frozen=True)
@@ -258,12 +251,6 @@ class KernelOptions(MethodOptions):
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
         return *super().files, self.layout
-
-    def _chooser(self) -> Callable[..., Choice]:
-        """Return the function that chooses a kernel, with its layout."""
-        from strapgen import catalogue
-
-        return partial(catalogue.choose, layout=self.layout)
 
 
 #: The options of an attitude step, which takes increments.

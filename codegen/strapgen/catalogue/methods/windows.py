@@ -146,20 +146,16 @@ WINDOW_TITLES: Mapping[str, str] = _BUILT_IN.titles
 EXACT, EXACT_TERMS = "-exact", 16
 
 
-def named_window(method: str | Window) -> Window | None:
-    """Return the window that a method is or names; None for the name of any other method.
+def named_window(name: str) -> Window | None:
+    """Return the window of a name; None for the name of any other method.
 
     Examples
     --------
     >>> named_window("window-7-7-exact").rotation, named_window("rk4")
     ('exact', None)
     """
-    if isinstance(method, Window):
-        return method
-    name = method.removesuffix(EXACT)
-    if name not in WINDOWS:
-        return None
-    return WINDOWS[name] if name == method else with_exact_rotation(WINDOWS[name])
+    known = WINDOWS.get(name.removesuffix(EXACT))
+    return known if known is None or not name.endswith(EXACT) else with_exact_rotation(known)
 
 
 def with_exact_rotation(window: Window) -> Window:
