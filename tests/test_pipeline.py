@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import re
 import sys
@@ -13,34 +14,38 @@ import pytest
 
 import strapgen
 from strapgen import pipeline, targets
-from strapgen.catalogue import Choice, choose
+from strapgen.catalogue import Choice, choose, derivation
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
+from strapgen.run.generation import Request
 from strapgen.storage import stage_cache
 
+PACKAGE = str(Path(strapgen.__file__).parent)
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
-#: The modules of the stages themselves.
-STAGES = (
-    *("strapgen.catalogue.derivation", "strapgen.catalogue.kernels", "strapgen.catalogue.methods"),
-    *("strapgen.kernel", "strapgen.lowering", "strapgen.fixedpoint", "strapgen.targets"),
-)
-#: The modules that a choice passes through beside the stages, from the command line to the text of generated C.
-TRIP = {
-    "strapgen.cli.generate_command",
-    "strapgen.cli.options",
-    "strapgen.catalogue.choosing",
-    "strapgen.catalogue.choice",
-    "strapgen.cli.fixed_options",
-    "strapgen.storage.stage_cache",
-    "strapgen.run.generation",
-    "strapgen.pipeline",
-}
+#: The functions that take the choice on its way from the command line to the text of C, in order: the name of the
+#: algorithm until it is chosen, then the choice, or a request that holds it.
+WALK = """
+cli.option_groups grouped.<locals>.run
+cli.generate_command generate
+cli.generate_command request
+cli.options MethodOptions.choose
+catalogue.choosing choose
+catalogue.choosing _choose_method
+cli.fixed_options FixedOptions.check_increments
+storage.stage_cache cached.<locals>.decorate.<locals>.recall
+pipeline compile
+pipeline fixed_program
+pipeline program
+catalogue.derivation derive
+catalogue.derivation _of_catalogue
+"""
 
 
 @pytest.fixture
 def empty_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Let everything be derived anew: no entry on disk, no program in memory."""
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
+    derivation._of_catalogue.cache_clear()
     return tmp_path
 
 
@@ -50,35 +55,48 @@ def run(*words: str) -> None:
     assert ended.value.code == 0
 
 
-def modules_with_a_choice(*words: str) -> set[str]:
-    """Run a command; return the modules in which a function takes, holds or returns a choice."""
-    modules: set[str] = set()
+def arguments(frame: FrameType) -> Iterator[object]:
+    """Yield the arguments of a call; a method of the choice itself does not take it from anywhere."""
+    code, values = frame.f_code, frame.f_locals
+    count = code.co_argcount + code.co_kwonlyargcount
+    for name in code.co_varnames[:count]:
+        if name != "self" or not isinstance(values[name], Choice):
+            yield values[name]
+    if code.co_flags & inspect.CO_VARARGS:
+        yield from values[code.co_varnames[count]]
+        count += 1
+    if code.co_flags & inspect.CO_VARKEYWORDS:
+        yield from values[code.co_varnames[count]].values()
+
+
+def walk(*words: str) -> list[str]:
+    """Run a command; return the functions that take the choice, each once, in the order of their first call."""
+    functions: dict[str, None] = {}
+    chosen: list[object] = []
 
     def look(frame: FrameType, event: str, value: object) -> None:
-        if event not in ("call", "return"):
+        if not frame.f_code.co_filename.startswith(PACKAGE):
             return
-        name = frame.f_globals.get("__name__", "")
-        if name.startswith("strapgen") and name not in modules:
-            values = [*frame.f_locals.values(), value]
-            if any(isinstance(each, Choice) for each in values):
-                modules.add(name)
+        if event == "return" and isinstance(value, Choice):
+            chosen.append(value)
+        elif event == "call" and any(
+            isinstance(each, (Choice, Request)) or (not chosen and each == words[1])
+            for each in arguments(frame)
+        ):
+            module = frame.f_globals["__name__"].removeprefix("strapgen.")
+            functions[f"{module} {frame.f_code.co_qualname}"] = None
 
     sys.setprofile(look)
     try:
         run(*words)
     finally:
         sys.setprofile(None)
-    return modules
+    return list(functions)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("algorithm", ["euler", str(EXAMPLE)])
-def test_a_choice_passes_through_few_modules(algorithm, empty_cache):
-    words = ("generate", algorithm, "--method", "rk1", "--increments", "1", "--target", "c")
-    modules = modules_with_a_choice(*words, "--out", str(empty_cache))
-    assert "strapgen.catalogue.derivation" in modules  # nothing came from a cache
-    assert {name for name in modules if not name.startswith(STAGES)} == TRIP
-    assert len(TRIP) <= 8
+def test_a_choice_walks_through_few_functions(empty_cache):
+    functions = walk("generate", "euler", "--target", "c-fixed", "--out", str(empty_cache))
+    assert functions == WALK.split("\n")[1:-1], "\n".join(functions)
 
 
 @pytest.mark.long
@@ -123,7 +141,7 @@ def test_targets_take_their_own_kind_of_program():
 def test_deriving_takes_names_or_a_complete_choice():
     assert pipeline.derive(choose("dcm", "rk2", 1)) == pipeline.derive("dcm", "rk2", 1)
     for options in ({"method": "rk2"}, {"increments": 1}, {"rates": True}, {"previous": 1}):
-        with pytest.raises(InputError, match="the choice of dcm-rk2-1 is complete"):
+        with pytest.raises(InputError, match="but the choice of dcm-rk2-1 has its own"):
             pipeline.derive(choose("dcm", "rk2", 1), **options)
 
 

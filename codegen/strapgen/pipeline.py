@@ -65,7 +65,7 @@ def fixed_program(choice: Choice, settings: Settings = _DEFAULTS) -> FixedProgra
 @cached("programs", "program of {0.kernel}")
 def program(choice: Choice) -> Program:
     """Return the program of a choice, which all targets share."""
-    return lower(derive(choice))
+    return lower(catalogue.derive(choice))
 
 
 def derive(
@@ -114,13 +114,10 @@ def derive(
     >>> derive("temperature-coefficient", constants={"slope_above": 0.5, "slope_below": "1/2"}).outputs[0].expressions
     (difference/2 + nominal,)
     """
-    if not isinstance(algorithm, Choice):
-        stage_arguments.require("derive", algorithm, str, os.PathLike, Choice)
-        algorithm = catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants, layout)
-    elif rates or any(x is not None for x in (method, increments, previous, ahead, constants, layout)):
-        raise InputError(f"the choice of {algorithm.kernel} is complete; derive takes it alone")
-    with timed("derive", algorithm.kernel):
-        return catalogue.derive(algorithm)
+    stage_arguments.require("derive", algorithm, str, os.PathLike, Choice)
+    return catalogue.derive(
+        catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants, layout)
+    )
 
 
 def lower(kernel: Kernel) -> Program:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.cli import main
 from strapgen.firmware.verify.verification import _Exact
@@ -59,7 +60,7 @@ def test_a_file_as_generated_holds(ending, folder, capsys):
 def test_the_error_of_a_state_that_saturates_is_that_from_the_end_of_its_range():
     """The scalar of a product is 0.64, 1.28 and -1.28 from elements near 0.8: inside, and beyond either end."""
     request = Request(choose("euler-product"), "c-fixed", Settings(state="q15", word=16))
-    exact = _Exact(request, request.sources().fixed)
+    exact = _Exact(request, pipeline.compile(*request).fixed)
     end, w = 1 << 15, 26215
     inside = exact.error([(0, 0, 0, w), (0, 0, 0, w)], [(0, 0, 0, 20972)])
     assert inside == pytest.approx(w * w / end - 20972, rel=1e-12)

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,7 @@ def test_other_text_and_another_compiler_compile_again(sources, counting, root, 
     compiler.load(sources)
     calls = counting()
     files = {name: text.replace("Euler", "Euler's") for name, text in sources.files.items()}
-    compiler.load(Sources.restore(sources.interface(), files))
+    compiler.load(replace(sources, files=files))
     assert counting() == 2 * calls
     assert len(list((root / "builds").iterdir())) == 2
     monkeypatch.setenv("CC", "cc -Wall")
@@ -172,7 +173,7 @@ def test_compiler_that_fails(sources, root, monkeypatch, capfd):
 def test_source_that_does_not_compile(sources, root, capfd):
     files = {name: text.replace("#include", "#error no") for name, text in sources.files.items()}
     with pytest.raises(CompilerError, match=r"failed on strapgen_euler_normalize: .*error.* no") as failure:
-        compiler.load(Sources.restore(sources.interface(), files))
+        compiler.load(replace(sources, files=files))
     assert "\n" not in str(failure.value)
     assert list((root / "builds").iterdir()) == []
     assert capfd.readouterr() == ("", "")
@@ -281,7 +282,7 @@ def test_many_without_a_compiler(many, without_compiler, root):
 def test_one_of_many_that_does_not_compile(many, root):
     first = many[0]
     files = {name: text.replace("#include", "#error no") for name, text in first.files.items()}
-    broken = Sources.restore(first.interface(), files)
+    broken = replace(first, files=files)
     with pytest.raises(CompilerError, match=r"error.* no"):
         compiler.compile_together([broken, *many[1:]])
     assert not list((root / "builds").iterdir())
@@ -297,7 +298,7 @@ def other(sources: Sources, number: int) -> Sources:
         name: text + (f"/* {number} */\n" if name.endswith(".c") else "")
         for name, text in sources.files.items()
     }
-    return Sources.restore(sources.interface(), files)
+    return replace(sources, files=files)
 
 
 def _compile_in_a_fork(sources: Sources, made) -> None:

@@ -7,7 +7,7 @@ loaded when it is derived.
 from __future__ import annotations
 
 from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
-from strapgen.catalogue.choosing import choose, choose_step, standard, with_constants
+from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
 from strapgen.catalogue.method_names import (
@@ -19,7 +19,8 @@ from strapgen.catalogue.method_names import (
     StepVector,
 )
 from strapgen.catalogue.methods.integrators import Integrator
-from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, MOST_BESIDE, MOST_INCREMENTS, reserved
+from strapgen.catalogue.methods.method_spec import MOST_BESIDE, MOST_INCREMENTS
+from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, reserved
 from strapgen.ir.recipe import Recipe
 
 __all__ = [
@@ -51,5 +52,4 @@ __all__ = [
     "reserved",
     "rounding",
     "standard",
-    "with_constants",
 ]

@@ -8,11 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from strapgen.catalogue.constants import Constants, options
-from strapgen.catalogue.method_names import INTEGRATORS
-from strapgen.catalogue.methods.shaped_coning import ShapedConing, named_shape
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.method_names import INTEGRATORS, named_method
+from strapgen.catalogue.methods.method_spec import MethodSpec
 from strapgen.catalogue.methods.window import Window
-from strapgen.catalogue.methods.windows import named_window
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
 from strapgen.catalogue.user_kernel import UserKernel
 from strapgen.ir.notebook_display import full_text, short_repr
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
 
 #: What chooses a method: its name, or the value that holds its coefficients.
-AnyMethod: TypeAlias = str | Tableau | Window | ShapedConing
+AnyMethod: TypeAlias = str | MethodSpec
 
 
 @dataclass(frozen=True)
@@ -84,19 +82,21 @@ class Choice:
         return self.name == "velocity-position"
 
     @property
+    def method_spec(self) -> MethodSpec | None:
+        """The method, also where `method` is a name."""
+        return None if self.method is None else named_method(self.method)
+
+    @property
     def method_name(self) -> str | None:
         """Name of the method."""
-        return self.method if self.method is None or isinstance(self.method, str) else self.method.name
+        spec = self.method_spec
+        return None if spec is None else spec.name
 
     @property
     def window(self) -> Window | None:
         """The window, if the method is one."""
-        return named_window(self.method) if isinstance(self.method, (str, Window)) else None
-
-    @property
-    def shape(self) -> ShapedConing | None:
-        """The coning coefficients for a band or a spectrum, if the method has such."""
-        return named_shape(self.method)
+        spec = self.method_spec
+        return spec if isinstance(spec, Window) else None
 
     @property
     def kernel(self) -> str:

@@ -11,26 +11,26 @@ from typing import TYPE_CHECKING, Any
 from strapgen import registration
 from strapgen.catalogue import constants as constant_values
 from strapgen.catalogue.choice import AnyMethod, Choice
-from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS, STANDARD_METHODS, VECTORS
-from strapgen.catalogue.methods.integrators import TAYLOR
-from strapgen.catalogue.methods.shaped_coning import SHAPES, ShapedConing, named_shape
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.method_names import (
+    ALGORITHMS,
+    INTEGRATORS,
+    METHODS,
+    STANDARD_METHODS,
+    VECTORS,
+    StepVector,
+    is_built_in,
+    named_method,
+)
+from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS, Asked, MethodSpec
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
-from strapgen.catalogue.methods.windows import EXACT, WINDOWS, named_window
-from strapgen.catalogue.names import (
-    KERNELS,
-    LAYOUT_KERNELS,
-    LEAST_WHOLE,
-    MOST_BESIDE,
-    MOST_INCREMENTS,
-    reserved,
-)
+from strapgen.catalogue.methods.windows import EXACT
+from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, reserved
 from strapgen.catalogue.user import loading
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.recipe import Description
-from strapgen.ir.suggestions import some
+from strapgen.ir.suggestions import some, unknown
 
 if TYPE_CHECKING:
     from strapgen.catalogue.constants import Constants
@@ -41,7 +41,7 @@ _FILE = "a Python file"
 
 
 def choose(
-    name: str,
+    name: str | os.PathLike[str] | Choice,
     method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
@@ -54,8 +54,9 @@ def choose(
 
     Parameters
     ----------
-    name : str
-        A name of the catalogue, a user's Python file, or the entry point of one.
+    name : str, path or Choice
+        A name of the catalogue, a user's Python file, or the entry point of one. A choice is returned as it is; the
+        other parameters do not go with it.
     method : str, Tableau, Window or ShapedConing, optional
     increments : int, optional
         Increments in a step.
@@ -83,14 +84,46 @@ def choose(
     >>> choose("temperature-coefficient", constants={"slope_above": 0}).constants
     (('slope_above', (Fraction(0, 1),)),)
     """
-    choice = _choose(name, method, increments, rates, previous, ahead)
+    if isinstance(name, Choice):
+        stated: dict[str, Any] = {"method": method, "increments": increments, "rates": rates or None}
+        stated |= {"previous": previous, "ahead": ahead, "constants": constants, "layout": layout}
+        for option, value in stated.items():
+            if value is not None:
+                raise InputError(f"{option} is {value!r}, but the choice of {name.kernel} has its own")
+        return name
+    if isinstance(name, os.PathLike):
+        name = os.fspath(name)
+    if not isinstance(name, str):
+        raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
+    asked = Asked(increments, rates, previous, ahead)
+    if name.endswith(".py") or (name not in reserved() and name in loading.installed()):
+        choice = _choose_users(name, method, asked)
+    elif name in ALGORITHMS or name in VECTORS:
+        choice = _choose_method(name, method, asked)
+    else:
+        if name not in reserved():
+            shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
+            names = [*_algorithms(), *VECTORS, *shown, *KERNELS, *LAYOUT_KERNELS]
+            checks.choice("algorithm", name, dict.fromkeys(names), _FILE, "kernels")
+        options = {
+            "method": method if isinstance(method, str) or method is None else method.name,
+            "increments": increments,
+            "rates": rates or None,
+            "previous": previous or None,
+            "ahead": ahead or None,
+        }
+        for option, value in options.items():
+            if value is not None:
+                takers = ", ".join([*ALGORITHMS, *VECTORS])
+                raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
+        choice = Choice(name)
     if layout is not None or name in LAYOUT_KERNELS:
         choice = _with_layout(choice, layout)
-    return choice if constants is None else with_constants(choice, constants)
+    return choice if constants is None else _with_constants(choice, constants)
 
 
-def with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
-    """Return a choice with constants in place of inputs; `constants` and errors are those of `choose`."""
+def _with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
+    """Return a choice with constants in place of inputs."""
     values = constant_values.read(constants)
     if choice.user_kernel is not None and choice.user_kernel.unknowns:
         return Choice.of_user(_with_values(choice.user_kernel.kernel, values))
@@ -128,184 +161,64 @@ def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Cho
     return replace(choice, layout=layout)
 
 
-def _choose(
-    name: str,
-    method: AnyMethod | None,
-    increments: int | None,
-    rates: bool,
-    previous: int | None,
-    ahead: int | None,
-) -> Choice:
-    """Return the choice without constants."""
-    if isinstance(name, os.PathLike):
-        name = os.fspath(name)
-    if not isinstance(name, str):
-        raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
-    if name.endswith(".py") or (name not in reserved() and name in loading.installed()):
-        return _choose_users(name, method, increments, rates, previous, ahead)
-    if name not in reserved():
-        shown = [kernel for kernel, recipe in KERNELS.items() if recipe.standard]
-        names = [*_algorithms(), *VECTORS, *shown, *KERNELS, *LAYOUT_KERNELS]
-        checks.choice("algorithm", name, dict.fromkeys(names), _FILE, "kernels")
-    if name in KERNELS or name in LAYOUT_KERNELS:
-        options = {
-            "method": method if isinstance(method, str) or method is None else method.name,
-            "increments": increments,
-            "rates": rates or None,
-            "previous": previous or None,
-            "ahead": ahead or None,
-        }
-        for option, value in options.items():
-            if value is not None:
-                takers = ", ".join([*ALGORITHMS, *VECTORS])
-                raise InputError(f"kernel {name} takes no {option} (got {value}); these do: {takers}")
-        return Choice(name)
-    if isinstance(method, str) and method in TABLEAUX and method not in TABLEAUX.own:
-        method = TABLEAUX[method]
-    if isinstance(method, (str, Window)):
-        window = named_window(method)
-        if window is not None:
-            return _choose_window(name, window, increments, rates, previous, ahead)
-    shape = named_shape(method)
-    if shape is not None:
-        return _choose_shape(name, shape, increments, rates, (previous, ahead))
-    assert not isinstance(method, (Window, ShapedConing)), "those are taken before"
-    if name in VECTORS:
-        if rates and VECTORS[name].every:
+def _choose_method(name: str, method: AnyMethod | None, asked: Asked) -> Choice:
+    """Return the choice of an attitude step of the catalogue, or of a vector of one."""
+    vector = VECTORS.get(name)
+    if method is None:
+        method = "rk4" if vector is None else vector.default
+    spec = named_method(method)
+    if vector is not None:
+        _require_vector(name, vector, method, spec, asked.rates)
+    if spec is None:
+        raise InputError(unknown("method", method, METHODS))
+    spec, samples = spec.select(asked)
+    is_named = not spec.file and is_built_in(spec.name) and named_method(spec.name) == spec
+    choice = Choice(name, spec.name if is_named else spec, *samples)
+    if not is_named and choice.kernel in KERNELS:
+        raise InputError(
+            f"a {spec.kind} called {spec.name} would make the kernel {choice.kernel}, which exists"
+        )
+    return choice
+
+
+def _require_vector(
+    name: str, vector: StepVector, method: AnyMethod, spec: MethodSpec | None, rates: bool
+) -> None:
+    """Refuse a method that cannot compute a vector of a step."""
+    allowed = ", ".join(vector.methods)
+    if isinstance(spec, Window):
+        if not vector.takes_windows:
+            raise InputError(f"{name} goes with no window; allowed methods: {allowed}")
+        if spec.rotation != "fourth" and not vector.every:
+            raise InputError(
+                f"{name}: {spec.name} computes a rotation, not its vector; {spec.name.removesuffix(EXACT)} does"
+            )
+    elif spec is None or spec.own_samples is None:
+        if rates and vector.every:
             raise InputError(f"{name} takes increments; rates at nodes do not go with it")
-        if isinstance(method, Tableau) and not VECTORS[name].every:
-            raise InputError(
-                f"{name} goes with no tableau; allowed methods: {', '.join(VECTORS[name].methods)}"
-            )
-        method = VECTORS[name].default if method is None else method
-        if not isinstance(method, Tableau):
-            checks.choice(f"method of {name}", method, VECTORS[name].methods)
-    if not isinstance(method, Tableau):
-        method = checks.choice("method", "rk4" if method is None else method, METHODS)
-    return _choose_samples(name, method, increments, rates, _beside(previous, ahead))
+        if spec is None or spec.kind != "tableau":
+            checks.choice(f"method of {name}", spec.name if spec else str(method), vector.methods)
+        elif not vector.every:
+            raise InputError(f"{name} goes with no tableau; allowed methods: {allowed}")
 
 
-def _choose_samples(
-    name: str, method: str | Tableau, increments: int | None, rates: bool, beside: tuple[int, int]
-) -> Choice:
-    previous, ahead = beside
-    if rates:
-        if increments is not None or previous or ahead:
-            more = f"{previous} previous ones" if previous else f"{ahead} ahead"
-            what = f"{increments} increments" if increments is not None else more
-            raise InputError(f"a step takes increments or rates, not both (got {what} and rates)")
-        if method in INTEGRATORS and not INTEGRATORS[str(method)].takes_rates:
-            raise InputError(f"method {method} takes increments; rates at nodes do not go with it")
-        return Choice(name, method)
-    increments = checks.count("increments", 2 if increments is None else increments, largest=MOST_INCREMENTS)
-    if ahead and method in INTEGRATORS and not INTEGRATORS[str(method)].takes_ahead:
-        raise InputError(f"method {method} takes no increments ahead; --previous goes with it")
-    if isinstance(method, str):
-        _require_whole_rate(method, increments + previous + ahead)
-    return Choice(name, method, increments, previous, ahead)
-
-
-def _require_whole_rate(method: str, samples: int) -> None:
-    """Refuse a Taylor series that ends before the rate's polynomial through many samples does.
-
-    The powers of time that it leaves out are of first order in the increments: the step does not turn by their sum.
-    """
-    allowed = [
-        name
-        for name, integrator in INTEGRATORS.items()
-        if integrator.module == TAYLOR and (samples < LEAST_WHOLE or integrator.order >= samples)
-    ]
-    if method not in INTEGRATORS or INTEGRATORS[method].module != TAYLOR or method in allowed:
-        return
-    series = f"{allowed[0]} to {allowed[-1]} and fit-exact keep" if len(allowed) > 1 else "fit-exact keeps"
-    raise InputError(
-        f"method {method} leaves out part of the rate through {samples} samples, those beside the step included; "
-        f"{series} all of it"
-    )
-
-
-def _choose_window(
-    name: str, window: Window, increments: int | None, rates: bool, previous: int | None, ahead: int | None
-) -> Choice:
-    """Return the choice of a window, or of the filters of its family with other numbers of samples beside the step."""
-    if name in VECTORS and not VECTORS[name].takes_windows:
-        raise InputError(f"{name} goes with no window; allowed methods: {', '.join(VECTORS[name].methods)}")
-    if name in VECTORS and window.rotation != "fourth" and not VECTORS[name].every:
-        raise InputError(
-            f"{name}: {window.name} computes a rotation, not its vector; {window.name.removesuffix(EXACT)} does"
-        )
-    if rates:
-        raise InputError(f"{window.name} takes increments; rates at nodes do not go with it")
-    if increments is not None and checks.count("increments", increments) != window.increments:
-        raise InputError(f"increments is {increments}; a step of {window.name} has {window.increments}")
-    if ahead is None and previous is not None:
-        ahead = window.previous + window.ahead - checks.count("previous", previous, smallest=0)
-    if ahead is not None:
-        chosen = window.one_sided_with(checks.count("ahead", ahead, smallest=0))
-        if previous not in (None, chosen.previous):
-            raise InputError(
-                f"previous {previous} and ahead {ahead} are no samples of {window.name}, which has "
-                f"{window.previous + window.ahead} beside the step"
-            )
-        window = chosen
-    if f"{name}-{window.name}" in KERNELS:
-        raise InputError(
-            f"a window called {window.name} would make the kernel {name}-{window.name}, which exists"
-        )
-    method = window if window.file or named_window(window.name, WINDOWS.own) != window else window.name
-    return Choice(name, method, window.increments, window.previous, window.ahead)
-
-
-def _choose_shape(
-    name: str,
-    shape: ShapedConing,
-    increments: int | None,
-    rates: bool,
-    beside: tuple[int | None, int | None],
-) -> Choice:
-    """Return the choice of coning coefficients for a band or a spectrum, which say what samples a step takes."""
-    if rates:
-        raise InputError(f"{shape.name} takes increments; rates at nodes do not go with it")
-    stated = {"increments": increments, "previous": beside[0], "ahead": beside[1]}
-    for (what, value), needed in zip(stated.items(), (shape.samples, shape.previous, 0), strict=True):
-        if value is not None and checks.count(what, value, smallest=0) != needed:
-            raise InputError(f"{what} is {value}; a step of {shape.name} has {needed}")
-    method = shape if shape.file or SHAPES.own.get(shape.name) != shape else shape.name
-    return Choice(name, method, shape.samples, shape.previous)
-
-
-def _beside(previous: int | None, ahead: int | None) -> tuple[int, int]:
-    """Check the numbers of increments from before a step and from after it."""
-    before = checks.count("previous", previous or 0, smallest=0, largest=MOST_BESIDE)
-    after = checks.count("ahead", ahead or 0, smallest=0, largest=MOST_BESIDE)
-    if before + after > MOST_BESIDE:
-        raise InputError(
-            f"previous {before} and ahead {after} are {before + after} together; at most {MOST_BESIDE} are allowed"
-        )
-    return before, after
-
-
-def _choose_users(
-    name: str,
-    method: AnyMethod | None,
-    increments: int | None,
-    rates: bool,
-    previous: int | None,
-    ahead: int | None,
-) -> Choice:
-    if rates:
+def _choose_users(name: str, method: AnyMethod | None, asked: Asked) -> Choice:
+    """Load a user's algorithm with the options that the user chose."""
+    if asked.rates:
         raise InputError(
             f"{name}: rates at nodes go with methods of the catalogue; the file of an algorithm says what it takes"
         )
     options: dict[str, Any] = {}
-    if isinstance(method, (Window, ShapedConing)):
-        what = "window" if isinstance(method, Window) else "coning coefficients"
-        raise InputError(f"{name}: an algorithm of a user takes a tableau, not the {what} {method.name}")
     if method is not None:
-        options["method"] = method if isinstance(method, Tableau) else TABLEAUX[_tableau_name(method)]
-    if increments is not None:
-        options["increments"] = checks.count("increments", increments, largest=MOST_INCREMENTS)
-    options |= {k: v for k, v in zip(("previous", "ahead"), _beside(previous, ahead), strict=True) if v}
+        tableau = method if isinstance(method, MethodSpec) else TABLEAUX[_tableau_name(method)]
+        if tableau.kind != "tableau":
+            raise InputError(
+                f"{name}: an algorithm of a user takes a tableau, not the {tableau.kind} {tableau.name}"
+            )
+        options["method"] = tableau
+    if asked.increments is not None:
+        options["increments"] = checks.count("increments", asked.increments, largest=MOST_INCREMENTS)
+    options |= {k: v for k, v in zip(("previous", "ahead"), asked.beside, strict=True) if v}
     return Choice.of_user(loading.load(name, **options))
 
 
@@ -321,21 +234,23 @@ def _tableau_name(method: str) -> str:
 
 
 def choose_step(
-    name: str,
+    name: str | os.PathLike[str] | Choice,
     method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
     previous: int | None = None,
     ahead: int | None = None,
+    constants: Mapping[str, Any] | None = None,
 ) -> Choice:
     """Check a choice of attitude step; parameters and errors are those of `choose`."""
-    if name in KERNELS or name in VECTORS or name in LAYOUT_KERNELS:
-        raise InputError(
-            f"algorithm {name!r} is no attitude step; allowed: {some(_algorithms())}, or {_FILE}"
-        )
-    if isinstance(name, str) and name not in ALGORITHMS and not name.endswith(".py"):
-        checks.choice("algorithm", name, _algorithms(), _FILE)
-    choice = choose(name, method, increments, rates, previous, ahead)
+    if isinstance(name, str):
+        if name in KERNELS or name in VECTORS or name in LAYOUT_KERNELS:
+            raise InputError(
+                f"algorithm {name!r} is no attitude step; allowed: {some(_algorithms())}, or {_FILE}"
+            )
+        if name not in ALGORITHMS and not name.endswith(".py"):
+            checks.choice("algorithm", name, _algorithms(), _FILE)
+    choice = choose(name, method, increments, rates, previous, ahead, constants)
     if choice.takes_velocity:
         raise InputError(f"algorithm {name} is a step of velocity and position; an attitude step is needed")
     return choice

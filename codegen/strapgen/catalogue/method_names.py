@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar, NamedTuple
 
 from strapgen.catalogue.methods.integrators import Integrator
-from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
-from strapgen.catalogue.methods.tableaux import TITLES
-from strapgen.catalogue.methods.windows import WINDOW_TITLES
+from strapgen.catalogue.methods.method_spec import Asked, MethodSpec, StepSamples, through_samples
+from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES, SHAPES
+from strapgen.catalogue.methods.tableaux import TABLEAUX, TITLES
+from strapgen.catalogue.methods.windows import EXACT, WINDOW_TITLES, named_window
 from strapgen.registry import Merged, Registry, Titles
 
 #: The folder of the modules that derive methods.
-_METHODS = "strapgen.catalogue.methods"
+_METHODS = f"{__package__}.methods"
 
 #: Attitude algorithms, by the state they integrate.
 ALGORITHMS = {
@@ -23,6 +26,57 @@ ALGORITHMS = {
 
 #: Integration methods without files of coefficients.
 INTEGRATORS = Registry("methods", Integrator)
+
+
+@dataclass(frozen=True)
+class _NamedTableau:
+    """A tableau of strapgen by its name, whose file is read when its coefficients are needed."""
+
+    name: str
+    title: str
+
+    file: ClassVar = ""
+    kind: ClassVar = "method"  # whoever names one need not know that it is a tableau
+    own_samples: ClassVar = None
+
+    @property
+    def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
+        """Module, function and arguments that make a `Method` of it."""
+        return TABLEAUX[self.name].recipe
+
+    @property
+    def tolerance(self) -> Fraction:
+        """Largest residual of a condition that the rounding of published coefficients explains."""
+        return TABLEAUX[self.name].tolerance
+
+    def select(self, asked: Asked) -> tuple[_NamedTableau, StepSamples]:
+        """Return the samples that are asked for."""
+        return self, through_samples(self.name, asked)
+
+
+def named_method(method: str | MethodSpec) -> MethodSpec | None:
+    """Return the method of a name, None where there is none; what is a method already is returned as it is.
+
+    Examples
+    --------
+    >>> named_method("window-7-7").own_samples, named_method("rk4").title, named_method("rk5")
+    (1, 'Kutta (1901), the classical method', None)
+    """
+    if not isinstance(method, str):
+        return method if isinstance(method, MethodSpec) else None
+    if method in TITLES:
+        return _NamedTableau(method, TITLES[method]) if method in TITLES.own else TABLEAUX[method]
+    integrator = INTEGRATORS.get(method)
+    if integrator is not None:
+        return replace(integrator, name=method)
+    return SHAPES.get(method) or named_window(method)
+
+
+def is_built_in(method: str) -> bool:
+    """Tell whether a name is none of an installed package's file of coefficients, which is then part of a choice."""
+    name = method.removesuffix(EXACT)
+    return not any(name in table and name not in table.own for table in (TITLES, SHAPE_TITLES, WINDOW_TITLES))
+
 
 #: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
 METHODS: Mapping[str, str] = Merged(TITLES, Titles(INTEGRATORS), SHAPE_TITLES, WINDOW_TITLES)

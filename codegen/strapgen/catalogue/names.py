@@ -8,13 +8,6 @@ from strapgen.catalogue.method_names import ALGORITHMS, VECTORS
 from strapgen.ir.recipe import Recipe
 from strapgen.registry import Registry
 
-#: Largest number of angle increments in a step, and of increments beside them, from before the step and from after it.
-MOST_INCREMENTS = 8
-MOST_BESIDE = 32
-
-#: From so many samples on a Taylor series has to keep every power of time of the polynomial through them.
-LEAST_WHOLE = 4
-
 #: Kernels that take no method.
 KERNELS = Registry("kernels", Recipe, lambda recipe: not getattr(recipe, "reader", ""))
 #: Kernels of a description in a file.

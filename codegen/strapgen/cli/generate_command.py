@@ -18,6 +18,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
+    from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
     from strapgen.run.generation import Request
 
@@ -63,11 +64,17 @@ def generate(
         return
     if algorithm is None:
         raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
+    from strapgen import pipeline
+
     tasks = [request(algorithm, method, name, fixed, output) for name in _names(target)]
-    results = [(task, task.sources()) for task in tasks]
+    results = [(task, pipeline.compile(*task)) for task in tasks]
     for _, sources in results:
         fixed.check_feedback(sources)
-    groups = [_files(task, sources, output) for task, sources in results]
+    groups = [sources.files if output.with_runs else sources.step_files for _, sources in results]
+    if output.project:
+        groups = [
+            files | _project_files(task, output) for (task, _), files in zip(results, groups, strict=True)
+        ]
     files = _together(groups)
     if output.check:
         output.show_difference(files, format)
@@ -84,7 +91,10 @@ def generate(
         ]
         print_json(data if len(data) > 1 else data[0])
     else:
-        typer.echo("\n".join(_text(task, sources, place) for (task, sources), place in rows))
+        samples = tasks[0].choice.increments_per_step
+        typer.echo(
+            "\n".join(_text(sources, place, task.settings, samples) for (task, sources), place in rows)
+        )
 
 
 def _names(target: str | None) -> list[str]:
@@ -94,11 +104,6 @@ def _names(target: str | None) -> list[str]:
         checks.choice("target", name, TARGETS)
         for name in listed("--target", "numpy" if target is None else target)
     ]
-
-
-def _files(task: Request, sources: Sources, output: SourceOptions) -> dict[str, str]:
-    files = sources.files if output.with_runs else sources.step_files
-    return files | _project_files(task, output) if output.project else files
 
 
 def _together(groups: list[dict[str, str]]) -> dict[str, str]:
@@ -133,7 +138,7 @@ def request(
 def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
     """Return the files that build and test the C, unless a file of the user is in their place."""
     writer = registration.extension("generate.project", "--project")
-    files: dict[str, str] = writer.project_files(task.choice, task.target, task.settings, task.naming)
+    files: dict[str, str] = writer.project_files(*task)
     if not output.check:
         writer.refuse_changed(output.out or Path(), files, output.force)
     return files
@@ -166,21 +171,21 @@ def _check_alone(
             raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
 
 
-def _text(task: Request, sources: Sources, written: list[Path]) -> str:
+def _text(sources: Sources, written: list[Path], settings: Settings | None, samples: int) -> str:
+    """Return the operations and the files, in fixed point with the gyro and the error of every output."""
     from strapgen.cli import generated_text
 
-    lines = [*generated_text.head(sources, task.target, written), *_call_rate(task)]
+    lines = [*generated_text.head(sources, sources.target, written), *_call_rate(settings, samples)]
     return "\n".join([*lines, *(f"  {line}" for line in generated_text.contract(sources))])
 
 
-def _call_rate(task: Request) -> list[str]:
-    """Return the line with the rate of calls, if the sampling rate is stated and a step takes several samples."""
-    words = [] if task.settings is None else task.settings.stated.split()
-    count = task.choice.increments_per_step
-    if "--sample-hz" not in words or count < 2:
+def _call_rate(settings: Settings | None, samples: int) -> list[str]:
+    """Return how often a step is called, if the sampling rate is stated and a step takes several samples."""
+    words = [] if settings is None else settings.stated.split()
+    if "--sample-hz" not in words or samples < 2:
         return []
-    hertz = checks.number("sample_hz", words[words.index("--sample-hz") + 1]) / count
-    return [f"  a step takes {count} samples of the gyro: call it at {float(hertz):g} Hz"]
+    hertz = checks.number("sample_hz", words[words.index("--sample-hz") + 1]) / samples
+    return [f"  a step takes {samples} samples of the gyro: call it at {float(hertz):g} Hz"]
 
 
 def _generate_all(targets: list[str] | None, output: SourceOptions, format: str) -> None:

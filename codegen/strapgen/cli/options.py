@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -222,25 +221,26 @@ class MethodOptions:
         for path, read in readers.values():
             if path is not None:
                 method = read(path)
-        choose = catalogue.choose_step if step else partial(catalogue.choose, layout=self.layout)
         one("--method", self.method)
         count = whole("increments", self.increments)
         before, after = whole("previous", self.previous), whole("ahead", self.ahead)
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-            return self._with_constants(choose(algorithm, method, count, self.rates, before, after))
+            rest = method, count, self.rates, before, after, self._constants()
+            if step:
+                return catalogue.choose_step(algorithm, *rest)
+            return catalogue.choose(algorithm, *rest, layout=self.layout)
 
-    def _with_constants(self, choice: Choice) -> Choice:
+    def _constants(self) -> dict[str, list[str]] | None:
+        """Return the numbers of each constant as they are written; None if none is stated."""
         if not self.constant:
-            return choice
-        from strapgen import catalogue
-
+            return None
         constants: dict[str, list[str]] = {}
         for text in self.constant:
             name, numbers = pair("--constant", text)
             if name in constants:
                 raise InputError(f"--constant {name} is given twice; one is needed")
             constants[name] = [number.strip() for number in numbers.split(",")]
-        return catalogue.with_constants(choice, constants)
+        return constants
 
 
 #: The options of an attitude step, which takes increments.

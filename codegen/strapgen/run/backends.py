@@ -524,10 +524,10 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
     """
     stage_arguments.require("evaluator", kernel, str, Choice)
     checks.choice("backend", backend, BACKENDS)
-    if not isinstance(kernel, Choice):
+    if isinstance(kernel, str):
         checks.choice("kernel", kernel, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
-        kernel = catalogue.choose(kernel)
-    return of_sources(sources_of_choice(kernel, BACKENDS[backend].target, fitted(backend, settings)))
+    choice = catalogue.choose(kernel)
+    return of_sources(sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings)))
 
 
 def backend(
@@ -583,7 +583,7 @@ def backend(
     """
     stage_arguments.require("backend", algorithm, str, os.PathLike, Choice)
     checks.choice("backend", backend, BACKENDS)
-    choice = chosen_step(algorithm, method, increments, previous, ahead)
+    choice = catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))
@@ -599,23 +599,6 @@ def sources_to_build(choice: Choice, backend: str, settings: Settings | None = N
     step = StepSources(sources_of_choice(choice, entry.target, fitted(backend, settings)), choice)
     beside = step.step_kernels.orthonormalize
     return [step.step, *([] if beside is None else [step.sources(beside, entry.target)])]
-
-
-def chosen_step(
-    algorithm: str | Choice,
-    method: AnyMethod | None,
-    increments: int | None,
-    previous: int | None = None,
-    ahead: int | None = None,
-) -> Choice:
-    """Return the choice of a step from its name and options; a choice, which has its own, as it is."""
-    if not isinstance(algorithm, Choice):
-        return catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
-    options = {"method": method, "increments": increments, "previous": previous, "ahead": ahead}
-    for option, value in options.items():
-        if value is not None:
-            raise InputError(f"{option} is {value!r}, but the choice of {algorithm.kernel} has its own")
-    return algorithm
 
 
 def build(sources: Sources, orthonormalization: str | None = None) -> Backend:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 from strapgen import pipeline
 from strapgen.catalogue import Choice
@@ -12,37 +11,14 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.targets.names import UNNAMED, Naming
 
-if TYPE_CHECKING:
-    from strapgen.ir.program import Program
 
-
-@dataclass(frozen=True)
-class Request:
-    """What one call of ``strapgen generate`` generates.
-
-    Parameters
-    ----------
-    choice : Choice
-    target : str
-        A key of `strapgen.targets.TARGETS`.
-    settings : Settings or None
-        Settings of fixed point, if any are stated.
-    naming : Naming
-        The name of the function in C, if the user chooses it.
-    """
+class Request(NamedTuple):
+    """What one call of ``strapgen generate`` generates: the arguments of `pipeline.compile`."""
 
     choice: Choice
     target: str
     settings: Settings | None = None
     naming: Naming = UNNAMED
-
-    def sources(self) -> Sources:
-        """Return the generated sources."""
-        return pipeline.compile(self.choice, self.target, self.settings, self.naming)
-
-    def program(self) -> Program:
-        """Return the program with its name."""
-        return self.naming.of(pipeline.program(self.choice))
 
 
 def generated_data(choice: Choice, sources: Sources, target: str, files: Sequence[str]) -> dict[str, Any]:

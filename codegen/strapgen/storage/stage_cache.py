@@ -1,7 +1,7 @@
 """`cached` decorates a stage: its results stay in memory, and on disk between processes.
 
-The key of an entry is the generator itself, its code and templates, with the identity of each argument: after a change
-of either, the stage runs again, and what runs agrees with the derivation.
+The key of an entry is the generator itself, its code and templates, with the `identity` of each argument, or its text:
+after a change of either, the stage runs again, and what runs agrees with the derivation.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def cached(
             bound = signature.bind(*args, **kwargs)
             bound.apply_defaults()
             more = depends(*bound.args[1:])
-            key = cache.digest([cache.generator_digest(), *map(_identity, bound.args), more])
+            identities = [str(getattr(argument, "identity", argument)) for argument in bound.args]
+            key = cache.digest([cache.generator_digest(), *identities, more])
             data = _remembered(kind, key, label.format(*bound.args), lambda: stage(*args, **kwargs), copies)
             result: R = pickle.loads(data) if copies else data
             return result
@@ -59,11 +60,6 @@ def cached(
         return recall
 
     return decorate
-
-
-def _identity(argument: Any) -> str:
-    """Return the text by which an argument differs from others: its `identity`, or itself."""
-    return str(getattr(argument, "identity", argument))
 
 
 def _remembered(kind: str, key: str, what: str, work: Callable[[], Any], as_bytes: bool) -> Any:

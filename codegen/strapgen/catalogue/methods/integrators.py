@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar
+
+from strapgen.catalogue.methods.method_spec import Asked, StepSamples, through_samples
+from strapgen.ir.exceptions import InputError
+
+#: From so many samples on a Taylor series has to keep every power of time of the polynomial through them.
+LEAST_WHOLE = 4
 
 
-class Integrator(NamedTuple):
+@dataclass(frozen=True)
+class Integrator:
     """A method without coefficient files; ``method(*arguments)``, or ``method(order)``, of its module returns it."""
 
     title: str
@@ -14,6 +23,44 @@ class Integrator(NamedTuple):
     takes_rates: bool = True
     arguments: tuple[str, ...] = ()
     takes_ahead: bool = True
+    name: str = ""  # that of its table
+
+    file: ClassVar = ""
+    kind: ClassVar = "method"
+    own_samples: ClassVar = None
+    tolerance: ClassVar = Fraction(0)
+
+    @property
+    def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
+        """Module, function and arguments that make a `Method` of it."""
+        return self.module, "method", self.arguments or (self.order,)
+
+    def keeps(self, samples: int) -> bool:
+        """Tell whether it is no Taylor series, or keeps every power of the rate's polynomial through the samples."""
+        return self.module != TAYLOR or samples < LEAST_WHOLE or self.order >= samples
+
+    def select(self, asked: Asked) -> tuple[Integrator, StepSamples]:
+        """Return the method for the samples that are asked for, and the samples.
+
+        A Taylor series that ends before the rate's polynomial through many samples does is refused: the powers of time
+        that it leaves out are of first order in the increments, and the step does not turn by their sum.
+        """
+        increments, previous, ahead = through_samples(
+            self.name, asked, takes_rates=self.takes_rates, takes_ahead=self.takes_ahead
+        )
+        samples = (increments or 0) + previous + ahead
+        if not self.keeps(samples):
+            allowed = [
+                name for name, one in INTEGRATORS.items() if one.module == TAYLOR and one.keeps(samples)
+            ]
+            series = (
+                f"{allowed[0]} to {allowed[-1]} and fit-exact keep" if len(allowed) > 1 else "fit-exact keeps"
+            )
+            raise InputError(
+                f"method {self.name} leaves out part of the rate through {samples} samples, those beside the step "
+                f"included; {series} all of it"
+            )
+        return self, (increments, previous, ahead)
 
 
 #: The module of the Taylor series.
@@ -80,4 +127,6 @@ _INTEGRATORS = {
 }
 
 #: Integration methods without files of coefficients.
-INTEGRATORS = {name: one._replace(module=f"{__package__}.{one.module}") for name, one in _INTEGRATORS.items()}
+INTEGRATORS = {
+    name: replace(one, name=name, module=f"{__package__}.{one.module}") for name, one in _INTEGRATORS.items()
+}

@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 
 import sympy as sp
 
 from strapgen.catalogue.kinematics import Kinematics
+from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.method import Method, combination
 from strapgen.catalogue.methods.order_conditions import attitude_order
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder
+
+
+def verified(tableau: Tableau) -> Method:
+    """Return the method of a tableau, a built-in one too, if it meets the conditions of its order."""
+    _require_conditions(tableau)
+    return method(tableau)
+
+
+@cache
+def _require_conditions(tableau: Tableau) -> None:
+    """Refuse a tableau that misses a condition of its order."""
+    try:
+        tableaux.verify(tableau)
+    except InputError as error:
+        raise InputError(f"tableau {tableau.name}: {error}") from None
 
 
 def method(tableau: Tableau) -> Method:

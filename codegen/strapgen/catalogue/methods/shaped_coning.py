@@ -14,11 +14,12 @@ from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files
 from strapgen.catalogue.methods.coefficient_files import InstalledFiles, band, entries, gyro, rational
+from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.ir import checks
@@ -111,6 +112,28 @@ class ShapedConing:
         """The option that chooses it on the command line."""
         return f"--coning {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
 
+    kind: ClassVar = "set of coning coefficients"
+
+    @property
+    def own_samples(self) -> int:
+        """Increments in a step."""
+        return self.samples
+
+    @property
+    def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
+        """Module, function and arguments that make a `Method` of it."""
+        return f"{__package__}.coning", "shaped", (self,)
+
+    def select(self, asked: Asked) -> tuple[ShapedConing, StepSamples]:
+        """Return the coefficients and their samples, which are the only ones that can be asked for."""
+        if asked.rates:
+            raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")
+        stated = {"increments": asked.increments, "previous": asked.previous, "ahead": asked.ahead}
+        for (what, value), needed in zip(stated.items(), (self.samples, self.previous, 0), strict=True):
+            if value is not None and checks.count(what, value, smallest=0) != needed:
+                raise InputError(f"{what} is {value}; a step of {self.name} has {needed}")
+        return self, (self.samples, self.previous, 0)
+
     @property
     def pairs(self) -> dict[tuple[int, int], Fraction]:
         """The coefficient of each cross product older x newest, by the numbers of the samples; the oldest is 0."""
@@ -156,20 +179,7 @@ _INSTALLED = InstalledFiles(_FILES, _installed)
 
 #: The coefficients of strapgen and of installed packages, by name, and their titles.
 SHAPES: Merged[ShapedConing] = Merged(_BUILT_IN, _INSTALLED)
-SHAPE_TITLES: Mapping[str, str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
-
-
-def named_shape(method: Any) -> ShapedConing | None:
-    """Return the coefficients that a method is or names; None for any other method.
-
-    Examples
-    --------
-    >>> named_shape("coning-shaped-8").previous, named_shape("rk4")
-    (8, None)
-    """
-    if isinstance(method, ShapedConing):
-        return method
-    return SHAPES.get(method) if isinstance(method, str) else None
+SHAPE_TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
 
 
 def read(path: str | Path) -> ShapedConing:

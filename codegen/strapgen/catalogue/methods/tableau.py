@@ -5,8 +5,9 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from strapgen.catalogue.methods.method_spec import Asked, StepSamples, through_samples
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 
 if TYPE_CHECKING:
@@ -64,6 +65,18 @@ class Tableau:
     def option(self) -> str:
         """The option that chooses it on the command line."""
         return f"--tableau {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
+
+    kind: ClassVar = "tableau"
+    own_samples: ClassVar = None
+
+    @property
+    def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
+        """Module, function and arguments that make a `Method` of it."""
+        return f"{__package__}.runge_kutta", "verified", (self,)
+
+    def select(self, asked: Asked) -> tuple[Tableau, StepSamples]:
+        """Return the method for the samples that are asked for, and the samples."""
+        return self, through_samples(self.name, asked)
 
     @property
     def rational(self) -> bool:

@@ -95,7 +95,7 @@ _INSTALLED = InstalledFiles(_FILES, _installed)
 TABLEAUX: Merged[Tableau] = Merged(_BUILT_IN, _INSTALLED)
 
 #: Their names in the literature.
-TITLES: Mapping[str, str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
+TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
 
 
 def read(path: str | Path) -> Tableau:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
+from strapgen.catalogue.methods.method_spec import Asked, StepSamples
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.ir.suggestions import counted
@@ -118,6 +120,36 @@ class Window:
         if not self.file:
             return f"--method {self.name}"
         return f"--window {shlex.quote(self.file)}" + (f" --ahead {self.ahead}" if self.sibling else "")
+
+    kind: ClassVar = "window"
+
+    @property
+    def own_samples(self) -> int:
+        """Increments in a step."""
+        return self.increments
+
+    @property
+    def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
+        """Module, function and arguments that make a `Method` of it."""
+        return f"{__package__}.windowed", "method", (self,)
+
+    def select(self, asked: Asked) -> tuple[Window, StepSamples]:
+        """Return the filters of the family with the samples that are asked for, and the samples."""
+        previous, ahead = asked.previous, asked.ahead
+        if asked.rates:
+            raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")
+        if asked.increments is not None and checks.count("increments", asked.increments) != self.increments:
+            raise InputError(f"increments is {asked.increments}; a step of {self.name} has {self.increments}")
+        beside = self.previous + self.ahead
+        if ahead is None and previous is not None:
+            ahead = beside - checks.count("previous", previous, smallest=0)
+        chosen = self if ahead is None else self.one_sided_with(checks.count("ahead", ahead, smallest=0))
+        if ahead is not None and previous not in (None, chosen.previous):
+            raise InputError(
+                f"previous {previous} and ahead {ahead} are no samples of {self.name}, which has {beside} "
+                "beside the step"
+            )
+        return chosen, (chosen.increments, chosen.previous, chosen.ahead)
 
     @property
     def samples(self) -> int:

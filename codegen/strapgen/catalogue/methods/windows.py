@@ -147,24 +147,20 @@ _INSTALLED = InstalledFiles(_FILES, _installed)
 WINDOWS: Merged[Window] = Merged(_BUILT_IN, _INSTALLED)
 
 #: The titles of their families.
-WINDOW_TITLES: Mapping[str, str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
+WINDOW_TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
 
 #: Ending of the name of a window whose rotation is exact, and the terms of its power series.
 EXACT, EXACT_TERMS = "-exact", 16
 
 
-def named_window(method: str | Window, among: Mapping[str, Window] = WINDOWS) -> Window | None:
-    """Return the window that a method is or names among some; None for the name of any other method.
+def named_window(name: str) -> Window | None:
+    """Return the window of a name; None for the name of any other method.
 
     >>> named_window("window-7-7-exact").rotation, named_window("rk4")
     ('exact', None)
     """
-    if isinstance(method, Window):
-        return method
-    name = method.removesuffix(EXACT)
-    if name not in among:
-        return None
-    return among[name] if name == method else with_exact_rotation(among[name])
+    known = WINDOWS.get(name.removesuffix(EXACT))
+    return known if known is None or not name.endswith(EXACT) else with_exact_rotation(known)
 
 
 def with_exact_rotation(window: Window) -> Window:

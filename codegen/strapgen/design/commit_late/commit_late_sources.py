@@ -108,7 +108,7 @@ def family(window: str | Window, sample_hz: float | str | Fraction | None = None
     >>> family("window-5-5").samples
     11
     """
-    chosen = named_window(window)
+    chosen = named_window(window) if isinstance(window, str) else window
     if chosen is None:
         raise InputError(f"window is {window!r}; a name as window-7-7, or a family of filters, is needed")
     rate = None if sample_hz is None else checks.number("sample_hz", sample_hz, positive=True)

@@ -133,7 +133,7 @@ def file_backend(file: Path, request: Request, *, run_differing: bool = False) -
 
 def _read(file: Path, request: Request) -> tuple[Sources, dict[str, str]]:
     """Return what the command of a file generates, and the text of the file, of its header and of its loops."""
-    sources = request.sources()
+    sources = pipeline.compile(*request)
     here = {path.name: text_of(path) for path in paths_of(file)}
     if not {*here} <= {*sources.step_files}:
         names = " and ".join(sources.step_files)

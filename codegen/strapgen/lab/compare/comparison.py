@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import Choice, choose_step
 from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir import checks, stage_arguments
 from strapgen.ir.exceptions import InputError, InputTypeError
@@ -21,7 +21,7 @@ from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
 from strapgen.lab.attitude_limits import require_finite
 from strapgen.lab.cost.code_size import code_size
 from strapgen.lab.simulate.runs import attitude, drift_between
-from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, Backend, chosen_step, sources_to_build
+from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, Backend, sources_to_build
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.compiler import compile_together
 from strapgen.run.increments import pulses
@@ -159,7 +159,7 @@ def compare(
     (['numpy', 'c'], 0.0)
     """
     stage_arguments.require("compare", algorithm, str, os.PathLike, Choice)
-    choice = chosen_step(algorithm, method, samples)
+    choice = choose_step(algorithm, method, samples)
     for name in backends:
         if not isinstance(name, Backend):
             checks.choice("backend", name, BACKENDS)
