@@ -13,20 +13,11 @@ from strapgen.run.evaluators import Array
 
 @dataclass
 class SystemMemory:
-    """What a system stores, in the numbers of its back end.
+    """What a system stores, in the numbers of its back end."""
 
-    Parameters
-    ----------
-    cells : dict of str to array, (runs, elements)
-    feedback : dict of str to array, (runs, number of words)
-        Error feedback of each stage.
-    cycle : int
-        Cycles since all rates last fell together.
-    """
-
-    cells: dict[str, Array]
-    feedback: dict[str, Array]
-    cycle: int = 0
+    cells: dict[str, Array]  # (runs, elements)
+    feedback: dict[str, Array]  # error feedback of each stage, (runs, number of words)
+    cycle: int = 0  # cycles since all rates last fell together
 
     def copy(self) -> SystemMemory:
         """Return a memory that changes by itself."""
@@ -35,18 +26,10 @@ class SystemMemory:
 
 @dataclass(frozen=True)
 class SystemRun:
-    """The result of a run.
+    """The result of a run."""
 
-    Parameters
-    ----------
-    values : mapping of str to array, (times, shape)
-        What was recorded, by the name of the cell, in SI units.
-    memory : SystemMemory
-        What is stored at the end, from which a next run goes on.
-    """
-
-    values: Mapping[str, Array]
-    memory: SystemMemory = field(repr=False)
+    values: Mapping[str, Array]  # by the name of the cell, in SI units, (times, shape)
+    memory: SystemMemory = field(repr=False)  # at the end, from which a next run goes on
 
 
 def rescaled(values: Array, there: Format, here: Format) -> Array:
