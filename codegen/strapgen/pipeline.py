@@ -43,7 +43,7 @@ def _target_code(target: str, settings: Settings | None, naming: Naming) -> str:
     _require_target(target, settings)
     if naming.option and not targets.TARGETS[target].nameable:
         raise InputError(f"{naming.option} goes with targets in C, C++, Rust and MATLAB, not with {target}")
-    return targets.registry.identity(target)
+    return targets.TARGETS.code(target)
 
 
 @cached("sources", "sources of {0.kernel} for {1}", depends=_target_code, copies=True)

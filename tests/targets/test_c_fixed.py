@@ -242,7 +242,8 @@ def test_a_run_says_where_it_was_refused():
 def test_loops_refuse_bad_arguments():
     fixed = quantized(EULER, Settings(32))
     made = build(generate(fixed, "c-fixed"))
-    propagate, ffi = made._generated, made._c.module.ffi
+    module = made.evaluator.module
+    propagate, ffi = getattr(module.lib, f"{made.sources.function.name}_propagate"), module.ffi
     array, history = ffi.new("int32_t[6]"), ffi.new("int32_t[8]", [9] * 8)
     null = ffi.NULL
     assert propagate(1, 1, 0, 0, null, array, array, history, null) == 4

@@ -25,14 +25,16 @@ class ModelEvaluator(Evaluator):
 
     def pack(self, rows: Array) -> Any:
         """Return the elements of rows; those of one row are Python's own integers, which are faster."""
-        return rows[0].tolist() if len(rows) == 1 else list(np.moveaxis(rows.astype(self.number), -1, 0))
+        return rows[0].tolist() if len(rows) == 1 else [*rows.astype(self.number, copy=False).T]
 
     def unpack(self, packed: Any, count: int) -> Array:
         """Return elements as rows, see `Evaluator.unpack`."""
         if count == 1:
             return np.array([packed], self.number)
-        columns = [np.broadcast_to(np.asarray(element, self.number), (count,)) for element in packed]
-        return np.stack(columns, axis=-1) if columns else np.empty((count, 0), self.number)
+        rows = np.empty((count, len(packed)), self.number)
+        for place, element in enumerate(packed):
+            rows[:, place] = element
+        return rows
 
     def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
         """Call the function on the elements of rows, see `Evaluator.call`."""

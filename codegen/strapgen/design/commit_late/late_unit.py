@@ -41,17 +41,7 @@ class GapError(InputError):
 
 
 def refusal(kind: int, gap: int, count: int) -> str:
-    """Return why a sample is refused; "" if it is not.
-
-    Parameters
-    ----------
-    kind : int
-        A `SampleKind`.
-    gap : int
-        Samples from a lost one on; 0 without a gap.
-    count : int
-        Samples that are held.
-    """
+    """Return why a sample is refused, `gap` samples after a lost one (0: none), with `count` held; "" if it is not."""
     if kind == SampleKind.LOST and gap:
         return (
             f"a sample is lost {gap} after another one; at least {REACH + 1} are needed from one to the other"
@@ -66,19 +56,8 @@ def refusal(kind: int, gap: int, count: int) -> str:
 class LateUnit:
     """Commits late and answers now, in the numbers of generated functions: doubles, or integers of the model.
 
-    Parameters
-    ----------
-    sources : LateSources
-        Functions for a target that Python can call.
-
-    Attributes
-    ----------
-    attitude : array, (state shape)
-        The committed attitude, at the end of the last committed interval.
-    pending : int
-        Intervals that are not committed.
-    committed : list of array
-        Attitudes at the ends of the intervals that the last call committed, the oldest first.
+    `attitude` is the committed one, at the end of the last committed interval, `pending` the number of intervals that
+    are not committed, and `committed` the attitudes that the last call committed, the oldest first.
     """
 
     #: Commits from one normalization to the next.

@@ -96,8 +96,7 @@ class CompiledSystem(SystemRunner):
     def trace(self, samples: Mapping[str, Array], memory: SystemMemory | None = None) -> dict[str, Array]:
         """Run checked samples cycle by cycle, and return every cell before the first cycle and after each.
 
-        `samples` (cycles, elements): what `samples` returned. Returns (cycles + 1, elements): in the numbers of the
-        C.
+        Cells are (cycles + 1, elements), in the numbers of the C. A stage that refuses its input is named.
         """
         ffi = self.module.ffi
         held = self.struct(memory or self.begin())

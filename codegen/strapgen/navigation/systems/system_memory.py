@@ -15,12 +15,9 @@ from strapgen.run.evaluators import Array
 class SystemMemory:
     """What a system stores, in the numbers of its back end."""
 
-    #: (runs, elements)
-    cells: dict[str, Array]
-    #: (runs, number of words): error feedback of each stage
-    feedback: dict[str, Array]
-    #: Cycles since all rates last fell together
-    cycle: int = 0
+    cells: dict[str, Array]  # (runs, elements)
+    feedback: dict[str, Array]  # error feedback of each stage, (runs, number of words)
+    cycle: int = 0  # cycles since all rates last fell together
 
     def copy(self) -> SystemMemory:
         """Return a memory that changes by itself."""
@@ -31,10 +28,8 @@ class SystemMemory:
 class SystemRun:
     """The result of a run."""
 
-    #: (times, shape): what was recorded, by the name of the cell, in SI units
-    values: Mapping[str, Array]
-    #: What is stored at the end, from which a next run goes on
-    memory: SystemMemory = field(repr=False)
+    values: Mapping[str, Array]  # by the name of the cell, in SI units, (times, shape)
+    memory: SystemMemory = field(repr=False)  # at the end, from which a next run goes on
 
 
 def rescaled(values: Array, there: Format, here: Format) -> Array:
