@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import pwd
 import shutil
 import subprocess
@@ -88,6 +89,17 @@ def test_full_disk_is_told_in_words(root):
     with pytest.raises(InputError, match=r"^cache folder .* cannot be written \(No space left on device\)$"):
         cache.entry("kind", "key", fill)
     assert names(root / "kind") == []
+
+
+def test_an_entry_is_the_folder_that_was_filled_and_appears_at_once(root):
+    filled = []
+
+    def fill(draft: Path) -> None:
+        write("file")(draft)
+        assert not (root / "kind" / "key").exists()
+        filled.append(draft.stat().st_ino)
+
+    assert [cache.entry("kind", "key", fill).stat().st_ino] == filled, "a copy would be seen half-made"
 
 
 def test_first_of_two_wins(root):
@@ -396,6 +408,79 @@ def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypat
     generated_sources.program(choose("euler-product"))
     assert compiler.load(generated_sources.sources(choose("euler-product"), "c")).lib.euler_product
     assert len(removed) == 1
+
+
+# Results of work
+
+
+@pytest.fixture
+def doubled():
+    """A function whose results are stored, and the arguments for which they were worked out."""
+    calls = []
+
+    def double(number: int, extra: tuple[str, ...] = ()) -> tuple[int, None]:
+        def work() -> tuple[int, None]:
+            calls.append(number)
+            if number < 0:
+                raise OSError(2, "no such number")
+            return 2 * number, None
+
+        return cache.stored("results", [str(number), *extra], work, f"2 x {number}")
+
+    return double, calls
+
+
+def test_a_result_is_worked_out_once_for_each_key(doubled, root, caplog):
+    double, calls = doubled
+    caplog.set_level("INFO", "strapgen")
+    assert [double(3), double(3), double(4), double(3, ("x",))] == [
+        (6, None),
+        (6, None),
+        (8, None),
+        (6, None),
+    ]
+    assert calls == [3, 4, 3]
+    assert caplog.messages == ["2 x 3: from the cache"]
+    assert len(names(root / "results")) == 3
+
+
+def test_a_result_is_worked_out_again_with_another_generator(doubled, monkeypatch):
+    double, calls = doubled
+    double(3)
+    monkeypatch.setattr(cache, "generator_digest", lambda: "another version")
+    double(3)
+    assert calls == [3, 3]
+
+
+def test_a_damaged_result_is_worked_out_again(doubled, root):
+    double, calls = doubled
+    double(3)
+    (place,) = (root / "results").iterdir()
+    (place / "result.pickle").write_bytes(pickle.dumps((7, None)))
+    assert double(3) == (6, None) and calls == [3, 3]
+
+
+def test_a_result_that_is_removed_while_it_is_read_is_worked_out_again(doubled, monkeypatch):
+    double, calls = doubled
+    double(3)
+    looked_up = cache.lookup
+
+    def lookup(kind: str, key: str) -> Path | None:
+        place = looked_up(kind, key)
+        if place is not None and len(calls) == 1:
+            shutil.rmtree(place)
+        return place
+
+    monkeypatch.setattr(cache, "lookup", lookup)
+    assert double(3) == (6, None) and calls == [3, 3]
+
+
+def test_an_error_of_the_work_is_its_own_and_leaves_no_result(doubled, root):
+    double, calls = doubled
+    for _ in range(2):
+        with pytest.raises(FileNotFoundError, match="no such number"):
+            double(-1)
+    assert calls == [-1, -1] and not root.exists()
 
 
 # Who may write there

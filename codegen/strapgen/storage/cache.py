@@ -23,10 +23,10 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache, wraps
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import TypeVar
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.timing import LOGGER, from_cache
@@ -35,7 +35,7 @@ from strapgen.storage.ownership import ForeignFileError
 
 _UNUSED_DAYS = 60
 _MANIFEST = "manifest.json"
-#: The file of an entry that holds the result of a function.
+#: The file of an entry that holds the result of some work.
 _RESULT = "result.pickle"
 #: Beginning of the name of a folder in which an entry is filled, of one that is to be removed, and of one that stands
 #: for a cache folder which others can write.
@@ -50,7 +50,6 @@ _replaced: dict[Path, Path] = {}
 #: Folders of a kind in which this process has looked for what others have left.
 _tidied: set[Path] = set()
 
-Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
@@ -83,30 +82,25 @@ def generator_digest() -> str:
     return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
 
 
-def cached(
-    kind: str,
-    key: Callable[Arguments, Iterable[str | bytes]],
-    what: Callable[Arguments, str] = lambda *_, **__: "",
-) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Decorate a function whose result, which can be pickled, depends on this package and the parts of a key alone.
+def stored(kind: str, parts: Iterable[str | bytes], work: Callable[[], Result], what: str = "") -> Result:
+    """Return the result of some work, from the cache if it is there; see `entry`.
 
-    `key` and `what` take the arguments of the function; `what` returns the name of the result in the log.
+    It can be pickled, and depends on this package and the parts of its key alone.
     """
+    key = digest([generator_digest(), *parts])
+    with suppress(FileNotFoundError):  # another process has removed it meanwhile
+        if (place := lookup(kind, key)) is not None:
+            known: Result = pickle.loads(read(place, _RESULT))
+            if what:
+                from_cache(what)
+            return known
+    result = work()
 
-    def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-        @wraps(function)
-        def stored(*args: Arguments.args, **options: Arguments.kwargs) -> Result:
-            def fill(draft: Path) -> None:
-                (draft / _RESULT).write_bytes(pickle.dumps(function(*args, **options)))
+    def fill(draft: Path) -> None:
+        (draft / _RESULT).write_bytes(pickle.dumps(result))
 
-            parts, name = digest([generator_digest(), *key(*args, **options)]), what(*args, **options)
-            content = persistently(lambda: read(entry(kind, parts, fill, name), _RESULT))
-            result: Result = pickle.loads(content)
-            return result
-
-        return stored
-
-    return decorate
+    entry(kind, key, fill)
+    return result
 
 
 def lookup(kind: str, key: str) -> Path | None:
@@ -268,10 +262,8 @@ def _is_whole(place: Path) -> bool:
     """Return whether an entry is there, the user's alone and undamaged; one that is others' is told of."""
     try:
         with ownership.private_folder(place, _PRIVATE) as folder:
-            manifest = json.loads(folder.read(_MANIFEST))
-            if manifest != {
-                name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST
-            }:
+            hashes = {name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST}
+            if json.loads(folder.read(_MANIFEST)) != hashes:
                 return False
             with suppress(OSError):
                 folder.touch()  # in use: not to be pruned

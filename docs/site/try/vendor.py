@@ -175,18 +175,9 @@ def _members(downloads: Path) -> Iterator[tuple[str, bytes]]:
 
 def bounds() -> bytes:
     """Return the bounds of `PROVED` on `PROVED_INCREMENTS` for every state, as `proved.load` takes them."""
-
-    def fill(draft: Path) -> None:
-        (draft / "bounds.json").write_text(json.dumps(dict(_proved_bounds())))
-
-    key = cache.digest([cache.generator_digest(), *PROVED, str(PROVED_INCREMENTS)])
-
-    def read() -> bytes:
-        return cache.read(
-            cache.entry("site-bounds", key, fill, "bounds of rounding for the site"), "bounds.json"
-        )
-
-    return cache.persistently(read)
+    key = [*PROVED, str(PROVED_INCREMENTS)]
+    what = "bounds of rounding for the site"
+    return cache.stored("site-bounds", key, lambda: json.dumps(dict(_proved_bounds())).encode(), what)
 
 
 def _proved_bounds() -> Iterator[tuple[str, dict[str, object]]]:

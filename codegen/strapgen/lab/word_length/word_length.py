@@ -252,30 +252,9 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 
 def run_case(case: Case) -> Outcome:
-    """Run one case, or read its outcome from the cache, so that a study that was stopped continues where it was.
-
-    Parameters
-    ----------
-    case : Case
-
-    Returns
-    -------
-    Outcome
-    """
-
-    def fill(draft: Path) -> None:
-        outcome = _run(case)
-        (draft / "outcome.json").write_text(
-            json.dumps({f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "case"})
-        )
-
-    source = Path(case.motion).read_bytes() if is_file(case.motion) else b""
-    key = cache.digest([cache.generator_digest(), json.dumps(asdict(case), sort_keys=True), source])
-
-    def read() -> bytes:
-        return cache.read(cache.entry("studies", key, fill), "outcome.json")
-
-    return Outcome(case, **json.loads(cache.persistently(read)))
+    """Run one case, or take its outcome from the cache, so that a study that was stopped continues where it was."""
+    motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
+    return cache.stored("studies", [json.dumps(asdict(case), sort_keys=True), motion], lambda: _run(case))
 
 
 def _run(case: Case) -> Outcome:
