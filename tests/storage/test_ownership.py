@@ -139,6 +139,32 @@ def test_an_ordinary_user_trusts_neither_the_administrator_s_folder_nor_a_third_
     assert as_stranger(reachable / "stranger") == f"{reachable} belongs to another user"
 
 
+def test_a_folder_of_the_administrator_is_private_to_no_other_user(monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: STRANGER)
+    with pytest.raises(ForeignFileError, match=r" / belongs to another user$"), private_folder(Path("/")):
+        raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("users", "owner", "is_outside"),
+    [
+        ("0 0 4294967295", STRANGER, False),
+        ("0 1000 1", STRANGER, False),
+        ("1000 1000 1", STRANGER, True),
+        ("1000 1000 1", 12, False),
+        ("1000 1000 1\n60000 1 9999", STRANGER, False),
+        ("", STRANGER, True),
+        ("unreadable", STRANGER, False),
+    ],
+)
+def test_nobody_is_the_administrator_only_where_the_namespace_has_neither(
+    users, owner, is_outside, monkeypatch
+):
+    files = {"/proc/self/uid_map": users, "/proc/sys/kernel/overflowuid": f"{STRANGER}\n"}
+    monkeypatch.setattr(Path, "read_text", lambda self: files[str(self)])
+    assert ownership._is_outside.__wrapped__(owner) is is_outside
+
+
 @pytest.mark.parametrize(
     ("name", "primary", "members", "alone"),
     [

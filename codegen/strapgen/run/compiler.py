@@ -86,16 +86,32 @@ class Compiler:
         """Return the path of the compiler."""
         return self.command()[0]
 
-    def identity(self) -> str:
-        """Return what tells this compiler from others, and from the same one before it was installed anew."""
-        path, *options = self.command()
-        status = Path(path).resolve().stat()
-        named = [self.language, str(Path(path).resolve()), *options]
-        return shlex.join([*named, str(status.st_size), str(status.st_mtime_ns)])
-
     def flags_in_effect(self) -> list[str]:
         """Return the flags of a library that computes the bits of the C."""
         return [OPTIMIZATION[self.language], *self.flags]
+
+    def identity(self, flags: Sequence[str] | None = None) -> str:
+        """Return what a build depends on beside its sources: this compiler, its flags, the machine and Python."""
+        import _cffi_backend
+
+        path, *options = self.command()
+        executable = Path(path).resolve()
+        status, machine = (
+            executable.stat(),
+            (platform.machine(), sys.platform, sysconfig.get_config_var("SOABI")),
+        )
+        used = self.flags_in_effect() if flags is None else flags
+        return repr(
+            (
+                executable,
+                status.st_size,
+                status.st_mtime_ns,
+                options,
+                used,
+                machine,
+                _cffi_backend.__version__,
+            )
+        )
 
 
 #: A module calls its own functions, whatever others of the same names the process has.
@@ -148,10 +164,9 @@ def compile_together(many: Iterable[Sources]) -> None:
     CompilerError
         If there is no C compiler, or it fails.
     """
+    # Of one language each, in which no file has its name twice: so often has a file had its name before.
+    groups: dict[tuple[str, int], dict[str, Sources]] = {}
     last: dict[str, int] = {}
-    groups: dict[
-        tuple[str, int], dict[str, Sources]
-    ] = {}  # of one language, in which no file has its name twice
     for key, sources in {build_key([sources]): sources for sources in many if _compiler_of(sources)}.items():
         if not _shared(key) and not cache.lookup("builds", key):
             turn = max(last.get(file, -1) for file in sources.files) + 1
@@ -243,19 +258,9 @@ def _import_file(file: Path) -> Any:
 
 def build_key(many: Iterable[Sources], flags: Sequence[str] | None = None) -> str:
     """Return the key of a build: compiling with another compiler, or for another Python, makes another entry."""
-    import _cffi_backend
-
-    many = list(many)
-    chosen = (_compiler_of(many[0]) if many else None) or C
-    return cache.digest(
-        [
-            *(part for sources in many for part in (*sources.files, *sources.files.values())),
-            *(chosen.flags_in_effect() if flags is None else flags),
-            *(_UNOPTIMIZED, _CRATE, chosen.identity()),
-            f"{platform.machine()} {sys.platform} {sysconfig.get_config_var('SOABI')}",
-            str(_cffi_backend.__version__),
-        ]
-    )
+    first, *_ = many = list(many)
+    texts = [part for sources in many for part in (*sources.files, *sources.files.values())]
+    return cache.digest([*texts, _UNOPTIMIZED, _CRATE, (_compiler_of(first) or C).identity(flags)])
 
 
 def _build(many: Sequence[Sources], name: str, key: str) -> Path:
@@ -274,8 +279,10 @@ def _build(many: Sequence[Sources], name: str, key: str) -> Path:
                 (draft / _DECLARATIONS).write_text(cdef)
                 command = [*chosen.command(), *chosen.flags_in_effect()]
                 reasons = _compile(command, files, chosen.ending, draft / _library(name))
-        if reasons:
-            raise CompilerError(f"{chosen.path()} failed on {name if chosen is C else kernels}: {reasons[0]}")
+            if reasons:
+                raise CompilerError(
+                    f"{chosen.path()} failed on {name if chosen is C else kernels}: {reasons[0]}"
+                )
 
     return cache.entry("builds", key, fill, f"compiled {kernels}")
 
@@ -308,27 +315,19 @@ def _compile(
 ) -> list[str]:
     """Compile files as one unit, so that loops can take steps in; return the errors if there is no library."""
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        parts = [file for file in files if file.endswith(ending)]
-        included = "".join(f'#include "{file}"\n' for file in parts)
-        crate = _CRATE + "".join(f"pub mod {Path(file).stem};\n" for file in parts)
-        root = f"{library.name.partition('.')[0]}_root{ending}"
-        for file, text in {**files, root: crate if ending == ".rs" else included}.items():
-            Path(folder, file).write_text(text)
-        words = [*command, "-o", library.name, root]
+        name, parts = library.name.partition(".")[0], [file for file in files if file.endswith(ending)]
+        text = "".join(f'#include "{file}"\n' for file in parts)
+        if ending == ".rs":
+            text = _CRATE + "".join(f"pub mod {Path(file).stem};\n" for file in parts)
+        for file, content in {**files, f"{name}_root{ending}": text}.items():
+            Path(folder, file).write_text(content)
+        words = [*command, "-o", library.name, f"{name}_root{ending}"]
         if wrapper is not None:
-            text = f"{library.name.partition('.')[0]}_wrapper.c"
-            wrapper.emit_c_code(str(Path(folder, text)))
-            words += ["-x", "c", text, "-x", "none", "-lm"]
+            wrapper.emit_c_code(str(Path(folder, f"{name}_wrapper.c")))
+            words += ["-x", "c", f"{name}_wrapper.c", "-x", "none", "-lm"]
+        how: dict[str, Any] = {"capture_output": True, "text": True, "errors": "replace", "check": False}
         try:
-            done = subprocess.run(
-                words,
-                cwd=folder,
-                env=os.environ | {"LC_ALL": "C"},
-                capture_output=True,
-                text=True,
-                errors="replace",
-                check=False,
-            )
+            done = subprocess.run(words, cwd=folder, env=os.environ | {"LC_ALL": "C"}, **how)
         except OSError as error:
             return [str(error.strerror)]
         built = Path(folder, library.name)

@@ -77,7 +77,7 @@ def compile_foreign(source: ForeignSource) -> Path:
         text = folder / f"bridge{of.ending}"
         text.write_text(bridge)
         preprocessed = _preprocessed(source, text)
-    key = cache.digest([preprocessed, bridge, compiler.build_key([], _FLAGS), of.identity()])
+    key = cache.digest([preprocessed, bridge, compiler.C.identity(_FLAGS), of.identity()])
 
     def fill(draft: Path) -> None:
         with timed("compile", source.function):
