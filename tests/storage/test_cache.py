@@ -410,22 +410,22 @@ def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypat
     assert len(removed) == 1
 
 
-# Results of functions
+# Results of work
 
 
 @pytest.fixture
 def doubled():
-    """A function whose results are kept, and the arguments that it was called with."""
+    """A function whose results are stored, and the arguments for which they were worked out."""
     calls = []
 
-    @cache.cached(
-        "results", lambda number, extra=(): [str(number), *extra], lambda number, extra=(): f"2 x {number}"
-    )
     def double(number: int, extra: tuple[str, ...] = ()) -> tuple[int, None]:
-        calls.append(number)
-        if number < 0:
-            raise OSError(2, "no such number")
-        return 2 * number, None
+        def work() -> tuple[int, None]:
+            calls.append(number)
+            if number < 0:
+                raise OSError(2, "no such number")
+            return 2 * number, None
+
+        return cache.stored("results", [str(number), *extra], work, f"2 x {number}")
 
     return double, calls
 
@@ -433,7 +433,7 @@ def doubled():
 def test_a_result_is_worked_out_once_for_each_key(doubled, root, caplog):
     double, calls = doubled
     caplog.set_level("INFO", "strapgen")
-    assert [double(3), double(3), double(4), double(3, extra=("x",))] == [
+    assert [double(3), double(3), double(4), double(3, ("x",))] == [
         (6, None),
         (6, None),
         (8, None),
@@ -442,7 +442,6 @@ def test_a_result_is_worked_out_once_for_each_key(doubled, root, caplog):
     assert calls == [3, 4, 3]
     assert caplog.messages == ["2 x 3: from the cache"]
     assert len(names(root / "results")) == 3
-    assert double.__name__ == "double"
 
 
 def test_a_result_is_worked_out_again_with_another_generator(doubled, monkeypatch):
@@ -476,7 +475,7 @@ def test_a_result_that_is_removed_while_it_is_read_is_worked_out_again(doubled, 
     assert double(3) == (6, None) and calls == [3, 3]
 
 
-def test_an_error_of_the_function_is_its_own_and_leaves_nothing(doubled, root):
+def test_an_error_of_the_work_is_its_own_and_leaves_no_result(doubled, root):
     double, calls = doubled
     for _ in range(2):
         with pytest.raises(FileNotFoundError, match="no such number"):

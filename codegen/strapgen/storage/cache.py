@@ -23,10 +23,10 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache, wraps
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import TypeVar
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.timing import LOGGER, from_cache
@@ -35,7 +35,7 @@ from strapgen.storage.ownership import ForeignFileError
 
 _UNUSED_DAYS = 60
 _MANIFEST = "manifest.json"
-#: The file of an entry that holds the result of a function.
+#: The file of an entry that holds the result of some work.
 _RESULT = "result.pickle"
 #: Beginning of the name of a folder in which an entry is filled, of one that is to be removed, and of one that stands
 #: for a cache folder which others can write.
@@ -50,7 +50,6 @@ _replaced: dict[Path, Path] = {}
 #: Folders of a kind in which this process has looked for what others have left.
 _tidied: set[Path] = set()
 
-Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
@@ -83,35 +82,25 @@ def generator_digest() -> str:
     return digest([version("sympy"), *(path.read_bytes() for path in resources.package_files())])
 
 
-def cached(
-    kind: str, key: Callable[Arguments, Iterable[str | bytes]], what: Callable[Arguments, str] | None = None
-) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Decorate a function whose result depends on this package and the parts of a key alone, and can be pickled.
+def stored(kind: str, parts: Iterable[str | bytes], work: Callable[[], Result], what: str = "") -> Result:
+    """Return the result of some work, from the cache if it is there; see `entry`.
 
-    `key` and `what` take the arguments of the function; `what` returns the name of the result in the log.
+    It can be pickled, and depends on this package and the parts of its key alone.
     """
+    key = digest([generator_digest(), *parts])
+    with suppress(FileNotFoundError):  # another process has removed it meanwhile
+        if (place := lookup(kind, key)) is not None:
+            known: Result = pickle.loads(read(place, _RESULT))
+            if what:
+                from_cache(what)
+            return known
+    result = work()
 
-    def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-        @wraps(function)
-        def answer(*args: Arguments.args, **options: Arguments.kwargs) -> Result:
-            parts = digest([generator_digest(), *key(*args, **options)])
-            with suppress(FileNotFoundError):  # another process has removed it meanwhile
-                if (place := lookup(kind, parts)) is not None:
-                    known: Result = pickle.loads(read(place, _RESULT))
-                    if what is not None:
-                        from_cache(what(*args, **options))
-                    return known
-            result = function(*args, **options)
+    def fill(draft: Path) -> None:
+        (draft / _RESULT).write_bytes(pickle.dumps(result))
 
-            def fill(draft: Path) -> None:
-                (draft / _RESULT).write_bytes(pickle.dumps(result))
-
-            entry(kind, parts, fill)
-            return result
-
-        return answer
-
-    return decorate
+    entry(kind, key, fill)
+    return result
 
 
 def lookup(kind: str, key: str) -> Path | None:

@@ -173,12 +173,11 @@ def _members(downloads: Path) -> Iterator[tuple[str, bytes]]:
     yield "bounds.json", bounds()
 
 
-@cache.cached(
-    "site-bounds", lambda: [*PROVED, str(PROVED_INCREMENTS)], lambda: "bounds of rounding for the site"
-)
 def bounds() -> bytes:
     """Return the bounds of `PROVED` on `PROVED_INCREMENTS` for every state, as `proved.load` takes them."""
-    return json.dumps(dict(_proved_bounds())).encode()
+    key = [*PROVED, str(PROVED_INCREMENTS)]
+    what = "bounds of rounding for the site"
+    return cache.stored("site-bounds", key, lambda: json.dumps(dict(_proved_bounds())).encode(), what)
 
 
 def _proved_bounds() -> Iterator[tuple[str, dict[str, object]]]:

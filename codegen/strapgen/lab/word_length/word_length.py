@@ -251,15 +251,13 @@ def _several(values: Any) -> tuple[Any, ...]:
     return (values,) if single else tuple(values)
 
 
-def _contents(case: Case) -> list[str | bytes]:
-    """Return all that the outcome of a case depends on, the content of a motion's file included."""
-    motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
-    return [json.dumps(asdict(case), sort_keys=True), motion]
-
-
-@cache.cached("studies", _contents)
 def run_case(case: Case) -> Outcome:
     """Run one case, or take its outcome from the cache, so that a study that was stopped continues where it was."""
+    motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
+    return cache.stored("studies", [json.dumps(asdict(case), sort_keys=True), motion], lambda: _run(case))
+
+
+def _run(case: Case) -> Outcome:
     h = checks.number("step", case.step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
     choice = catalogue.choose_step(case.algorithm, case.method, case.increments)
