@@ -89,7 +89,7 @@ def test_lines_at_one_frequency_depend_on_how_they_begin(tmp_path):
 def test_tones_are_the_exact_lines_as_the_gyro_passes_them_on(tmp_path):
     brief = read_brief(written(tmp_path, ("5.4", "10.8"), GYRO))
     one, two = causes.tones(brief)
-    assert two.frequency_hz == 2 * one.frequency_hz, "exactly"
+    assert two.frequency_hz == 2 * one.frequency_hz
     line = brief.environment.lines()[0]
     assert [abs(c) for c in one.angles] == pytest.approx([line.theta_x, line.theta_y, 0])
     assert np.angle(one.angles[1] / one.angles[0]) == pytest.approx(line.phase)

@@ -302,5 +302,5 @@ def _lines(value: Any) -> tuple[Line, ...]:
             for key in ("theta_x_rad", "theta_y_rad", "acceleration_y_m_s2")
         ]
         phase = float(checks.number(f"{where}phase_rad", one.get("phase_rad", 0)))
-        lines.append(Line(frequency, sizes[0], sizes[1], phase, sizes[2]))
+        lines.append(Line(float(frequency), sizes[0], sizes[1], phase, sizes[2]))
     return tuple(lines)

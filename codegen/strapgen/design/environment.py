@@ -63,8 +63,7 @@ class Line:
 
     Parameters
     ----------
-    frequency_hz : float or Fraction
-        Exact for a line of a brief.
+    frequency_hz : float
     theta_x, theta_y : float
         Amplitudes X and Y in rad.
     phase : float
@@ -73,7 +72,7 @@ class Line:
         Amplitude of the acceleration along y in m/s^2, of the phase P.
     """
 
-    frequency_hz: float | Fraction
+    frequency_hz: float
     theta_x: float
     theta_y: float
     phase: float
@@ -99,7 +98,7 @@ class LineEnvironment:
     @property
     def highest_hz(self) -> float:
         """The highest frequency in Hz."""
-        return float(max(line.frequency_hz for line in self.stated))
+        return max(line.frequency_hz for line in self.stated)
 
     def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the error of the mean rate, see `Environment.error`."""

@@ -38,7 +38,7 @@ class Tone(NamedTuple):
     Parameters
     ----------
     frequency_hz : number
-        Above 0. Sums of frequencies are exact, so write 5.4 Hz as "5.4" or a Fraction.
+        Above 0. Decimals are exact, and so are sums of frequencies.
     angles : tuple of complex
         Amplitudes c of the angles about x, y and z in rad, for a tone that begins at the phase 0; -1j is a sine.
     gain : complex, optional

@@ -77,7 +77,7 @@ class Oscillations:
         The resonances.
     products : list of list of tuple of int
         The products that are kept, by degree.
-    zero, one : Polynomial
+    zero : Polynomial
     """
 
     #: The numbers of the kernels, in double.
@@ -92,7 +92,7 @@ class Oscillations:
         self.products = [sorted(one) for one in kept]
         self.places = [{product: k for k, product in enumerate(one)} for one in self.products]
         self._tables = {(a, b): self._table(a, b) for a in range(DEGREE + 1) for b in range(DEGREE + 1 - a)}
-        self.zero, self.one = self(0), self(1)
+        self.zero = self(0)
 
     def __call__(self, number: Any) -> Polynomial:
         """Return a number as a polynomial; a polynomial itself."""

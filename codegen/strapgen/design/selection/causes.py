@@ -160,7 +160,7 @@ def tones(brief: DesignBrief) -> list[Tone]:
         Tone(
             line.frequency_hz,
             (-1j * line.theta_x, -1j * line.theta_y * cmath.exp(1j * line.phase), 0),
-            brief.gyro.gain(float(line.frequency_hz)),
+            brief.gyro.gain(line.frequency_hz),
         )
         for line in environment.stated
     ]

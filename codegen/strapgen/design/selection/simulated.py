@@ -130,7 +130,7 @@ def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
 @lru_cache(maxsize=2)
 def _vibration(lines: tuple[Line, ...], gyro: GyroBrief) -> Vibration:
     """Return the motion of lines, seen by a gyro, once for all algorithms of a brief."""
-    hertz = np.array([float(line.frequency_hz) for line in lines])
+    hertz = np.array([line.frequency_hz for line in lines])
     omega = 2 * np.pi * hertz
     still = np.zeros_like(omega)
     sizes = np.array([[line.theta_x, line.theta_y] for line in lines]).T
