@@ -44,23 +44,15 @@ _MOST_HZ, _MOST_SECONDS = 1_000_000, 1_000_000
 
 @dataclass(frozen=True)
 class GyroBrief:
-    """The gyro of a brief.
+    """The gyro of a brief."""
 
-    Parameters
-    ----------
-    sample_hz : Fraction
-        Sampling rate in Hz.
-    noise_deg_sqrt_h : float
-        Random walk of the angle on each axis in deg per root of an hour.
-    pulse_arcsec : Fraction
-        Angle of a pulse; 0 for increments that are not quantized.
-    bandwidth_hz, damping : Fraction or None
-        Natural frequency and damping of a gyro of second order; None for one that passes on everything.
-    """
-
+    #: Sampling rate in Hz
     sample_hz: Fraction
+    #: Random walk of the angle on each axis in deg per root of an hour
     noise_deg_sqrt_h: float = 0.0
+    #: Angle of a pulse; 0 for increments that are not quantized
     pulse_arcsec: Fraction = Fraction(0)
+    #: Natural frequency and damping of a gyro of second order; None for one that passes on everything
     bandwidth_hz: Fraction | None = None
     damping: Fraction | None = None
 
@@ -74,23 +66,15 @@ class GyroBrief:
 
 @dataclass(frozen=True)
 class BudgetBrief:
-    """What an algorithm may lose.
+    """What an algorithm may lose."""
 
-    Parameters
-    ----------
-    drift_deg_h : float
-        Angle from the true attitude, divided by the time, of all causes together.
-    over_s : Fraction
-        The time in s over which errors add up.
-    software_share : float
-        Part of it that truncation, coning and rounding may use together.
-    velocity_m_s, position_m : float or None
-        Errors of velocity and position after that time, in which the same share belongs to sculling.
-    """
-
+    #: Angle from the true attitude, divided by the time, of all causes together
     drift_deg_h: float
+    #: The time in s over which errors add up
     over_s: Fraction = _DEFAULT_OVER
+    #: Part of it that truncation, coning and rounding may use together
     software_share: float = float(DEFAULT_SHARE)
+    #: Errors of velocity and position after that time, in which the same share belongs to sculling
     velocity_m_s: float | None = None
     position_m: float | None = None
 
@@ -102,22 +86,15 @@ class BudgetBrief:
 
 @dataclass(frozen=True)
 class ProcessorBrief:
-    """What an algorithm may cost.
+    """What an algorithm may cost."""
 
-    Parameters
-    ----------
-    word : int
-        Bits of a word.
-    operations_per_s, instructions_per_s, bytes : float or None
-        Largest number of operations and of instructions a second, and bytes of code and constants.
-    cpu : str
-        The processor on which instructions and bytes are counted.
-    """
-
+    #: Bits of a word
     word: int = _DEFAULT_WORD
+    #: Largest number of operations and of instructions a second, and bytes of code and constants
     operations_per_s: float | None = None
     instructions_per_s: float | None = None
     bytes: float | None = None
+    #: The processor on which instructions and bytes are counted
     cpu: str = _DEFAULT_CPU
 
     @property
@@ -128,20 +105,11 @@ class ProcessorBrief:
 
 @dataclass(frozen=True)
 class DesignBrief:
-    """An environment, a gyro, a budget and a processor.
+    """An environment, a gyro, a budget and a processor."""
 
-    Parameters
-    ----------
-    max_rate_deg_s : Fraction
-        Largest rate about an axis, vibration included.
-    environment : Environment or None
-        The vibration; None without one.
-    gyro : GyroBrief
-    budget : BudgetBrief
-    processor : ProcessorBrief
-    """
-
+    #: Largest rate about an axis, vibration included
     max_rate_deg_s: Fraction
+    #: The vibration; None without one
     environment: Environment | None
     gyro: GyroBrief
     budget: BudgetBrief
@@ -149,23 +117,7 @@ class DesignBrief:
 
 
 def read_brief(path: str | Path) -> DesignBrief:
-    """Read a brief.
-
-    Parameters
-    ----------
-    path : path
-        A TOML file with the number max_rate_deg_s and the tables vibration, gyro, budget and processor; see
-        docs/design.md. Files that it names are sought beside it.
-
-    Returns
-    -------
-    DesignBrief
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a table, a key or a value is not allowed.
-    """
+    """Read a brief."""
     data = toml_files.content(path, "a brief", _MOST_BYTES, parse_float=str)
     try:
         return _brief(data, Path(path).parent)

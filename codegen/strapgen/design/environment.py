@@ -39,18 +39,7 @@ class Environment(Protocol):
     def error(self, assessment: Assessment, step: Fraction, cycles: int | None = None) -> float:
         """Return the length of the error of the mean rate that an algorithm computes, in its unit.
 
-        Parameters
-        ----------
-        assessment : Assessment
-        step : Fraction
-            Step in s; for a recursion its slow cycle.
-        cycles : int, optional
-            Fast cycles in the slow cycle of a recursion.
-
-        Raises
-        ------
-        InputError
-            If the algorithm has no mean rate under the vibration.
+        `step`: step in s; for a recursion its slow cycle.
         """
 
     def lines(self) -> tuple[Line, ...]:
@@ -59,34 +48,21 @@ class Environment(Protocol):
 
 @dataclass(frozen=True)
 class Line:
-    """A vibration at one frequency: angles X sin(2 pi f t) about x and Y sin(2 pi f t + P) about y.
-
-    Parameters
-    ----------
-    frequency_hz : float
-    theta_x, theta_y : float
-        Amplitudes X and Y in rad.
-    phase : float
-        P in rad.
-    acceleration_y : float
-        Amplitude of the acceleration along y in m/s^2, of the phase P.
-    """
+    """A vibration at one frequency: angles X sin(2 pi f t) about x and Y sin(2 pi f t + P) about y."""
 
     frequency_hz: float
+    #: Amplitudes X and Y in rad
     theta_x: float
     theta_y: float
+    #: P in rad
     phase: float
+    #: Amplitude of the acceleration along y in m/s^2, of the phase P
     acceleration_y: float = 0.0
 
 
 @dataclass(frozen=True)
 class LineEnvironment:
-    """A vibration of some lines, whose effects add up.
-
-    Parameters
-    ----------
-    stated : tuple of Line
-    """
+    """A vibration of some lines, whose effects add up."""
 
     stated: tuple[Line, ...]
 
@@ -126,12 +102,7 @@ class LineEnvironment:
 
 @dataclass(frozen=True)
 class SpectralEnvironment:
-    """A random vibration with a power spectral density.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    """
+    """A random vibration with a power spectral density."""
 
     spectrum: Spectrum
 
@@ -165,17 +136,11 @@ class SpectralEnvironment:
 
 @dataclass(frozen=True)
 class RecordedEnvironment:
-    """The vibration of a recording, as cross spectra of the angles about its axes.
+    """The vibration of a recording, as cross spectra of the angles about its axes."""
 
-    Parameters
-    ----------
-    hertz : array, (K,)
-        Frequencies in Hz at even distances.
-    densities : array, (3, 3, K)
-        One-sided densities S_ab of the angles in rad^2/Hz, with the complex conjugate of b.
-    """
-
+    #: (K,): frequencies in Hz at even distances
     hertz: NDArray[np.float64]
+    #: (3, 3, K): one-sided densities S_ab of the angles in rad^2/Hz, with the complex conjugate of b
     densities: NDArray[np.complex128]
 
     @classmethod
@@ -183,11 +148,6 @@ class RecordedEnvironment:
         """Return the vibration of a file of increments.
 
         The spectra are means over halfway overlapping parts of 1,024 samples under a Hann window.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be read, or is too short.
         """
         recording = read_increments(path)
         count = len(recording.increments)

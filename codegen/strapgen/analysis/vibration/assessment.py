@@ -136,23 +136,6 @@ def two_speed(quantity: str = "drift") -> Assessment:
     The slow loop treats the sum of the increments as the one sample of its cycle, and adds the second-order sums of the
     fast loop to the result. The navigation frame does not rotate.
 
-    Parameters
-    ----------
-    quantity : str, optional
-        "drift" or "sculling".
-
-    Returns
-    -------
-    Assessment
-        Its continuous part is the true rate, without a term in T_m.
-
-    Raises
-    ------
-    InputError
-        If the quantity is unknown.
-
-    Examples
-    --------
     >>> two_speed().text("computed")
     '-pi*f*theta_x*theta_y*sin(phi)*(2*sin(2*pi*T_l*f)/(3*pi*T_l*f) - sin(4*pi*T_l*f)/(12*pi*T_l*f))'
     """
@@ -170,21 +153,6 @@ def two_speed(quantity: str = "drift") -> Assessment:
 def quantities(choice: Choice) -> tuple[str, ...]:
     """Return which of "drift" and "sculling" can be assessed for a kernel of the catalogue; at least one can.
 
-    Parameters
-    ----------
-    choice : Choice
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    InputError
-        If the kernel takes no angle increments.
-
-    Examples
-    --------
     >>> [quantities(catalogue.choose(name)) for name in ("euler", "sculling", "two-speed-fast-2")]
     [('drift', 'sculling'), ('sculling',), ('drift', 'sculling')]
     """

@@ -99,17 +99,6 @@ class BandOptions:
 def command_line(words: Sequence[str], groups: Sequence[Any], **others: str | None) -> str:
     """Return a command with the options that differ from their defaults, and with the names of files alone.
 
-    Parameters
-    ----------
-    words : sequence of str
-        The command.
-    groups : sequence of dataclass
-        Options by field.
-    **others : str or None
-        Further options by name; None leaves one out.
-
-    Examples
-    --------
     >>> command_line(["strapgen", "window", "design"], [BandOptions(band_hz="20", sample_hz="100")], out="a b.toml")
     "strapgen window design --band-hz 20 --sample-hz 100 --out 'a b.toml'"
     """

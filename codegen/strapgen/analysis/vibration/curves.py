@@ -20,22 +20,15 @@ POINTS = 400
 
 @dataclass(frozen=True)
 class Curve:
-    """The mean rates of an algorithm as functions of frequency.
+    """The mean rates of an algorithm as functions of frequency."""
 
-    Parameters
-    ----------
-    label : str
-        Name of the kernel.
-    unit : str
-        "rad/s" or "m/s^2".
-    frequencies_hz : array, (N,)
-    continuous, error : array, (N,)
-        The true rate, and the error of the algorithm, in that unit.
-    """
-
+    #: Name of the kernel
     label: str
+    #: "rad/s" or "m/s^2"
     unit: str
+    #: (N,)
     frequencies_hz: Array
+    #: (N,): the true rate, and the error of the algorithm, in that unit
     continuous: Array
     error: Array
 
@@ -43,23 +36,8 @@ class Curve:
 def frequencies(low: float | str | Fraction, high: float | str | Fraction, points: int = POINTS) -> Array:
     """Return frequencies in Hz at equal ratios from one end to the other.
 
-    Parameters
-    ----------
-    low, high : number
-        Ends in Hz, above 0.
-    points : int, optional
+    `low, high`: ends in Hz, above 0. Returns (points,).
 
-    Returns
-    -------
-    array, (points,)
-
-    Raises
-    ------
-    InputError
-        If an end is not above 0, or the ends do not rise.
-
-    Examples
-    --------
     >>> frequencies(1, 100, 3)
     array([  1.,  10., 100.])
     """
@@ -83,22 +61,7 @@ def curve(
 ) -> Curve:
     """Return the rates of an algorithm for the vibration of equation (65) or (70), at many frequencies.
 
-    Parameters
-    ----------
-    assessment : Assessment
-    hertz : array, (N,)
-        Frequencies in Hz, above 0.
-    step, theta_x, theta_y, phase, acceleration_y, cycles
-        As for `Assessment.rates`.
-
-    Returns
-    -------
-    Curve
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed, or the rates are beyond the range of double.
+    `hertz` (N,): frequencies in Hz, above 0.
     """
     amplitude_x, amplitude_y, angle, amplitude = (
         float(checks.number(what, value))

@@ -22,37 +22,18 @@ _ORDER = 2
 
 
 class Expansion(NamedTuple):
-    """A polynomial of second degree in named inputs, which approximates a function of small inputs.
-
-    Parameters
-    ----------
-    constant : number
-    linear : dict of str to number
-        Coefficients of the inputs.
-    square : dict of (str, str) to number
-        Coefficients of products of two inputs, each product once.
-    """
+    """A polynomial of second degree in named inputs, which approximates a function of small inputs."""
 
     constant: Number
+    #: Coefficients of the inputs
     linear: dict[str, Number]
+    #: Coefficients of products of two inputs, each product once
     square: dict[Pair, Number]
 
 
 class Expander:
     """Evaluates kernels on series in the size of their inputs, in the smallest field that holds their numbers.
 
-    Parameters
-    ----------
-    kernels : iterable of Kernel
-        The kernels that will be evaluated.
-
-    Attributes
-    ----------
-    domain : domain of SymPy
-        The field.
-
-    Examples
-    --------
     >>> from strapgen import derive
     >>> expander = Expander([derive("coning-slow")])
     >>> inputs = {name: expander.variable(name) for name in ("beta_x", "coning_x")}
@@ -110,13 +91,7 @@ class Expander:
         )
 
     def __call__(self, kernel: Kernel, inputs: Mapping[str, Powers]) -> dict[str, list[Powers]]:
-        """Return the outputs of a kernel, row-major; missing elements of inputs are zero.
-
-        Raises
-        ------
-        InputError
-            If the kernel has no expansion where its inputs are zero.
-        """
+        """Return the outputs of a kernel, row-major; missing elements of inputs are zero."""
         exact = self._kernels[kernel.name]
         names = chain.from_iterable(signal.elements for signal in exact.inputs)
         values = {name: inputs.get(name) or self.constant(0) for name in names}

@@ -22,17 +22,12 @@ _MOST_PANELS = 100_000
 
 
 class Integral(NamedTuple):
-    """Integrals of several functions.
+    """Integrals of several functions."""
 
-    Parameters
-    ----------
-    values : array, (n,)
-    errors : array, (n,)
-        Sum over the panels of the difference between a rule and one with about half as many points. The values are
-        those of the better rule, so their error is far smaller.
-    """
-
+    #: (n,)
     values: Array
+    #: (n,): sum over the panels of the difference between a rule and one with about half as many points. The
+    #: values are those of the better rule, so their error is far smaller
     errors: Array
 
 
@@ -46,28 +41,8 @@ def integrate(
 ) -> Integral:
     """Integrate functions over a range.
 
-    Parameters
-    ----------
-    function : callable
-        ``function(x)`` takes x of shape (N,) and returns the values of n functions, (n, N).
-    edges : sequence of float
-        The beginning and the end of the range, and between them all points where a function or its slope jumps.
-    width : float
-        Width of the widest panel at the start; choose about a period of the fastest oscillation.
-    tolerance : float, optional
-        Allowed error relative to the integral of the magnitude of each function.
+    `function`: ``function(x)`` takes x of shape (N,) and returns the values of n functions, (n, N).
 
-    Returns
-    -------
-    Integral
-
-    Raises
-    ------
-    InputError
-        If a function or its integral is not finite, or a function needs too many panels.
-
-    Examples
-    --------
     >>> integral = integrate(lambda x: np.array([np.sin(x), x**2]), [0, np.pi], 1.0)
     >>> integral.values.round(9), bool(np.all(integral.errors < 1e-10))
     (array([ 2.        , 10.33542556]), True)

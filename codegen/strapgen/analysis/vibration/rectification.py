@@ -51,37 +51,23 @@ class Tone(NamedTuple):
 
 
 class Sampling(NamedTuple):
-    """The samples that an attitude step takes.
+    """The samples that an attitude step takes."""
 
-    Parameters
-    ----------
-    step : Fraction
-        Length of a step in s.
-    samples : int
-        Samples of the step itself, of equal length.
-    intervals : range
-        Numbers of the sampling intervals that it takes: 0 is the first of the step, -1 the one before it.
-    """
-
+    #: Length of a step in s
     step: Fraction
+    #: Samples of the step itself, of equal length
     samples: int
+    #: Numbers of the sampling intervals that it takes: 0 is the first of the step, -1 the one before it
     intervals: range
 
 
 class _Term(NamedTuple):
-    """What products of one order and of the same phase add to the error of the mean rate.
-
-    Parameters
-    ----------
-    order : int
-    turns : tuple of int
-        How often the start phase of each tone is in that of the term; the first one that is not 0 is positive.
-    rate : array, (3,)
-        The complex vector r in rad/s; the term is Re(r exp(j phase)).
-    """
+    """What products of one order and of the same phase add to the error of the mean rate."""
 
     order: int
+    #: How often the start phase of each tone is in that of the term; the first one that is not 0 is positive
     turns: tuple[int, ...]
+    #: (3,): the complex vector r in rad/s; the term is Re(r exp(j phase))
     rate: Array
 
 
@@ -274,15 +260,7 @@ def _generator(
 ) -> dict[int, Array]:
     """Return Omega of each degree as a vector for every product, in rad a step, or in rad/s without a step.
 
-    Parameters
-    ----------
-    ring : Oscillations
-    driving : mapping of int to array, (3, 3, number of products)
-        A - I by degree, or [w x].
-    hertz : sequence of Fraction
-        Frequencies of the tones.
-    step : Fraction or None
-        Length of a step in s.
+    `driving` (3, 3, number of products): a - I by degree, or [w x]. `step`: length of a step in s.
     """
     oscillating = {0: np.eye(3, dtype=complex)[:, :, None]}
     moved: dict[int, Array] = {}

@@ -28,17 +28,6 @@ Array = NDArray[np.complex128]
 def resonances(shares: Sequence[Fraction]) -> list[Product]:
     """Return the products of up to four oscillations that have a mean.
 
-    Parameters
-    ----------
-    shares : sequence of Fraction
-        Periods of each line in a step.
-
-    Returns
-    -------
-    list of tuple of int
-
-    Examples
-    --------
     One line, and a second one of twice its frequency:
 
     >>> len(resonances([Fraction(1, 10)]))
@@ -65,19 +54,6 @@ class Oscillations:
     """The ring of polynomials in the oscillations of lines, up to what divides no resonance.
 
     It takes the place of a ring of SymPy as that of the coefficients of `power_series.Powers`.
-
-    Parameters
-    ----------
-    shares : sequence of Fraction
-        Periods of each line in a step.
-
-    Attributes
-    ----------
-    resonant : list of tuple of int
-        The resonances.
-    products : list of list of tuple of int
-        The products that are kept, by degree.
-    zero : Polynomial
     """
 
     #: The numbers of the kernels, in double.
@@ -127,14 +103,7 @@ class Oscillations:
     def product(self, a: int, x: Array, b: int, y: Array, form: str = "n,n->n") -> Array:
         """Return the coefficients of a product of homogeneous polynomials, or of matrices of them.
 
-        Parameters
-        ----------
-        a, b : int
-            The degrees.
-        x, y : array, (..., number of products)
-            Coefficients by the products of each degree.
-        form : str, optional
-            How `numpy.einsum` multiplies two coefficients.
+        `x, y` (..., number of products): coefficients by the products of each degree.
         """
         left, right, begins = self._tables[a, b]
         terms = np.einsum(form, x[..., left], y[..., right])
@@ -144,12 +113,7 @@ class Oscillations:
 class Polynomial:
     """A homogeneous polynomial in the oscillations of lines.
 
-    Parameters
-    ----------
-    ring : Oscillations
-    degree : int
-    values : array, (number of products)
-        Coefficients by the products of this degree.
+    `values` (number of products): coefficients by the products of this degree.
     """
 
     __slots__ = ("degree", "ring", "values")

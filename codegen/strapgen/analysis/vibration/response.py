@@ -17,14 +17,9 @@ Pair = tuple[str, str]
 
 
 class Form(NamedTuple):
-    """The complex factor H of two channels with amplitudes a and b, whose mean rate is the real part of H a b*.
+    """The complex factor H of two channels with amplitudes a and b, whose mean rate is the real part of H a b*."""
 
-    Parameters
-    ----------
-    real, imaginary : Expr
-        Functions of the frequency f in Hz and the times of the algorithm in s.
-    """
-
+    #: Functions of the frequency f in Hz and the times of the algorithm in s
     real: sp.Expr
     imaginary: sp.Expr
 
@@ -43,19 +38,6 @@ def forms(system: System) -> dict[Pair, Form]:
     x(l + 1) = P x(l) + R s(l), so x(l) = Re(U z^l + V) with U = (z I - P)^-1 R sigma; V makes a state that is reset
     start from zero. The watched sum grows by products of two states or samples, and the mean of Re(u z^l) Re(v z^l) is
     Re(u v*)/2.
-
-    Parameters
-    ----------
-    system : System
-
-    Returns
-    -------
-    dict of (str, str) to Form
-
-    Raises
-    ------
-    InputError
-        If the states do not follow this form, or the kernel does not accumulate the watched sum.
     """
     states = list(system.following)
     domain = system.domain
@@ -219,17 +201,9 @@ def _time(system: System, shift: Shift) -> sp.Expr:
 def true_forms(kind: str, endless: bool) -> dict[Pair, Form]:
     """Return the factors of the true mean rate of an integral, from its definition.
 
-    Parameters
-    ----------
-    kind : str
-        "coning" is half the integral of beta x w, equation (22); "S1" the integral of beta x a; "S2" half the integral
-        of beta x a + u x w, equation (50). Here beta and u are the integrals of w and a since the slow cycle began.
-    endless : bool
-        Whether the mean is taken over a very long time instead of the slow cycle T_m.
-
-    Returns
-    -------
-    dict of (str, str) to Form
+    `kind`: "coning" is half the integral of beta x w, equation (22); "S1" the integral of beta x a; "S2" half
+    the integral of beta x a + u x w, equation (50). Here beta and u are the integrals of w and a since the slow
+    cycle began.
     """
     omega = sp.Symbol("omega", positive=True)
     # beta or u over its amplitude is exp(j omega t) - 1, and w or a is its derivative. The mean of their product with

@@ -43,43 +43,28 @@ _WHOLE_CHANGE = "velocity_change"
 
 @dataclass(frozen=True)
 class System:
-    """A kernel to second order, with the samples that drive it.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    domain : domain of SymPy
-        The field of all numbers.
-    following : dict of str to Expansion
-        Every element of the states after a call as a function of the elements before it and of the samples.
-    begun_anew : frozenset of str
-        Elements that are reset to zero in every slow cycle; may be empty.
-    samples : dict of str to dict of str to Wave
-        The response of every element of the samples to every channel.
-    cycle : tuple of int
-        The time from call to call as a shift.
-    slow_cycle : tuple of int or None
-        The slow cycle as a shift; None if the recursion has no end.
-    times : tuple of Expr
-        Basic times of the shifts in s.
-    watched : dict of str to number
-        Weights of the elements in the sum whose growth is assessed.
-    unit : str
-        Its unit: rad or m/s.
-    rates : bool
-        Whether the samples are rates times the cycle, so that the waves have to be multiplied by j omega T.
-    """
+    """A kernel to second order, with the samples that drive it."""
 
     kernel: Kernel
+    #: The field of all numbers
     domain: Any
+    #: Every element of the states after a call as a function of the elements before it and of the samples
     following: dict[str, Expansion]
+    #: Elements that are reset to zero in every slow cycle; may be empty
     begun_anew: frozenset[str]
+    #: The response of every element of the samples to every channel
     samples: dict[str, dict[str, Wave]]
+    #: The time from call to call as a shift
     cycle: Shift
+    #: The slow cycle as a shift; None if the recursion has no end
     slow_cycle: Shift | None
+    #: Basic times of the shifts in s
     times: tuple[sp.Expr, ...]
+    #: Weights of the elements in the sum whose growth is assessed
     watched: dict[str, Number]
+    #: Its unit: rad or m/s
     unit: str
+    #: Whether the samples are rates times the cycle, so that the waves have to be multiplied by j omega T
     rates: bool = False
 
 
@@ -92,29 +77,7 @@ def of(
 ) -> System:
     """Return the system of a kernel.
 
-    Parameters
-    ----------
-    kernel : Kernel
-        An attitude step, the rotation vector or the sculling term of one, or a recursion that sums such terms over a
-        slow cycle.
-    unit : str, optional
-        For a recursion that sums coning and sculling, the one to assess: "rad" or "m/s".
-    nodes : sequence of Fraction or Expr, optional
-        Nodes of a step that takes rates.
-    previous, ahead : int, optional
-        Numbers of samples from before the step and from after it, for the vector of a step; an attitude step has these
-        numbers.
-
-    Returns
-    -------
-    System
-
-    Raises
-    ------
-    InputTypeError
-        If `kernel` is no `Kernel`.
-    InputError
-        If the kernel is none of these, or has no expansion to second order.
+    `unit`: for a recursion that sums coning and sculling, the one to assess: "rad" or "m/s".
     """
     sampled = [signal for signal in checked(kernel).inputs if signal.name in SAMPLES]
     if not any(signal.unit == "rad" for signal in sampled):
@@ -137,13 +100,7 @@ def _check_beside(signal: Signal, previous: int, ahead: int) -> None:
 
 
 def checked(kernel: Any) -> Kernel:
-    """Return the argument if it is a kernel.
-
-    Raises
-    ------
-    InputTypeError
-        If it is no kernel.
-    """
+    """Return the argument if it is a kernel."""
     if not isinstance(kernel, Kernel):
         raise InputTypeError(f"kernel is {kernel!r}; a Kernel is needed")
     return kernel

@@ -27,27 +27,7 @@ def vibration_image(
 ) -> bytes:
     """Return the errors of algorithms under vibration against frequency: drift in deg/h, acceleration in micro-g.
 
-    Parameters
-    ----------
-    curves : sequence of (str, Curve)
-        Labels and curves; those in rad/s and those in m/s^2 have a panel each.
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-    mark_hz : float, optional
-        A frequency to mark.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
+    `curves`: labels and curves; those in rad/s and those in m/s^2 have a panel each.
     """
     panels = {unit: [(label, curve) for label, curve in curves if curve.unit == unit] for unit in _RATES}
     panels = {unit: group for unit, group in panels.items() if group}

@@ -38,19 +38,12 @@ _REPAIRS = {
 
 @dataclass(frozen=True)
 class AssessedCase:
-    """An assessment as it stands in a report.
-
-    Parameters
-    ----------
-    assessment : Assessment
-    cycles : int or None
-        Fast cycles in a step of an algorithm in two speeds; None for any other algorithm.
-    samples : int
-        Samples in a step.
-    """
+    """An assessment as it stands in a report."""
 
     assessment: Assessment
+    #: Fast cycles in a step of an algorithm in two speeds; None for any other algorithm
     cycles: int | None
+    #: Samples in a step
     samples: int
 
     @property
@@ -77,19 +70,12 @@ class AssessedCase:
 
 @dataclass(frozen=True)
 class CaseRates:
-    """The mean rates of a case.
-
-    Parameters
-    ----------
-    case : AssessedCase
-    rates : Rates
-        In the unit of the assessment.
-    quadrature : Rates or None
-        Estimates of the error of quadrature under random vibration; None at one frequency.
-    """
+    """The mean rates of a case."""
 
     case: AssessedCase
+    #: In the unit of the assessment
     rates: Rates
+    #: Estimates of the error of quadrature under random vibration; None at one frequency
     quadrature: Rates | None = None
 
 
@@ -121,13 +107,7 @@ def _algorithm_data(group: Sequence[CaseRates]) -> dict[str, Any]:
 
 
 def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
-    """Return mean rates as text: a table for drift and one for sculling; closed forms where one algorithm is assessed.
-
-    Raises
-    ------
-    InputError
-        If a rate in the unit that a person reads is beyond the range of double.
-    """
+    """Return mean rates as text: tables for drift and sculling, and closed forms where one algorithm is assessed."""
     lines = [f"mean rates about z, to second order in the amplitudes; {title}"]
     for unit in READABLE_UNITS:
         group = [outcome for outcome in outcomes if outcome.case.assessment.unit == unit]
@@ -204,13 +184,7 @@ def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
 def vibration_report(outcomes: Sequence[CaseRates], cases: Sequence[AssessedCase], title: str) -> Report:
     """Return mean rates as a report, whose table has a row for each quantity of each algorithm.
 
-    Parameters
-    ----------
-    outcomes : sequence of CaseRates
-    cases : sequence of AssessedCase
-        The cases themselves, whose closed forms LaTeX shows.
-    title : str
-        The vibration in words.
+    `title`: the vibration in words.
     """
 
     def data() -> Any:

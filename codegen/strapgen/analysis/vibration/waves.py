@@ -15,24 +15,16 @@ Matrix = list[list[Any]]
 class Wave:
     """A sum of terms c exp(j omega t) with shifts t, divided by a power of exp(j omega T) - 1, where T is the cycle.
 
-    Parameters
-    ----------
-    cycle : tuple of int
-        The cycle as a shift.
-    terms : dict of tuple of int to number
-        Real coefficients by shifts.
-    poles : int
-        The power in the denominator; the fraction is reduced.
-
-    Examples
-    --------
     >>> step = Wave((2,), {(2,): 1, (0,): -1})
     >>> step.summed().terms, step.conjugate().terms
     ({(0,): 1}, {(-2,): 1, (0,): -1})
     """
 
+    #: The cycle as a shift
     cycle: Shift
+    #: Real coefficients by shifts
     terms: dict[Shift, Any]
+    #: The power in the denominator; the fraction is reduced
     poles: int = 0
 
     def __add__(self, other: Wave) -> Wave:
@@ -130,14 +122,6 @@ def resolvent(matrix: Matrix, one: Any) -> tuple[list[Matrix], int, int] | None:
 
     The algorithm is that of Faddeev and Le Verrier. The result is None if P has other eigenvalues than 0 and 1.
 
-    Parameters
-    ----------
-    matrix : list of list of number, n x n
-    one : number
-        The number 1 of their field.
-
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> memory = [[Fraction(1), Fraction(2)], [Fraction(0), Fraction(0)]]
     >>> powers, zeros, ones = resolvent(memory, Fraction(1))

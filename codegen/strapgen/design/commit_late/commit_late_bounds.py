@@ -30,17 +30,11 @@ _BITS = 80
 
 
 class Advance(NamedTuple):
-    """What one step adds to the distance from exact arithmetic.
+    """What one step adds to the distance from exact arithmetic."""
 
-    Parameters
-    ----------
-    error : Fraction
-        Length of the difference that it adds, of a row for a matrix.
-    stretch : Fraction
-        What it can multiply the distance before it by.
-    """
-
+    #: Length of the difference that it adds, of a row for a matrix
     error: Fraction
+    #: What it can multiply the distance before it by
     stretch: Fraction
 
 
@@ -51,29 +45,7 @@ def now_errors(
     interfaces: tuple[Interface, Interface],
     truncation: Truncation,
 ) -> NowErrors:
-    """Return bounds of the distance of the attitude of now from that of exact arithmetic.
-
-    Parameters
-    ----------
-    filters : LateFilters
-    fixed : FixedFilters
-        The taps as integers.
-    programs : tuple of Program
-        The step, and the step from Legendre coefficients.
-    interfaces : tuple of Interface
-        Those of their code in fixed point.
-    truncation : Truncation
-        What the series of a transition leaves out of a rotation.
-
-    Returns
-    -------
-    NowErrors
-
-    Raises
-    ------
-    InputError
-        If samples are so large that the series of a rotation does not converge.
-    """
+    """Return bounds of the distance of the attitude of now from that of exact arithmetic."""
     running = _moved(filters.sets, fixed.sets, fixed, interfaces[1])
     starting = _moved(filters.short, fixed.short, fixed, interfaces[1])
     whole = _stretch(filters, fixed, programs[0], interfaces[0], truncation)

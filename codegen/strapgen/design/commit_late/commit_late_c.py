@@ -24,12 +24,7 @@ _COUNTED = ("multiply", "add")
 
 @dataclass(frozen=True)
 class CallCost:
-    """Multiplications and additions.
-
-    Parameters
-    ----------
-    multiply, add : int
-    """
+    """Multiplications and additions."""
 
     multiply: int = 0
     add: int = 0
@@ -59,21 +54,14 @@ class CallCost:
 
 @dataclass(frozen=True)
 class LateCosts:
-    """What calls of the generated functions cost at most.
+    """What calls of the generated functions cost at most."""
 
-    Parameters
-    ----------
-    commit : CallCost
-        A commit with all samples ahead, which nearly every sample is.
-    start, gap : CallCost
-        The most in one call of ``_push``, at the start and after a gap, both where a gap ends the start.
-    now, now_gap : CallCost
-        The attitude of now, without a gap and with one.
-    """
-
+    #: A commit with all samples ahead, which nearly every sample is
     commit: CallCost
+    #: The most in one call of ``_push``, at the start and after a gap, both where a gap ends the start
     start: CallCost
     gap: CallCost
+    #: The attitude of now, without a gap and with one
     now: CallCost
     now_gap: CallCost
 
@@ -107,25 +95,7 @@ def whole(
     functions: tuple[Sources, Sources, Sources],
     fixed: FixedFilters | None = None,
 ) -> Sources:
-    """Generate the C that commits late and answers now.
-
-    Parameters
-    ----------
-    name : str
-        What all names of functions and files begin with.
-    title, command : str
-        A line for the head of the files, and the command line that generates them.
-    filters : LateFilters
-    functions : tuple of Sources
-        C of the step, of the step from Legendre coefficients and of the normalization.
-    fixed : FixedFilters, optional
-        The taps of the filters as integers, where the functions are in fixed point.
-
-    Returns
-    -------
-    Sources
-        The files of the whole and those of the functions.
-    """
+    """Generate the C that commits late and answers now."""
     step, rotation, normalization = functions
     state, result = step.function.inputs[0], step.function.outputs[0]
     rows = filters.sums

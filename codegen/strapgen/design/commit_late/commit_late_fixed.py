@@ -29,28 +29,7 @@ WORD, WIDE = 32, 64
 def functions(
     filters: LateFilters, choices: tuple[Choice, Choice, Choice], target: str, settings: Settings
 ) -> tuple[tuple[Sources, Sources, Sources], FixedFilters, LateFilters]:
-    """Return the generated functions in formats that fit together, and the taps for them.
-
-    Parameters
-    ----------
-    filters : LateFilters
-    choices : tuple of Choice
-        The step, the step from Legendre coefficients and the normalization.
-    target : str
-        A target in fixed point.
-    settings : Settings
-        Of words of 32 bits, which the counts of a gyro have too.
-
-    Returns
-    -------
-    tuple
-        The functions, the taps and the filters whose taps they are.
-
-    Raises
-    ------
-    InputError
-        If the rotation is exact, or the settings have other words, a state that saturates, or ranges or formats.
-    """
+    """Return the generated functions in formats that fit together, and the taps for them."""
     if filters.exact:
         raise InputError(
             f"the rotation of {filters.window.name} is exact; in fixed point only that to fourth order can be "
@@ -146,17 +125,6 @@ def rounded(taps: Sequence[Fraction], fraction: int, moments: int) -> Integers:
 
     The error of each tap goes on to the next ones, and the last taps take up what is left, a few units.
 
-    Parameters
-    ----------
-    taps : sequence of Fraction
-        Their sum, and with two moments the sum of each times its number, is a multiple of 2^-fraction; otherwise these
-        sums are rounded.
-    fraction : int
-    moments : int
-        1, or 2.
-
-    Examples
-    --------
     >>> rounded([Fraction(-1, 3), Fraction(0), Fraction(1, 3)], 4, 1)
     (-5, 0, 5)
     """

@@ -35,44 +35,22 @@ NORMALIZATIONS = {"dcm": "dcm-orthonormalize-first-order", "euler": "euler-norma
 
 @dataclass(frozen=True)
 class LateSources:
-    """What commits an attitude late and answers it now.
-
-    Parameters
-    ----------
-    filters : LateFilters
-    step : Sources
-        The step of the window, which is committed.
-    rotation : Sources
-        The step from Legendre coefficients, which all other filters share.
-    normalization : Sources
-        Removes rounding from a committed attitude.
-    fixed : FixedFilters or None
-        The taps as integers, in fixed point.
-    """
+    """What commits an attitude late and answers it now."""
 
     filters: LateFilters
+    #: The step of the window, which is committed
     step: Sources
+    #: The step from Legendre coefficients, which all other filters share
     rotation: Sources
+    #: Removes rounding from a committed attitude
     normalization: Sources
+    #: The taps as integers, in fixed point
     fixed: FixedFilters | None = None
 
 
 def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choice]:
     """Return the choices of the step, of the step from Legendre coefficients and of the normalization.
 
-    Parameters
-    ----------
-    filters : LateFilters
-    algorithm : str
-        A key of `NORMALIZATIONS`.
-
-    Raises
-    ------
-    InputError
-        If the algorithm is unknown.
-
-    Examples
-    --------
     >>> [choice.kernel for choice in kernels(family("window-7-7"), "euler")]
     ['euler-window-7-7', 'euler-legendre-4', 'euler-normalize-first-order']
     """
@@ -87,24 +65,8 @@ def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choic
 def family(window: str | Window, sample_hz: float | str | Fraction | None = None) -> LateFilters:
     """Return the filters of a family, if they go with the sampling rate.
 
-    Parameters
-    ----------
-    window : str or Window
-        A window of the catalogue by its name, or a family.
-    sample_hz : number, optional
-        Sampling rate in Hz, which a family that is designed for a gyro needs.
+    `sample_hz`: sampling rate in Hz, which a family that is designed for a gyro needs.
 
-    Returns
-    -------
-    LateFilters
-
-    Raises
-    ------
-    InputError
-        If the name is unknown, the window is no whole family, or it is designed for a gyro at another rate.
-
-    Examples
-    --------
     >>> family("window-5-5").samples
     11
     """
@@ -121,23 +83,7 @@ def family(window: str | Window, sample_hz: float | str | Fraction | None = None
 
 
 def parts(filters: LateFilters, algorithm: str, target: str, settings: Settings | None = None) -> LateSources:
-    """Return the generated functions with their filters.
-
-    Parameters
-    ----------
-    filters : LateFilters
-    algorithm : str
-        A key of `NORMALIZATIONS`.
-    target : str
-        A key of `strapgen.targets.TARGETS`.
-    settings : Settings, optional
-        Of fixed point.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, or the settings do not go with the target.
-    """
+    """Return the generated functions with their filters."""
     choices = kernels(filters, algorithm)
     targets.require(target, settings)
     if targets.TARGETS[target].fixed:
@@ -159,30 +105,8 @@ def sources(
 ) -> Sources:
     """Return the C that commits an attitude late and answers it now.
 
-    Parameters
-    ----------
-    window, sample_hz
-        As for `family`.
-    algorithm : str, optional
-        A key of `NORMALIZATIONS`.
-    target : str, optional
-        "c", "c-float" or "c-fixed".
-    name : str, optional
-        What the names of functions and files begin with; by default it follows from algorithm and window.
-    settings : Settings, optional
-        Of fixed point, with words of 32 bits; by default increments are up to 1/8 rad.
+    `settings`: of fixed point, with words of 32 bits; by default increments are up to 1/8 rad.
 
-    Returns
-    -------
-    Sources
-
-    Raises
-    ------
-    InputError
-        If a name is unknown or too long, or the window cannot be committed late.
-
-    Examples
-    --------
     >>> list(sources("window-3-3").files)[:4]
     ['euler_late_3_3.h', 'euler_late_3_3.c', 'euler_window_3_3.h', 'euler_window_3_3.c']
     """

@@ -17,52 +17,34 @@ class NowErrors(NamedTuple):
 
     They are lengths of the difference of the state, of a row for a matrix. The integers are those of the committed
     attitude and of the samples that are held.
-
-    Parameters
-    ----------
-    running : Fraction
-        With L intervals waiting.
-    start : Fraction
-        With up to p + L, before as many samples are there as filters take.
-    gap : Fraction
-        While a lost sample waits to be restored.
     """
 
+    #: With L intervals waiting
     running: Fraction = Fraction(0)
+    #: With up to p + L, before as many samples are there as filters take
     start: Fraction = Fraction(0)
+    #: While a lost sample waits to be restored
     gap: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
 class FixedFilters:
-    """The taps of all filters as integers.
+    """The taps of all filters as integers."""
 
-    Parameters
-    ----------
-    limit : int
-        Largest magnitude of a sample.
-    fraction : int
-        Fraction bits of a sample.
-    sums : range
-        Legendre coefficients that are sums of samples; of an ideal gyro the first one is a sample itself.
-    sets, short : tuple of tuple of tuple of int
-        The filters as in `LateFilters`, rows of `sums`.
-    shifts : tuple of int
-        Bits by which the sum of each row is shifted down.
-    restoring : tuple of tuple of int, (2, 17)
-        The filters of a lost sample, and of one whose sum with the next is known.
-    restoring_shift : int
-        Bits by which their sums are shifted down.
-    now_errors : NowErrors
-        Bounds of the distance of the attitude of now from exact arithmetic, see `library.commit_late_bounds`.
-    """
-
+    #: Largest magnitude of a sample
     limit: int
+    #: Fraction bits of a sample
     fraction: int
+    #: Legendre coefficients that are sums of samples; of an ideal gyro the first one is a sample itself
     sums: range
+    #: The filters as in `LateFilters`, rows of `sums`
     sets: tuple[tuple[Integers, ...], ...]
     short: tuple[tuple[Integers, ...], ...]
+    #: Bits by which the sum of each row is shifted down
     shifts: Integers
+    #: The filters of a lost sample, and of one whose sum with the next is known
     restoring: tuple[Integers, Integers]
+    #: Bits by which their sums are shifted down
     restoring_shift: int
+    #: Bounds of the distance of the attitude of now from exact arithmetic, see `library.commit_late_bounds`
     now_errors: NowErrors = field(default_factory=NowErrors)

@@ -31,32 +31,18 @@ Rows = tuple[Taps, ...]
 class LateFilters:
     """All filters that commit an attitude late, and answer it now.
 
-    Parameters
-    ----------
-    window : Window
-        A family with steps of one sample.
-    calm_start : bool, optional
-        Whether the first intervals of a recording have filters of small noise gain too, which words can hold, in place
-        of the family's own for its start.
-    scale : Fraction, optional
-        What the samples are multiplied by to be increments in rad: that of the counts of a gyro.
-
-    Raises
-    ------
-    InputError
-        If the family has steps of several samples or an exact rotation of another number of terms than the
-        catalogue's, or one-sided filters are missing.
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> filters = LateFilters(WINDOWS["window-3-3"])
     >>> filters.samples, filters.capacity, filters.most_commits, len(filters.sets), len(filters.short)
     (7, 17, 9, 7, 10)
     """
 
+    #: A family with steps of one sample
     window: Window
+    #: Whether the first intervals of a recording have filters of small noise gain too, which words can hold, in
+    #: place of the family's own for its start
     calm_start: bool = False
+    #: What the samples are multiplied by to be increments in rad: that of the counts of a gyro
     scale: Fraction = Fraction(1)
 
     def __post_init__(self) -> None:
@@ -135,15 +121,6 @@ class LateFilters:
 def short_place(count: int, place: int) -> int:
     """Return where the filters of an interval stand in `LateFilters.short`.
 
-    Parameters
-    ----------
-    count : int
-        Samples of the polynomial, 1 to 4.
-    place : int
-        Number of them before the interval.
-
-    Examples
-    --------
     >>> [short_place(3, place) for place in range(3)]
     [3, 4, 5]
     """
@@ -153,21 +130,6 @@ def short_place(count: int, place: int) -> int:
 def polynomial(count: int, place: int, degree: int) -> Rows:
     """Return the Legendre coefficients over one interval of the polynomial rate that has some increments.
 
-    Parameters
-    ----------
-    count : int
-        Increments, as many as the coefficients of the polynomial.
-    place : int
-        Number of them before the interval.
-    degree : int
-        Highest Legendre coefficient; above the degree of the polynomial they are zero.
-
-    Returns
-    -------
-    tuple of tuple of Fraction, (degree + 1, count)
-
-    Examples
-    --------
     >>> [[str(tap) for tap in row] for row in polynomial(2, 1, 2)]
     [['0', '1'], ['-1/2', '1/2'], ['0', '0']]
     """

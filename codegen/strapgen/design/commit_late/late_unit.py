@@ -90,13 +90,7 @@ class LateUnit:
         self._feedback, self._commits = self._step.fresh(1), 0
 
     def push(self, sample: Array, kind: int) -> int:
-        """Take a sample, (3,), of a `SampleKind`, and return how many intervals it commits.
-
-        Raises
-        ------
-        GapError
-            If a lost sample cannot be restored, or the sum of two intervals follows no lost one.
-        """
+        """Take a sample, (3,), of a `SampleKind`, and return how many intervals it commits."""
         reason = refusal(kind, self._gap, len(self._samples))
         if reason:
             raise GapError(reason)

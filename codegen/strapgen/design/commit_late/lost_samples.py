@@ -30,30 +30,17 @@ _REAL.dps = 50
 
 
 class Restoration(NamedTuple):
-    """The filters that restore a lost sample, the oldest tap first: those of samples -8 to 8, 0 the lost one.
+    """The filters that restore a lost sample, the oldest tap first: those of samples -8 to 8, 0 the lost one."""
 
-    Parameters
-    ----------
-    lost : tuple of Fraction, (17,)
-        The tap of the lost sample is 0.
-    merged : tuple of Fraction, (17,)
-        Where the sum of the lost sample and the next one is known: both have the tap of the sum.
-    """
-
+    #: The tap of the lost sample is 0
     lost: Taps
+    #: Where the sum of the lost sample and the next one is known: both have the tap of the sum
     merged: Taps
 
 
 def restoration(window: Window) -> Restoration:
     """Return the filters that restore a lost sample within the band of a window.
 
-    Parameters
-    ----------
-    window : Window
-        Its band and its gyro matter.
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> filters = restoration(WINDOWS["window-3-3"])
     >>> sum(filters.lost), sum(filters.merged), [round(float(tap), 4) for tap in filters.lost[8:]]

@@ -18,15 +18,6 @@ BACKENDS = ("numpy", "c", "c-float")
 def covers(choice: Choice, backend: str) -> bool:
     """Return whether a recording is covered as a whole: by a family of filters with steps of one sample.
 
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step.
-    backend : str
-        Name of its back end.
-
-    Examples
-    --------
     >>> from strapgen import choose
     >>> covers(choose("euler", "window-7-7"), "c"), covers(choose("euler", "rk4"), "c")
     (True, False)
@@ -55,27 +46,6 @@ def propagate_whole(
     The intervals at both ends have filters with fewer samples on one side. The states are normalized, whatever the
     interval of orthonormalization.
 
-    Parameters
-    ----------
-    choice : Choice
-        A step that `covers` its recordings.
-    backend : str
-        Name of a back end.
-    recording : Recording
-    orthonormalize, record, pulse : number, optional
-        As for `recording.propagate`.
-
-    Returns
-    -------
-    History
-
-    Raises
-    ------
-    InputError
-        If the window does not cover a recording, the recording is empty, or a number does not fit.
-
-    Examples
-    --------
     >>> from strapgen import choose
     >>> history = propagate_whole(choose("euler", "window-3-3"), "numpy", Recording(0.0, 0.01, np.full((9, 3), 1e-3)))
     >>> history.states.shape, history.time[[0, -1]].tolist()

@@ -90,13 +90,7 @@ def generate(
 def generated(
     window: str, algorithm: str, target: str, sample_hz: str | None, fixed: FixedOptions, name: str | None
 ) -> Sources:
-    """Return the sources that the options ask for.
-
-    Raises
-    ------
-    InputError
-        If options do not go together.
-    """
+    """Return the sources that the options ask for."""
     from strapgen.design.commit_late import commit_late_sources
 
     rated = sample_hz if (fixed.max_rate_deg_s, fixed.lsb) != (None, None) else None

@@ -40,40 +40,27 @@ _LEVEL_DIGITS = 6
 
 @dataclass(frozen=True)
 class ConingBrief:
-    """What coning coefficients are to do.
+    """What coning coefficients are to do."""
 
-    Parameters
-    ----------
-    samples, previous : int
-        N samples of the step, and samples from before it.
-    objective : str
-        "band", "worst" or "random", see `shaped_coning.OBJECTIVES`.
-    band : Fraction, optional
-        Highest angular frequency in rad a sample, for "band".
-    lines : Lines, optional
-        The spectrum, for the other two.
-    powers : int, optional
-        Number of powers of the frequency that the drift has not, from the third on.
-    gyro : GyroResponse, optional
-        By default the increments are integrals of the rate.
-    noise, pulse : Fraction, optional
-        Standard deviation of the noise of an increment, and the pulse of the gyro, in rad, for "random".
-    title : str, optional
-        By default it says the samples and the band.
-    products : int, optional
-        Highest total degree of products of two powers of time for which a step is exact.
-    """
-
+    #: N samples of the step, and samples from before it
     samples: int
     previous: int
+    #: "band", "worst" or "random", see `shaped_coning.OBJECTIVES`
     objective: str
+    #: Highest angular frequency in rad a sample, for "band"
     band: Fraction | None = None
+    #: The spectrum, for the other two
     lines: Lines | None = None
+    #: Number of powers of the frequency that the drift has not, from the third on
     powers: int = 0
+    #: By default the increments are integrals of the rate
     gyro: GyroResponse | None = None
+    #: Standard deviation of the noise of an increment, and the pulse of the gyro, in rad, for "random"
     noise: Fraction = Fraction(0)
     pulse: Fraction = Fraction(0)
+    #: By default it says the samples and the band
     title: str = ""
+    #: Highest total degree of products of two powers of time for which a step is exact
     products: int = 0
 
     @property
@@ -96,23 +83,6 @@ class ConingBrief:
 def design(brief: ConingBrief) -> ShapedConing:
     """Return the coefficients for a brief.
 
-    Parameters
-    ----------
-    brief : ConingBrief
-
-    Returns
-    -------
-    ShapedConing
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy is not installed, which the objective "band" needs.
-    InputError
-        If the coefficients are not determined, or their design does not converge.
-
-    Examples
-    --------
     >>> shape = design(ConingBrief(1, 2, "band", Fraction(1)))
     >>> [round(float(c), 9) for c in shape.coefficients], str(shape.level)
     ([0.127237734, -0.023056512], '0.000103062')
@@ -155,8 +125,6 @@ def design(brief: ConingBrief) -> ShapedConing:
 def annulling(shape: ConingShape) -> tuple[Fraction, ...]:
     """Return the coefficients that annul as many powers of the frequency as there are coefficients.
 
-    Examples
-    --------
     >>> [str(c) for c in annulling(ConingShape(1, 2))]
     ['7/60', '-1/60']
     """
@@ -164,21 +132,7 @@ def annulling(shape: ConingShape) -> tuple[Fraction, ...]:
 
 
 class ConingProblem:
-    """The drift on coning as a function of the coefficients that no condition determines.
-
-    Parameters
-    ----------
-    shape : ConingShape
-    powers : int
-        Number of powers of the frequency that are annulled.
-    products : int, optional
-        Highest total degree of the products of powers of time for which a step is exact.
-
-    Raises
-    ------
-    InputError
-        If the conditions contradict each other, or products go with a gyro.
-    """
+    """The drift on coning as a function of the coefficients that no condition determines."""
 
     title = "the drift on coning"
 

@@ -12,19 +12,6 @@ from strapgen.design.windows.family_file import number
 def written(shape: ShapedConing, command: str, figures: Sequence[str] = ()) -> str:
     """Return coefficients as a TOML file that says which command designed them.
 
-    Parameters
-    ----------
-    shape : ShapedConing
-    command : str
-    figures : sequence of str, optional
-        Lines on what they reach.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.shaped_coning import SHAPES
     >>> print(*written(SHAPES["coning-shaped-8"], "strapgen coning ...").splitlines()[:4], sep=chr(10))
     # Designed by: strapgen coning ...

@@ -40,14 +40,7 @@ _DRIFT_HEADINGS = ("rad a sample", "these", "annulling powers")
 
 
 def coning_data(design: Design, terms: bool = False) -> dict[str, Any]:
-    """Return a design as plain JSON data; coefficients and residual are text that SymPy can read.
-
-    Parameters
-    ----------
-    design : Design
-    terms : bool, optional
-        Whether the terms of third and fourth order follow, of the polynomial through the samples.
-    """
+    """Return a design as plain JSON data; coefficients and residual are text that SymPy can read."""
     names = sample_names(design.samples, design.previous)
     drift = design.residual()
     order = method(design.form).step_order(design.samples, design.previous)
@@ -72,14 +65,7 @@ def _products(row: Scalars, names: list[str]) -> dict[str, str]:
 
 
 def coning_text(design: Design, data: Mapping[str, Any]) -> str:
-    """Return a design as text.
-
-    Parameters
-    ----------
-    design : Design
-    data : mapping
-        What `coning_data` returns for the design.
-    """
+    """Return a design as text."""
     lines = [
         f"{design.form} coning coefficients, {_samples_text(design)}",
         f"source of the form: {SOURCES[design.form]}",
@@ -152,16 +138,10 @@ def _pair_lines(design: Design, data: Mapping[str, Any]) -> list[str]:
 
 @dataclass(frozen=True)
 class ShapedDrift:
-    """The drift on coning with coefficients for a band or a spectrum, and with those that annul powers.
-
-    Parameters
-    ----------
-    shape : ShapedConing
-    lines : Lines or None
-        The spectrum for which they are designed.
-    """
+    """The drift on coning with coefficients for a band or a spectrum, and with those that annul powers."""
 
     shape: ShapedConing
+    #: The spectrum for which they are designed
     lines: Lines | None = None
 
     @property
@@ -187,11 +167,8 @@ class ShapedDrift:
     def figures(self) -> dict[str, float]:
         """Return what the coefficients reach, and what those reach that annul powers.
 
-        Returns
-        -------
-        dict of str to float
-            Over a band the largest drift in rad a step; under a spectrum the drift in deg/h for the worst phases, and
-            its root mean square for lines of random phases.
+        Returns: over a band the largest drift in rad a step; under a spectrum the drift in deg/h for the worst
+        phases, and its root mean square for lines of random phases.
         """
         if self.shape.band is not None:
             return {

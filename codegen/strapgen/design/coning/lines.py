@@ -26,19 +26,6 @@ _DIGITS = 30
 class Lines:
     """Lines of a vibration about x and y, at equal distances in frequency.
 
-    Parameters
-    ----------
-    hertz : tuple of float
-        Frequencies in Hz.
-    products : tuple of float
-        Amplitude about x times amplitude about y of each line, in rad^2.
-    squares : tuple of float
-        Sum of the squares of both, in rad^2.
-    sample_hz : Fraction
-        Sampling frequency in Hz.
-
-    Examples
-    --------
     >>> lines = Lines((10.0, 20.0), (1e-6, 4e-6), (2e-6, 8e-6), Fraction(100))
     >>> [float(b) for b in lines.radians]
     [0.6283185307179586, 1.2566370614359172]
@@ -46,9 +33,13 @@ class Lines:
     [0.250001, 1.000001]
     """
 
+    #: Frequencies in Hz
     hertz: tuple[float, ...]
+    #: Amplitude about x times amplitude about y of each line, in rad^2
     products: tuple[float, ...]
+    #: Sum of the squares of both, in rad^2
     squares: tuple[float, ...]
+    #: Sampling frequency in Hz
     sample_hz: Fraction
 
     @cached_property
@@ -73,13 +64,7 @@ class Lines:
         return max(self.products) ** 2 / (self.hertz[1] - self.hertz[0])
 
     def increment_square(self, gyro: GyroResponse | None) -> float:
-        """Return the mean square of an increment, both axes together, in rad^2.
-
-        Parameters
-        ----------
-        gyro : GyroResponse or None
-            The gyro through which the vibration is seen.
-        """
+        """Return the mean square of an increment, both axes together, in rad^2."""
         b = 2 * np.pi * np.array(self.hertz) / float(self.sample_hz)
         power = np.ones(len(b))
         if gyro is not None:
@@ -99,23 +84,8 @@ def of_spectrum(spectrum: Spectrum, sample_hz: Fraction) -> Lines:
     A line in a band df has the amplitudes a with a^2/2 = P |H|^2 df about each axis, P the density of the input and H
     the transfer function to the angle.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    sample_hz : Fraction
-        Sampling frequency in Hz.
+    `sample_hz`: sampling frequency in Hz.
 
-    Returns
-    -------
-    Lines
-
-    Raises
-    ------
-    InputError
-        If the spectrum does not turn about both axes.
-
-    Examples
-    --------
     >>> flat = Spectrum(lambda f: 5e-7 + 0 * f, {"angle_x": np.ones_like, "angle_y": np.ones_like}, (2.0, 40.0))
     >>> lines = of_spectrum(flat, Fraction(100))
     >>> len(lines.hertz), lines.hertz[0], lines.hertz[-1], round(sum(lines.products) * 1e6, 2)

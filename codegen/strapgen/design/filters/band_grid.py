@@ -47,19 +47,8 @@ def real(value: int) -> Any:
 class BandGrid:
     """Frequencies of a band, with the functions of the samples at each.
 
-    Parameters
-    ----------
-    points : sequence of mpf
-        b in rad a sample.
-    reach : int
-        Distances from the middle of the step go up to this number of samples, and half of one more for even N.
-    gyro : GyroResponse, optional
-        By default the response is 1.
-    increments : int, optional
-        N, samples of the step.
+    `points`: b in rad a sample.
 
-    Examples
-    --------
     >>> grid = BandGrid([REAL.mpf(1)], 2)
     >>> round(grid.cosines[0][2] / ONE, 6), round(grid.sines[0][2] / ONE, 6), round(grid.gains[0][0] / ONE, 6)
     (-0.416147, 0.909297, 0.958851)
@@ -101,17 +90,7 @@ class BandGrid:
         return [(x * x + y * y) >> BITS for x, y in self.gains]
 
     def errors(self, m: int, taps: Sequence[int], previous: int) -> list[tuple[int, int]]:
-        """Return the error of a filter as real and imaginary part, by frequency.
-
-        Parameters
-        ----------
-        m : int
-            Degree of the Legendre coefficient.
-        taps : sequence of int
-            Integers of the taps, the oldest first.
-        previous : int
-            Samples before the step.
-        """
+        """Return the error of a filter as real and imaginary part, by frequency."""
         result = []
         even, odd = _folded(taps, 2 * previous + self._increments - 1)
         for cosines, sines, (x, y), right in zip(
@@ -138,15 +117,6 @@ def _folded(taps: Sequence[int], twice_middle: int) -> tuple[list[int], list[int
 def distance(place: int, twice_middle: int) -> tuple[int, bool]:
     """Return the number of a sample by its distance from the middle of the step, and whether it is after that.
 
-    Parameters
-    ----------
-    place : int
-        Of the sample in a window.
-    twice_middle : int
-        Twice the place of the middle of the step.
-
-    Examples
-    --------
     >>> [distance(place, 4)[0] for place in range(5)], [distance(place, 3)[0] for place in range(4)]
     ([2, 1, 0, 1, 2], [1, 0, 0, 1])
     """

@@ -29,15 +29,9 @@ _QUOTIENT_BITS = 80
 
 
 class Answers(NamedTuple):
-    """What unknowns answer at frequencies, and what they have to answer together, in the integers of `band_grid`.
+    """What unknowns answer at frequencies, and what they have to answer together, in the integers of `band_grid`."""
 
-    Parameters
-    ----------
-    columns : list of list of int, (free, points)
-        The answer to a unit of each free unknown.
-    right : list of int, (points,)
-    """
-
+    #: The answer to a unit of each free unknown
     columns: list[list[int]]
     right: list[int]
 
@@ -77,25 +71,7 @@ class Solution(NamedTuple):
 def least_largest(problem: Problem, band: Fraction, points: int = SEARCH_POINTS) -> Solution:
     """Return the free unknowns of the least largest error over a band.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its errors alternate as often as there are free unknowns, and once more, where they are the best ones.
-    band : Fraction
-        Highest angular frequency in rad a sample.
-    points : int, optional
-        Frequencies of the grid on which the largest errors are searched, before they are refined.
-
-    Returns
-    -------
-    Solution
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy is not installed.
-    InputError
-        If the exchange does not converge.
+    `band`: highest angular frequency in rad a sample.
     """
     grid = search_points(band, points)
     table = problem.answers(grid)
@@ -153,8 +129,6 @@ def _refined(problem: Problem, grid: Sequence[Any], places: Sequence[int], free:
 def alternating(errors: Sequence[Any], count: int) -> list[int] | None:
     """Return the places of so many largest errors of alternating sign; None if the sign alternates too seldom.
 
-    Examples
-    --------
     >>> alternating([0, 3, 1, -2, -3, 2, -1], 3), alternating([1, 2, -1], 3)
     ([1, 4, 5], None)
     """
@@ -182,13 +156,7 @@ def _start(problem: Problem, band: Fraction) -> list[Any]:
 
 
 def orthonormal(answers: Answers) -> tuple[list[list[float]], list[float]]:
-    """Return orthonormal columns and what they leave of the right side, scaled to at most 1, in double precision.
-
-    Raises
-    ------
-    InputError
-        If columns depend on each other.
-    """
+    """Return orthonormal columns and what they leave of the right side, scaled to at most 1, in double precision."""
     basis: list[list[int]] = []
     for column in [*answers.columns, answers.right]:
         for other in basis * 2:

@@ -22,25 +22,8 @@ _LEAST_WEIGHT = ONE // 10**12
 def design(shape: Shape, degrees: Sequence[int], band: Fraction) -> list[list[Any]]:
     """Return filters with the least largest errors over a band, of those that the iteration passes.
 
-    Parameters
-    ----------
-    shape : Shape
-    degrees : sequence of int
-        m of each filter.
-    band : Fraction
-        Highest angular frequency in rad a sample; the errors are those at `band_grid.mean_points`.
+    `band`: highest angular frequency in rad a sample; the errors are those at `band_grid.mean_points`.
 
-    Returns
-    -------
-    list of list of mpf, (len(degrees), p + 1 + L)
-
-    Raises
-    ------
-    InputError
-        If no filter is the best one.
-
-    Examples
-    --------
     >>> taps, = design(Shape(1, 1, 3), [1], Fraction(1))
     >>> [round(float(tap), 12) for tap in taps]
     [-0.25, 0.0, 0.25]

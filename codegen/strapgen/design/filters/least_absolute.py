@@ -26,24 +26,8 @@ _MOST_VERTICES = 20
 def design(answers: Answers, weights: Sequence[Any]) -> list[Any]:
     """Return the unknowns of the least sum of w |error|.
 
-    Parameters
-    ----------
-    answers : Answers
-        With n points.
-    weights : sequence of mpf, (n,)
-        Above 0.
+    `weights` (n,): above 0.
 
-    Returns
-    -------
-    list of mpf, (free,)
-
-    Raises
-    ------
-    InputError
-        If there are fewer points than unknowns, or the search does not end.
-
-    Examples
-    --------
     >>> one = 1 << BITS
     >>> [float(x) for x in design(Answers([[one] * 4], [one, 2 * one, 3 * one, 10 * one]), [2, 1, 1, 1])]
     [2.0]

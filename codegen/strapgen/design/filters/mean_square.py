@@ -22,29 +22,8 @@ def design(
 ) -> list[list[Any]]:
     """Return the filters of the least mean of S |sum_j F_j A_j - C_m|^2 over a band plus sigma^2 sum_j F_j^2.
 
-    Parameters
-    ----------
-    shape : Shape
-    degrees : sequence of int
-        m of each filter.
-    band : Fraction
-        Highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`.
-    noise : Fraction
-        sigma.
-    spectrum : sequence of int, optional
-        Integers of S at the points, of mean 1; by default S is 1.
+    `band`: highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`.
 
-    Returns
-    -------
-    list of list of mpf, (len(degrees), p + 1 + L)
-
-    Raises
-    ------
-    InputError
-        If no filter is the best one.
-
-    Examples
-    --------
     >>> taps, = design(Shape(1, 1, 3), [1], Fraction(1), Fraction(0))
     >>> [round(float(tap), 12) for tap in taps]
     [-0.25, 0.0, 0.25]
@@ -62,18 +41,7 @@ def least_squares(
     weights: Sequence[int],
     noise: Fraction = Fraction(0),
 ) -> list[list[Any]]:
-    """Return the filters of least weighted sum of squares of errors on a grid, under their conditions.
-
-    Parameters
-    ----------
-    grid : BandGrid
-    shape : Shape
-    degrees : sequence of int
-    weights : sequence of int
-        Integer of the weight of each frequency.
-    noise : Fraction, optional
-        Its square times the squares of the taps is added to the sum.
-    """
+    """Return the filters of least weighted sum of squares of errors on a grid, under their conditions."""
     count, powers = shape.samples, shape.conditions
     scaled = [(w * square) >> BITS for w, square in zip(weights, grid.squares(), strict=True)]
     lags = [real(sum(map(mul, scaled, column)) >> BITS) for column in zip(*grid.lags, strict=True)]
@@ -111,13 +79,6 @@ def _products(grid: BandGrid, shape: Shape, m: int, weights: Sequence[int]) -> l
 def solve(matrix: Sequence[Sequence[Any]], rights: Sequence[Sequence[Any]]) -> list[list[Any]]:
     """Return the solutions of linear equations for several right sides, in the digits of `REAL`.
 
-    Raises
-    ------
-    InputError
-        If there is none, or no single one.
-
-    Examples
-    --------
     >>> [[float(x) for x in row] for row in solve([[REAL.mpf(2), REAL.mpf(0)], [REAL.mpf(1), REAL.mpf(1)]], [[4, 3]])]
     [[2.0, 1.0]]
     """

@@ -14,45 +14,19 @@ from strapgen.design.filters.unknowns import Unknowns
 
 
 class Minimax(NamedTuple):
-    """A filter of the least largest error.
+    """A filter of the least largest error."""
 
-    Parameters
-    ----------
-    taps : tuple of mpf, (p + 1 + L)
-        The oldest first.
-    level : mpf
-        The largest error, for each unit of rate times the sampling interval.
-    """
-
+    #: The oldest first
     taps: tuple[Any, ...]
+    #: The largest error, for each unit of rate times the sampling interval
     level: Any
 
 
 def design(unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS) -> Minimax:
     """Return the filter of the least largest error over a band under its conditions.
 
-    Parameters
-    ----------
-    unknowns : Unknowns
-        Those of a symmetric or antisymmetric filter.
-    band : Fraction
-        Highest angular frequency in rad a sample.
-    points : int, optional
-        Frequencies of the grid on which the largest errors are searched, before they are refined.
+    `band`: highest angular frequency in rad a sample.
 
-    Returns
-    -------
-    Minimax
-
-    Raises
-    ------
-    MissingExtraError
-        If SciPy is not installed.
-    InputError
-        If the exchange does not converge.
-
-    Examples
-    --------
     >>> from strapgen.design.filters.unknowns import Shape
     >>> filter = design(Unknowns(Shape(3, 3, 4), 1), Fraction(13, 10))
     >>> [round(float(tap), 12) for tap in filter.taps[4:]], f"{float(filter.level):.6e}"
@@ -66,12 +40,7 @@ def design(unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS) -> M
 
 
 class FilterProblem:
-    """The error of a symmetric or antisymmetric filter, whose answers are real.
-
-    Parameters
-    ----------
-    unknowns : Unknowns
-    """
+    """The error of a symmetric or antisymmetric filter, whose answers are real."""
 
     def __init__(self, unknowns: Unknowns) -> None:
         self._unknowns = unknowns

@@ -21,14 +21,6 @@ _GAIN_POINTS = 2000
 def level(window: Window, m: int) -> float:
     """Return the largest error of a filter over its band, for each unit of rate times the sampling interval.
 
-    Parameters
-    ----------
-    window : Window
-    m : int
-        Degree of the Legendre coefficient.
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> f"{level(WINDOWS['window-3-3'], 1):.6e}"
     '2.160751e-03'
@@ -52,8 +44,6 @@ def level(window: Window, m: int) -> float:
 def noise_gain(window: Window, m: int) -> float:
     """Return the root of the sum of squares of the taps: standard deviation of c_m by that of white increment noise.
 
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> round(noise_gain(WINDOWS["window-7-7"], 1), 3)
     0.731
@@ -66,8 +56,6 @@ def largest_gain(window: Window) -> float:
 
     The response is |sum_j F_0j A_j(b)|/N, with the gyro: 1 is a rate that is passed on unchanged.
 
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> largest_gain(WINDOWS["window-3-3"])
     1.0
@@ -85,17 +73,8 @@ def largest_gain(window: Window) -> float:
 def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
     """Return the error of a filter in magnitude at frequencies.
 
-    Parameters
-    ----------
-    window : Window
-    m : int
-    points : sequence of float, (n,)
-        Angular frequencies in rad a sample, up to pi.
-
-    Returns
-    -------
-    array, (n,)
-        |sum_j F_j A_j - C_m|, for each unit of rate times the sampling interval.
+    `points` (n,): angular frequencies in rad a sample, up to pi. Returns (n,): |sum_j F_j A_j - C_m|, for each
+    unit of rate times the sampling interval.
     """
     grid = BandGrid([REAL.mpf(b) for b in points], window.samples - 1, window.gyro, window.increments)
     return np.array([magnitude(*e) / ONE for e in grid.errors(m, _integers(window, m), window.previous)])
@@ -104,8 +83,6 @@ def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
 def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
     """Return the filters of the polynomial through all samples of a window, which other methods take.
 
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> [str(tap) for tap in polynomial_fit(WINDOWS["window-3-3"])[1][4:]]
     ['7843/20160', '-211/2520', '191/20160']

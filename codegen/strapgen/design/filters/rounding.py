@@ -17,16 +17,8 @@ TABLE_BITS = 60
 def rounded(unknowns: Unknowns, taps: Sequence[Any], bits: int = TABLE_BITS) -> Taps:
     """Return taps as rationals: the outer ones as nearest multiples of a unit, the inner ones from the conditions.
 
-    Parameters
-    ----------
-    unknowns : Unknowns
-    taps : sequence of mpf, (p + 1 + L)
-        The oldest first.
-    bits : int, optional
-        The unit is 2^-bits.
+    `taps` (p + 1 + L): the oldest first.
 
-    Examples
-    --------
     >>> from strapgen.design.filters.unknowns import Shape
     >>> taps = [0, 0, 0, 0, 0.408856141152301, -0.0995849129218411, 0.0134378948971269]
     >>> taps[:3] = [-tap for tap in reversed(taps[4:])]
@@ -40,8 +32,6 @@ def rounded(unknowns: Unknowns, taps: Sequence[Any], bits: int = TABLE_BITS) -> 
 def nearest(value: Any, bits: int) -> Fraction:
     """Return the multiple of 2^-bits nearest to a number.
 
-    Examples
-    --------
     >>> nearest(REAL.mpf(1) / 3, 4)
     Fraction(5, 16)
     """

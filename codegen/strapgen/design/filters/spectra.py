@@ -20,27 +20,8 @@ def weights(spectrum: Spectrum, band: Fraction, sample_hz: Fraction) -> tuple[in
     The rate about x and y together has the density (2 pi f)^2 P (|H_x|^2 + |H_y|^2), P the density of the input and H
     its transfer functions to the angles.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        With a transfer function to an angle.
-    band : Fraction
-        Highest angular frequency in rad a sample.
-    sample_hz : Fraction
-        Sampling frequency in Hz.
+    `band`: highest angular frequency in rad a sample. `sample_hz`: sampling frequency in Hz.
 
-    Returns
-    -------
-    tuple of int
-        In the integers of `band_grid`.
-
-    Raises
-    ------
-    InputError
-        If the spectrum turns nothing, or has nothing in the band.
-
-    Examples
-    --------
     >>> flat = Spectrum(lambda f: f**-2.0, {"angle_x": np.ones_like}, (1e-3, 100.0))
     >>> {weight >> BITS for weight in weights(flat, Fraction(1), Fraction(100))}
     {1}

@@ -53,14 +53,6 @@ class Shape:
 class Unknowns:
     """The unknowns of one filter, those nearest to the step first.
 
-    Parameters
-    ----------
-    shape : Shape
-    m : int
-        Degree of the Legendre coefficient that the filter estimates.
-
-    Examples
-    --------
     >>> unknowns = Unknowns(Shape(3, 3, 4), 1)
     >>> unknowns.groups
     (((4, 1), (2, -1)), ((5, 1), (1, -1)), ((6, 1), (0, -1)))
@@ -69,6 +61,7 @@ class Unknowns:
     """
 
     shape: Shape
+    #: Degree of the Legendre coefficient that the filter estimates
     m: int
 
     @cached_property

@@ -30,19 +30,6 @@ _POINTS, _MOST_COMBINED = 300, 7
 def in_words(window: Window, bits: int) -> Window:
     """Return a window whose taps are multiples of 2^-bits, with the errors of a search over a unit of each free tap.
 
-    Parameters
-    ----------
-    window : Window
-    bits : int
-        Binary digits behind the point, 2 or more.
-
-    Returns
-    -------
-    Window
-        Its conditions are those that hold exactly, 2 of them, or 1 with a gyro; it has no one-sided filters.
-
-    Examples
-    --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> words = in_words(WINDOWS["window-3-3"], 30)
     >>> words.conditions, words.parity, [str(tap * 2**30) for tap in words.filters[1][4:]]

@@ -58,17 +58,11 @@ EVERY = "all"
 
 @dataclass(frozen=True)
 class Candidate:
-    """An algorithm that is compared.
+    """An algorithm that is compared."""
 
-    Parameters
-    ----------
-    method : str
-        A method, or the Python file of a user's algorithm.
-    increments, previous, ahead : int
-        Samples of a step, and samples from before it and from after it.
-    """
-
+    #: A method, or the Python file of a user's algorithm
     method: str
+    #: Samples of a step, and samples from before it and from after it
     increments: int
     previous: int = 0
     ahead: int = 0
@@ -121,28 +115,20 @@ CANDIDATES = tuple(
 
 @dataclass(frozen=True)
 class Standing:
-    """What an algorithm costs, and how it drifts.
+    """What an algorithm costs, and how it drifts."""
 
-    Parameters
-    ----------
-    name, title, source : str
-        Of the candidate, of its kernel, and where the algorithm comes from.
-    increments : int
-        Samples of a step.
-    multiply, add, other : int
-        Multiplications, additions and subtractions, and all other operations of a step: divisions, roots, sines and
-        cosines, choices.
-    drifts : mapping of str to float or None
-        The drift on each motion in deg/h; None where the attitude leaves the range of its numbers.
-    """
-
+    #: Of the candidate, of its kernel, and where the algorithm comes from
     name: str
     title: str
     source: str
+    #: Samples of a step
     increments: int
+    #: Multiplications, additions and subtractions, and all other operations of a step: divisions, roots, sines
+    #: and cosines, choices
     multiply: int
     add: int
     other: int
+    #: The drift on each motion in deg/h; None where the attitude leaves the range of its numbers
     drifts: Mapping[str, float | None]
 
     def per_second(self, sample_hz: float) -> float:
@@ -152,20 +138,13 @@ class Standing:
 
 @dataclass(frozen=True)
 class Trial:
-    """What a process needs to run a candidate on all motions.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    sample_hz, duration : str
-        Sampling rate in Hz, and length of the runs in s.
-    motions : mapping of str to (str, mapping of str to str), optional
-        By their labels.
-    """
+    """What a process needs to run a candidate on all motions."""
 
     candidate: Candidate
+    #: Sampling rate in Hz, and length of the runs in s
     sample_hz: str
     duration: str
+    #: By their labels
     motions: Motions = field(default_factory=lambda: MOTIONS)
 
     def moved(self, begin: Path, end: Path) -> Trial:
@@ -181,24 +160,6 @@ class Trial:
 def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
     """Return the algorithms that are asked for, checked.
 
-    Parameters
-    ----------
-    names : iterable of str, optional
-        Methods, each of which stands for its candidates in `CANDIDATES`, and methods or Python files with their
-        samples, as in "coning-combined:8+3" or "window-7-7:1+7+7"; "all" stands for all methods of the catalogue. By
-        default all of `CANDIDATES`.
-
-    Returns
-    -------
-    list of Candidate
-
-    Raises
-    ------
-    InputError
-        If a name is not known, or its samples are not allowed.
-
-    Examples
-    --------
     >>> [candidate.name for candidate in candidates(["magnus6", "rk2:1+1"])]
     ['magnus6:3', 'magnus6:4', 'magnus6:3+3', 'rk2:1+1']
     """
@@ -260,29 +221,7 @@ def frontier(
 ) -> Iterator[Standing]:
     """Run algorithms on motions, and yield what each costs and how it drifts when its runs end.
 
-    Parameters
-    ----------
-    several : sequence of Candidate
-    sample_hz, duration : str
-        Sampling rate in Hz, and length of the runs in s.
-    results : path, optional
-        File that keeps what is done: the study goes on from there.
-    jobs : int, optional
-        Number of processes; by default one for each processor.
-    cluster : Cluster, optional
-        Where they run, in place of processes of this one.
-    motions : mapping of str to (str, mapping of str to str), optional
-        Names of motions, or files of users, with their settings, by labels; by default all of `MOTIONS`.
-
-    Yields
-    ------
-    Standing
-        In the order in which they come; `in_order` sorts them.
-
-    Raises
-    ------
-    InputError
-        If a number is not allowed, or the file holds another study.
+    `sample_hz, duration`: sampling rate in Hz, and length of the runs in s.
     """
     rate, length = require_steps(several, sample_hz, duration)
     for name, settings in motions.values():
@@ -301,19 +240,7 @@ def frontier(
 
 
 def require_steps(several: Sequence[Candidate], sample_hz: str, duration: str) -> tuple[Fraction, Fraction]:
-    """Return the sampling rate and the duration as numbers, in which every algorithm has a whole step.
-
-    Parameters
-    ----------
-    several : sequence of Candidate
-    sample_hz, duration : str
-        As for `frontier`.
-
-    Raises
-    ------
-    InputError
-        If one is not allowed, or a step is longer than the duration.
-    """
+    """Return the sampling rate and the duration as numbers, in which every algorithm has a whole step."""
     rate = checks.number("sample_hz", sample_hz, positive=True)
     length = checks.number("duration", duration, positive=True)
     for candidate in several:
@@ -373,19 +300,6 @@ def _motion(name: str, settings: tuple[tuple[str, str], ...], duration: str) -> 
 def pareto(points: Mapping[str, tuple[float, float]], gain: float = 0.0) -> list[str]:
     """Return the names of the points that gain in the second number on all that have a smaller first one.
 
-    Parameters
-    ----------
-    points : mapping of str to (float, float)
-    gain : float, optional
-        Least gain, as a part of the smallest number before.
-
-    Returns
-    -------
-    list of str
-        By the first number.
-
-    Examples
-    --------
     >>> pareto({"cheap": (1, 9), "worse": (2, 9), "little": (3, 8.9), "good": (4, 1)}, gain=0.1)
     ['cheap', 'good']
     """

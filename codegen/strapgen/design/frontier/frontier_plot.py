@@ -27,26 +27,7 @@ def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, 
 
     A line of steps joins the algorithms that halve the drift of all that cost less; only they have a label.
 
-    Parameters
-    ----------
-    standings : sequence of Standing
-    sample_hz : float
-        Sampling rate in Hz.
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
+    `sample_hz`: sampling rate in Hz.
     """
     panels = [label for label in PANELS if label in standings[0].drifts] or list(standings[0].drifts)
     columns = min(_COLUMNS, len(panels))

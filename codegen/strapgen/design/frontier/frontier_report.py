@@ -18,13 +18,7 @@ def frontier_report(
 ) -> Report:
     """Return standings as a report.
 
-    Parameters
-    ----------
-    standings : sequence of Standing
-    sample_hz, duration_s : float
-        Sampling rate in Hz, and length of the runs in s.
-    motions : mapping of str to (str, mapping of str to str), optional
-        Those of the runs, by their labels.
+    `sample_hz, duration_s`: sampling rate in Hz, and length of the runs in s.
     """
 
     def data() -> dict[str, Any]:

@@ -29,29 +29,16 @@ _LONGEST_WORD, _MOST_STEPS = 32, 4000
 
 
 def reference(brief: DesignBrief, steps: int) -> tuple[str, int]:
-    """Return the back end beside which fixed point is run, and the steps of that run: words may be finer than double.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    steps : int
-        Steps where that is double.
-    """
+    """Return the back end beside which fixed point is run, and the steps of the run: words may be finer than double."""
     return ("numpy", steps) if brief.processor.word <= _LONGEST_WORD else ("exact", min(steps, _MOST_STEPS))
 
 
 class ProcessorCost(NamedTuple):
-    """What an algorithm costs on a processor.
+    """What an algorithm costs on a processor."""
 
-    Parameters
-    ----------
-    bytes : float
-        Of code and constants.
-    instructions_per_s : float or None
-        None where they cannot be counted.
-    """
-
+    #: Of code and constants
     bytes: float
+    #: None where they cannot be counted
     instructions_per_s: float | None
 
 
@@ -83,10 +70,7 @@ class Algorithm(Protocol):
     def quantization(self, over_s: Fraction | None = None) -> float:
         """Return the root mean square of the drift that pulses leave in a turn at the largest rate.
 
-        Parameters
-        ----------
-        over_s : Fraction, optional
-            Time of the turn in s; by default that of the budget.
+        `over_s`: time of the turn in s; by default that of the budget.
         """
 
     def rounding(self, allowed: float) -> Rounding:
@@ -106,13 +90,7 @@ class Algorithm(Protocol):
 
 
 class AttitudeStep:
-    """An attitude step of the catalogue, for a brief: see `Algorithm`.
-
-    Parameters
-    ----------
-    choice : Choice
-    brief : DesignBrief
-    """
+    """An attitude step of the catalogue, for a brief: see `Algorithm`."""
 
     def __init__(self, choice: Choice, brief: DesignBrief) -> None:
         self.choice, self._brief = choice, brief

@@ -25,29 +25,7 @@ def judgements(
     jobs: int | None = None,
     cluster: Cluster | None = None,
 ) -> Iterator[list[Judgement]]:
-    """Judge algorithms by a brief, and yield the judgements of each with all states when they are there.
-
-    Parameters
-    ----------
-    path : path
-        The file of the brief.
-    several : iterable of Contender
-    results : path, optional
-        File that keeps what is done: the study goes on from there.
-    jobs : int, optional
-        Number of processes; by default one for each processor.
-    cluster : Cluster, optional
-        Where they run, in place of processes of this one.
-
-    Yields
-    ------
-    list of Judgement
-
-    Raises
-    ------
-    InputError
-        If the brief is not allowed, or the file holds another study.
-    """
+    """Judge algorithms by a brief, and yield the judgements of each with all states when they are there."""
     cases = {one.name: Question(str(path), one) for one in several}
     files = None if cluster is None else Bundle.of(files_of(path))
     if results is None:
@@ -74,14 +52,7 @@ def in_order(several: Iterable[Judgement]) -> list[Judgement]:
 
 
 def verdicts(brief: DesignBrief, ordered: list[Judgement]) -> list[str]:
-    """Return what a brief leads to, in sentences.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    ordered : list of Judgement
-        As `in_order` returns them.
-    """
+    """Return what a brief leads to, in sentences."""
     sentences = []
     accepted = [one for one in ordered if one.meets]
     share = brief.budget.software_share * brief.budget.drift_deg_h

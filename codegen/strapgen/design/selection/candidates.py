@@ -50,18 +50,13 @@ TUNED = "tuned-"
 
 @dataclass(frozen=True)
 class Contender:
-    """An algorithm that may be selected, for every state of `STATES`.
+    """An algorithm that may be selected, for every state of `STATES`."""
 
-    Parameters
-    ----------
-    method : str
-        A method of the catalogue; or "tuned-worst" or "tuned-random", whose coefficients a design for the vibration
-        gives; or "two-speed".
-    increments, previous, ahead : int
-        Samples of a step, and samples from before it and from after it; of two speeds the fast cycles in a slow one.
-    """
-
+    #: A method of the catalogue; or "tuned-worst" or "tuned-random", whose coefficients a design for the
+    #: vibration gives; or "two-speed"
     method: str
+    #: Samples of a step, and samples from before it and from after it; of two speeds the fast cycles in a slow
+    #: one
     increments: int
     previous: int = 0
     ahead: int = 0
@@ -73,15 +68,7 @@ class Contender:
         return f"{self.method}:{self.increments}{beside}" + (f"+{self.ahead}" if self.ahead else "")
 
     def choice(self, state: str, path: str) -> Choice:
-        """Return the choice of a step.
-
-        Parameters
-        ----------
-        state : str
-            A name of `STATES`.
-        path : str
-            The file of the brief.
-        """
+        """Return the choice of a step."""
         method = self.method
         if method.startswith(TUNED):
             shape = tuned(path, method.removeprefix(TUNED), self.increments, self.previous)
@@ -94,19 +81,6 @@ def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[C
 
     Coefficients are designed where the vibration has a spectrum that turns about two axes.
 
-    Parameters
-    ----------
-    brief : DesignBrief
-    names : iterable of str, optional
-        Methods, or their names with samples, as in "coning-combined:3+3"; by default all.
-
-    Raises
-    ------
-    InputError
-        If a name is not among them.
-
-    Examples
-    --------
     >>> from fractions import Fraction
     >>> from strapgen.design.brief import BudgetBrief, GyroBrief, ProcessorBrief
     >>> brief = DesignBrief(Fraction(70), None, GyroBrief(Fraction(100)), BudgetBrief(0.01), ProcessorBrief())
@@ -153,17 +127,7 @@ def _has_coning(environment: SpectralEnvironment) -> bool:
 
 @lru_cache(maxsize=16)
 def tuned(path: str, objective: str, samples: int, previous: int) -> ShapedConing:
-    """Return the coefficients that are designed for the spectrum of a brief and for its gyro.
-
-    Parameters
-    ----------
-    path : str
-        The file of the brief.
-    objective : str
-        "worst" or "random", see `coning.SOURCES`.
-    samples, previous : int
-        Samples of a step and from before it.
-    """
+    """Return the coefficients that are designed for the spectrum of a brief and for its gyro."""
     brief = read_brief(Path(path))
     assert isinstance(brief.environment, SpectralEnvironment), "only these are tuned for"
     gyro = None

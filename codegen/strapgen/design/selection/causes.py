@@ -44,32 +44,18 @@ MOST_LINES = 40
 
 @dataclass(frozen=True)
 class Rounding:
-    """The certified drift of fixed-point code.
+    """The certified drift of fixed-point code."""
 
-    Parameters
-    ----------
-    deg_h : float or None
-        The bound over the time of the budget; None where none is known.
-    carry : str
-        The error feedback of the code, see `Settings`.
-    reason : str
-        Why there is no bound, in words; empty if there is one.
-    """
-
+    #: The bound over the time of the budget; None where none is known
     deg_h: float | None
+    #: The error feedback of the code, see `Settings`
     carry: str
+    #: Why there is no bound, in words; empty if there is one
     reason: str = ""
 
 
 def truncation(choice: Choice, brief: DesignBrief) -> float:
-    """Return the drift in deg/h of a steady turn at the largest rate, from one step in 40 digits.
-
-    Parameters
-    ----------
-    choice : Choice
-        An attitude step.
-    brief : DesignBrief
-    """
+    """Return the drift in deg/h of a steady turn at the largest rate, from one step in 40 digits."""
     backend = attitude_backend(choice, backend="exact")
     step = float(step_length(choice, brief.gyro))
     with mpmath.workdps(exact.DIGITS):
@@ -86,24 +72,12 @@ def truncation(choice: Choice, brief: DesignBrief) -> float:
 
 
 def coning(choice: Choice, brief: DesignBrief) -> float:
-    """Return the drift in deg/h that an algorithm computes under the vibration, less the true one, to second order.
-
-    Raises
-    ------
-    InputError
-        If it has no mean rate there.
-    """
+    """Return the drift in deg/h that an algorithm computes under the vibration, less the true one, to second order."""
     return _mean_error(choice, brief, "drift") * DEG_H
 
 
 def sculling(choice: Choice, brief: DesignBrief) -> float | None:
-    """Return the error in m/s^2 of the sculling term that is dual to a step's coning term.
-
-    Returns
-    -------
-    float or None
-        None where the vibration has no accelerations, or the step has no such term.
-    """
+    """Return the error in m/s^2 of the sculling term that is dual to a step's coning term."""
     if brief.environment is None or not brief.environment.accelerates:
         return None
     try:
@@ -122,14 +96,7 @@ def _mean_error(choice: Choice, brief: DesignBrief, quantity: str) -> float:
 def mean_error(assessed: Assessment, brief: DesignBrief, step: Fraction, cycles: int | None = None) -> float:
     """Return the length of the error of a mean rate under the vibration, seen through the gyro.
 
-    Parameters
-    ----------
-    assessed : Assessment
-    brief : DesignBrief
-    step : Fraction
-        Step in s; for a recursion its slow cycle.
-    cycles : int, optional
-        Fast cycles in the slow cycle of a recursion.
+    `step`: step in s; for a recursion its slow cycle.
     """
     if brief.environment is None:
         return 0.0
@@ -188,12 +155,7 @@ def over(brief: DesignBrief, seconds: Fraction | None) -> DesignBrief:
 def pulse_drift(noise: QuantizationNoise, brief: DesignBrief, step: Fraction) -> float:
     """Return the drift in deg/h of the noise of pulses over the time of the budget.
 
-    Parameters
-    ----------
-    noise : QuantizationNoise
-    brief : DesignBrief
-    step : Fraction
-        Step in s.
+    `step`: step in s.
     """
     pulse = float(brief.gyro.pulse_arcsec) * _ARCSEC
     turn = math.radians(float(brief.max_rate_deg_s)) * float(step)
@@ -209,12 +171,7 @@ def noise(brief: DesignBrief) -> float:
 def rounding(choice: Choice, brief: DesignBrief, allowed: float) -> Rounding:
     """Return the certified drift of the fixed-point code with as little error feedback as meets a limit.
 
-    Parameters
-    ----------
-    choice : Choice
-    brief : DesignBrief
-    allowed : float
-        The limit in deg/h; where no feedback meets it, the smallest bound is returned.
+    `allowed`: the limit in deg/h; where no feedback meets it, the smallest bound is returned.
     """
     several = []
     for carry in CARRIES:

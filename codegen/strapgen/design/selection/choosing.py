@@ -11,22 +11,7 @@ from strapgen.design.selection.candidates import TWO_SPEED, Contender
 
 
 def algorithm_of(contender: Contender, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:
-    """Return an algorithm for a brief.
-
-    Parameters
-    ----------
-    contender : Contender
-    state : str
-        A name of `candidates.STATES`.
-    brief : DesignBrief
-    path : path
-        The file of the brief, for which coefficients are designed.
-
-    Raises
-    ------
-    InputError
-        If the state has no such step.
-    """
+    """Return an algorithm for a brief."""
     if contender.method == TWO_SPEED:
         loops: Algorithm = registration.extension("design.two-speed", f"method {TWO_SPEED}")(
             state, contender.increments, brief

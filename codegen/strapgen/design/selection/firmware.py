@@ -21,26 +21,7 @@ REPORT, COEFFICIENTS, SYSTEM = "design.txt", "coefficients.toml", "system.toml"
 def firmware_files(
     brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, report: str, command: str
 ) -> dict[str, str]:
-    """Return the files of a selected algorithm by their names.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    judgement : Judgement
-        Of an algorithm that meets the brief.
-    algorithm : Algorithm
-        The algorithm itself.
-    report : str
-        What the answer says.
-    command : str
-        The command line, for coefficients that it has designed.
-
-    Returns
-    -------
-    dict of str to str
-        The C and its header, CMakeLists.txt, main.c, a test of vectors, the report, and coefficients that were
-        designed for the brief. Of two speeds the C of a described system and its file.
-    """
+    """Return the files of a selected algorithm by their names."""
     if not isinstance(algorithm, AttitudeStep):
         described = cast(DescribedAlgorithm, algorithm)  # nothing else is selected
         options = f"--target c-fixed --word {brief.processor.word}"

@@ -29,56 +29,39 @@ SOFTWARE = CAUSES[:3]
 
 @dataclass(frozen=True)
 class Judgement:
-    """What an algorithm loses and costs, and whether it meets a brief.
+    """What an algorithm loses and costs, and whether it meets a brief."""
 
-    Parameters
-    ----------
-    name : str
-        State, method and samples, as "euler coning-compressed:2".
-    state, method : str
-    increments, previous, ahead : int
-        See `Contender`.
-    meets : bool
-    binding : str or None
-        The cause or the limit that is exceeded most, of those that were looked at; None if none is.
-    reason : str
-        The same in words; empty if none is.
-    drift_deg_h : dict of str to float or None
-        Drift by cause; None where it is not known, or not looked at because a cheaper look had refused the algorithm.
-    operations_per_s : float
-        Additions, multiplications, divisions, roots, functions and choices.
-    carry : str
-        Error feedback of the fixed-point code.
-    velocity_m_s, position_m : float or None
-        What sculling leaves after the time of the budget; None without accelerations.
-    instructions_per_s, bytes : float or None
-        Counted on the processor of the brief, where it has a limit.
-    fragile : str
-        Why it meets the brief by errors that cancel, and so for these very lines alone; empty if it does not.
-    run_deg_h : dict of str to float or None
-        Drift by cause in a run in time; None where it was not run.
-    coning_parts_deg_h : dict of str to float or None
-        The largest drift under lines of each order in their angles, "2" to "4"; None where it was not looked at.
-    """
-
+    #: State, method and samples, as "euler coning-compressed:2"
     name: str
     state: str
     method: str
+    #: See `Contender`
     increments: int
     previous: int
     ahead: int
     meets: bool
+    #: The cause or the limit that is exceeded most, of those that were looked at; None if none is
     binding: str | None
+    #: The same in words; empty if none is
     reason: str
+    #: Drift by cause; None where it is not known, or not looked at because a cheaper look had refused the
+    #: algorithm
     drift_deg_h: dict[str, float | None]
+    #: Additions, multiplications, divisions, roots, functions and choices
     operations_per_s: float
+    #: Error feedback of the fixed-point code
     carry: str = "none"
+    #: What sculling leaves after the time of the budget; None without accelerations
     velocity_m_s: float | None = None
     position_m: float | None = None
+    #: Counted on the processor of the brief, where it has a limit
     instructions_per_s: float | None = None
     bytes: float | None = None
+    #: Why it meets the brief by errors that cancel, and so for these very lines alone; empty if it does not
     fragile: str = ""
+    #: Drift by cause in a run in time; None where it was not run
     run_deg_h: dict[str, float] | None = None
+    #: The largest drift under lines of each order in their angles, "2" to "4"; None where it was not looked at
     coning_parts_deg_h: dict[str, float] | None = None
 
     @property
@@ -90,15 +73,9 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Question:
-    """What a process needs to judge an algorithm with every state.
+    """What a process needs to judge an algorithm with every state."""
 
-    Parameters
-    ----------
-    path : str
-        The file of the brief.
-    contender : Contender
-    """
-
+    #: The file of the brief
     path: str
     contender: Contender
 
@@ -207,16 +184,6 @@ def judge(
     """Return the judgement of an algorithm.
 
     What takes long is looked at last, and not at all where a limit is exceeded before.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    contender : Contender
-    state : str
-    algorithm : Algorithm
-        The algorithm of both.
-    second_order : SecondOrder
-        What is known from the same algorithm with another state.
     """
     look = _Look(brief)
     operations = look.figures["operations_per_s"] = algorithm.operations_per_s()
@@ -267,16 +234,7 @@ def judge(
 
 
 def after_run(brief: DesignBrief, one: Judgement, run_deg_h: dict[str, float]) -> Judgement:
-    """Return a judgement with the drifts of a run in time in place of the predicted ones: its verdict is the run's.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    one : Judgement
-        Of an algorithm that meets the brief by prediction.
-    run_deg_h : dict of str to float
-        Drift in the run by cause.
-    """
+    """Return a judgement with the drifts of a run in time in place of the predicted ones: its verdict is the run's."""
     look = _Look(brief, {**one.drift_deg_h, **run_deg_h})
     excesses = look.excesses()
     if not excesses:

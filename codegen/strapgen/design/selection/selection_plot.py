@@ -15,28 +15,7 @@ _LEAST, _GAIN = 1e-9, 0.2
 
 
 def selection_image(brief: DesignBrief, ordered: Sequence[Judgement], title: str, path: str | Path) -> bytes:
-    """Return a picture of judgements: what the software adds to the drift, over its operations a second.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    ordered : sequence of Judgement
-    title : str
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return a picture of judgements: what the software adds to the drift, over its operations a second."""
     figure, grid = figures.grid_of_axes(1, 1, (9.0, 5.4))
     axes = grid[0, 0]
     axes.set_xscale("log")

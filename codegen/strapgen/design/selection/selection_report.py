@@ -21,16 +21,7 @@ _MOST_ACCEPTED, _MOST_REFUSED = 20, 12
 def selection_report(
     brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[str, Simulated] | None = None
 ) -> Report:
-    """Return the judgements of algorithms as a report.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    ordered : sequence of Judgement
-        Those that meet the brief first.
-    simulated : mapping of str to Simulated, optional
-        What time simulations made of those that meet it, by name.
-    """
+    """Return the judgements of algorithms as a report."""
     return Report(
         lambda: _text(brief, ordered, simulated or {}),
         lambda: [_as_dict(one) | _runs(one, simulated or {}) for one in ordered],

@@ -39,58 +39,38 @@ RANDOM_RUNS, _RANDOM_STEPS, _SEED = 2000, 200, 0
 
 
 class RandomDrift(NamedTuple):
-    """The root mean square of a drift in deg/h, of random runs.
-
-    Parameters
-    ----------
-    mean : float
-    low, high : float
-        Its 95 % interval.
-    """
+    """The root mean square of a drift in deg/h, of random runs."""
 
     mean: float
+    #: Its 95 % interval
     low: float
     high: float
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """Drifts in time simulations.
+    """Drifts in time simulations."""
 
-    Parameters
-    ----------
-    truncation : float
-        Drift in deg/h of a steady turn at the largest rate.
-    coning : float or None
-        Drift in deg/h under the vibration, less the true one; None without vibration.
-    rounding : float
-        Drift in deg/h between fixed point and double in the steady turn; words of 64 bits run beside 40 digits.
-    quantization, noise : RandomDrift or None
-        Drift after the time of the budget that pulses and noise leave in the steady turn: that of shorter random runs,
-        times the factor by which it grows in the closed form. None without pulses or noise.
-    """
-
+    #: Drift in deg/h of a steady turn at the largest rate
     truncation: float
+    #: Drift in deg/h under the vibration, less the true one; None without vibration
     coning: float | None
+    #: Drift in deg/h between fixed point and double in the steady turn; words of 64 bits run beside 40 digits
     rounding: float
+    #: Drift after the time of the budget that pulses and noise leave in the steady turn: that of shorter random
+    #: runs, times the factor by which it grows in the closed form. None without pulses or noise
     quantization: RandomDrift | None
     noise: RandomDrift | None
 
 
 @dataclass(frozen=True)
 class Vibration(Motion):
-    """A vibration of lines about x and y, as a gyro measures it.
+    """A vibration of lines about x and y, as a gyro measures it."""
 
-    Parameters
-    ----------
-    name, parameters
-        As for `Motion`.
-    rates, measured : CosineSum
-        The body rate, and what the gyro passes on of it.
-    """
-
+    #: As for `Motion`
     name: str = "vibration of a brief"
     parameters: dict[str, float] = field(default_factory=dict)
+    #: The body rate, and what the gyro passes on of it
     rates: Any = None
     measured: Any = None
     #: Attitudes that were integrated, by shape and times: several algorithms are recorded at the same ones.
@@ -117,13 +97,7 @@ class Vibration(Motion):
 
 
 def vibration(lines: Sequence[Line], brief: DesignBrief) -> Vibration:
-    """Return the motion of lines, seen by the gyro of a brief.
-
-    Parameters
-    ----------
-    lines : sequence of Line
-    brief : DesignBrief
-    """
+    """Return the motion of lines, seen by the gyro of a brief."""
     return _vibration(tuple(lines), brief.gyro)
 
 
@@ -148,31 +122,13 @@ def start_phases(count: int) -> NDArray[np.float64]:
 
 
 def algorithm_named(judgement: Judgement, brief: DesignBrief, path: str | Path) -> Algorithm:
-    """Return the algorithm of a judgement.
-
-    Parameters
-    ----------
-    judgement : Judgement
-    brief : DesignBrief
-    path : path
-        The file of the brief, for which coefficients are designed again.
-    """
+    """Return the algorithm of a judgement."""
     contender = Contender(judgement.method, judgement.increments, judgement.previous, judgement.ahead)
     return algorithm_of(contender, judgement.state, brief, path)
 
 
 def run(brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: int | None = 1) -> Simulated:
-    """Run an algorithm that meets a brief in time.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    judgement : Judgement
-    algorithm : Algorithm
-        The algorithm of the judgement.
-    jobs : int, optional
-        Number of processes of the random runs; None for one for each processor.
-    """
+    """Run an algorithm that meets a brief in time."""
     drifts = software_drifts(brief, algorithm)
     return Simulated(
         drifts["truncation"],
@@ -211,19 +167,6 @@ def confirmed(brief: DesignBrief, path: str | Path, ordered: Iterable[Judgement]
     """Run algorithms that meet a brief, the cheapest first, until one meets it in its run too.
 
     What is above fourth order in the angles of lines, and above second order under a spectrum, shows in a run alone.
-
-    Parameters
-    ----------
-    brief : DesignBrief
-    path : path
-        The file of the brief.
-    ordered : iterable of Judgement
-        As `in_order` returns them.
-
-    Returns
-    -------
-    list of Judgement
-        In order, with the verdicts of the runs.
     """
     left = list(ordered)
     run_ones: list[Judgement] = []

@@ -13,22 +13,7 @@ from strapgen.design.filters import responses
 
 
 def written(family: Window, command: str) -> str:
-    """Return a family as a TOML file that says which command designed it.
-
-    Parameters
-    ----------
-    family : Window
-    command : str
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        If the family lacks filters.
-    """
+    """Return a family as a TOML file that says which command designed it."""
     levels = ", ".join(
         f"{responses.level(family, m):.6e}" for m in range(0 if family.gyro else 1, family.degree + 1)
     )
@@ -77,8 +62,6 @@ def _filters(rows: tuple[Taps, ...]) -> Iterator[str]:
 def number(value: Fraction) -> str:
     """Return a number as a decimal if it is one, otherwise as a fraction.
 
-    Examples
-    --------
     >>> number(Fraction(13, 10)), number(Fraction(3, 10000)), number(Fraction(1, 3)), number(Fraction(-40))
     ('1.3', '0.0003', '1/3', '-40')
     """

@@ -20,13 +20,7 @@ WindowArgument = Annotated[
 
 
 def window_of(argument: str) -> Window:
-    """Return a window, its conditions verified; an argument that ends in .toml or holds a path separator is a file.
-
-    Raises
-    ------
-    InputError
-        If the name is unknown, or the file cannot be read or holds no window.
-    """
+    """Return a window, its conditions verified; an argument that ends in .toml or holds a path separator is a file."""
     from strapgen.catalogue.methods import windows
 
     if argument.endswith(".toml") or any(part in argument for part in (os.sep, os.altsep) if part):

@@ -16,26 +16,7 @@ _POINTS, _LOWEST = 240, 1e-14
 
 
 def window_image(window: Window, path: str | Path) -> bytes:
-    """Return the error of each filter against frequency, beside that of the polynomial through the same samples.
-
-    Parameters
-    ----------
-    window : Window
-    path : path
-        File for the image; its ending says which kind.
-
-    Returns
-    -------
-    bytes
-        The content of the file.
-
-    Raises
-    ------
-    MissingExtraError
-        If matplotlib is not installed.
-    InputError
-        If the kind of image is unknown.
-    """
+    """Return the error of each filter against frequency, beside that of the polynomial through the same samples."""
     curves = {_label(window): window}
     now = [one for one in window.one_sided if one.ahead < window.ahead]
     curves |= {_label(one): one for one in (now[len(now) // 2 :: max(1, len(now) - len(now) // 2 - 1)])}

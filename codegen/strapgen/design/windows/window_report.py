@@ -19,12 +19,7 @@ _TWO_COLUMNS = (Column(align="<"), Column(align="<"))
 
 
 def window_data(window: Window) -> dict[str, Any]:
-    """Return a family, or one-sided filters alone, as plain JSON data; taps are text, exact, the oldest sample first.
-
-    Parameters
-    ----------
-    window : Window
-    """
+    """Return a family, or one-sided filters alone, as plain JSON data; taps are exact, as text, the oldest first."""
     gyro = window.gyro
     return {
         "name": window.name,
@@ -64,14 +59,7 @@ def _side(window: Window) -> dict[str, Any]:
 
 
 def window_text(window: Window, data: Mapping[str, Any]) -> str:
-    """Return the filters of a window as text: conditions, errors and gains, and rounded taps.
-
-    Parameters
-    ----------
-    window : Window
-    data : mapping
-        What `window_data` returns.
-    """
+    """Return the filters of a window as text: conditions, errors and gains, and rounded taps."""
     band = float(window.band)
     facts = {
         "samples": f"{window.previous} before the step, {window.increments} in it, {window.ahead} ahead of it",
@@ -161,12 +149,7 @@ def _tap_table(window: Window) -> TextTable:
 
 
 def window_report(window: Window) -> Report:
-    """Return a window as a report, whose table has a row for each filter with its exact taps.
-
-    Parameters
-    ----------
-    window : Window
-    """
+    """Return a window as a report, whose table has a row for each filter with its exact taps."""
     data = window_data(window)
     return Report(lambda: window_text(window, data), lambda: data, lambda: flat_table(list(_rows(data))))
 
@@ -181,13 +164,7 @@ def _rows(data: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def window_warnings(window: Window) -> list[str]:
-    """Return what a user of filters should know: errors and gains that are large, a sentence each.
-
-    Parameters
-    ----------
-    window : Window
-        A family.
-    """
+    """Return what a user of filters should know: errors and gains that are large, a sentence each."""
     warnings = []
     level = responses.level(window, 1)
     if level > _HIGH_LEVEL:

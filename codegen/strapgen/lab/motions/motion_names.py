@@ -13,21 +13,15 @@ _PROFILES = f"{__package__}.rate_profiles"
 
 
 class MotionEntry(NamedTuple):
-    """A motion of the table.
+    """A motion of the table."""
 
-    Parameters
-    ----------
-    parameters : mapping of str to str
-        Its parameters and the unit of each: "rad/s", "rad", "s" or "Hz".
-    function : str
-        "module:function": takes the parameters in SI units by name, and returns the `RateProfile` of the motion, or the
-        motion itself. "" for a motion in closed form, which the kernels NAME-truth and NAME-increments compute.
-    defaults : mapping of str to float
-        Parameters in SI units that can be left out as long as another one is set.
-    """
-
+    #: Its parameters and the unit of each: "rad/s", "rad", "s" or "Hz"
     parameters: Mapping[str, str]
+    #: "module:function": takes the parameters in SI units by name, and returns the `RateProfile` of the motion,
+    #: or the motion itself. "" for a motion in closed form, which the kernels NAME-truth and NAME-increments
+    #: compute
     function: str = ""
+    #: Parameters in SI units that can be left out as long as another one is set
     defaults: Mapping[str, float] = {}
 
 
