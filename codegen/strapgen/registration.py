@@ -62,7 +62,7 @@ class Registration:
     tableaux, windows, coning_shapes : tuple of str, optional
         Folders "package:folder" of TOML files with coefficients; a file has the name of its method.
     motions : tuple of str, optional
-        Tables of motions: mappings of names to `strapgen.lab.motions.motion_names.MotionEntry`.
+        Tables of motions: mappings of names to `MotionEntry` of the module `motion_names`.
     targets : tuple of str, optional
         Tables of targets: mappings of names to `strapgen.Target`.
     backends : tuple of str, optional
