@@ -74,7 +74,8 @@ class Registration:
         What it adds to others, by the extension point that the compiler or another application defines, such as
         "lab.described".
     requires : tuple of str, optional
-        Applications of strapgen that it imports; without one of them it is not there either.
+        Folders of strapgen that it needs, as "lab" or "targets.c_fixed"; without one of them it is not there either,
+        and it comes after them.
     """
 
     title: str
