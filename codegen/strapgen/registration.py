@@ -62,7 +62,7 @@ class Registration:
     tableaux, windows, coning_shapes : tuple of str, optional
         Folders "package:folder" of TOML files with coefficients; a file has the name of its method.
     motions : tuple of str, optional
-        Tables of motions: mappings of names to `strapgen.lab.motions.motion_names.MotionEntry`.
+        Tables of motions: mappings of names to `MotionEntry` of the module `motion_names`.
     targets : tuple of str, optional
         Tables of targets: mappings of names to `strapgen.Target`.
     backends : tuple of str, optional
@@ -74,7 +74,8 @@ class Registration:
         What it adds to others, by the extension point that the compiler or another application defines, such as
         "lab.described".
     requires : tuple of str, optional
-        Applications of strapgen that it imports; without one of them it is not there either.
+        Folders of strapgen that it needs, as "lab" or "targets.c_fixed"; without one of them it is not there either,
+        and it comes after them.
     """
 
     title: str

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+#: So many names are shown, and of more their number.
+_FEW = 30
+
 
 class Item(NamedTuple):
     """What an installed package brings under a name: the entry point, the place, and the record once it is loaded."""
@@ -36,7 +39,7 @@ class Own(Mapping[str, T], Generic[T]):
         self._kind, self._keep, self._first = kind, keep, first
 
     def _in_words(self) -> str:
-        return f"{len(self)} {self._kind}"
+        return ", ".join(self) if len(self) <= _FEW else f"{len(self)} {self._kind}"
 
     @cached_property
     def _records(self) -> dict[str, T]:

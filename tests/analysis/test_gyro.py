@@ -34,7 +34,7 @@ class SeenCone(IntegratedMotion):
     hertz: float
 
     @cached_property
-    def _profile(self) -> ThroughGyro:
+    def profile(self) -> ThroughGyro:
         omega = 2 * math.pi * self.hertz
         motion = CosineSum(
             ANGLE * omega * np.array([[1.0], [1.0], [0.0]]),
@@ -45,7 +45,7 @@ class SeenCone(IntegratedMotion):
 
     @cached_property
     def _reference(self) -> ReferenceAttitude:
-        return ReferenceAttitude(self._profile.rate, 16)
+        return ReferenceAttitude(self.profile.rate, 16)
 
     def attitude(self, time):
         return self._reference(time)

@@ -214,7 +214,7 @@ class SumOfCones(IntegratedMotion):
     signs: NDArray[np.float64]
 
     @cached_property
-    def _profile(self) -> CosineSum:
+    def profile(self) -> CosineSum:
         omega = 2 * math.pi * self.hertz
         phases = 2 * math.pi * (np.sqrt(7) * np.arange(1, len(omega) + 1) % 1)
         return CosineSum(
@@ -225,7 +225,7 @@ class SumOfCones(IntegratedMotion):
 
     @cached_property
     def _reference(self) -> ReferenceAttitude:
-        return ReferenceAttitude(self._profile.rate, 16)
+        return ReferenceAttitude(self.profile.rate, 16)
 
     def attitude(self, time):
         return self._reference(time)

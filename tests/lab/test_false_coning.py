@@ -23,7 +23,7 @@ class Angles(IntegratedMotion):
     """Angles about x and y at one frequency in Hz, y ahead by a phase; the parameters are its numbers."""
 
     @property
-    def _profile(self):
+    def profile(self):
         turn = 2 * math.pi * self.parameters["hertz"]
         size = np.array([[self.parameters["x"]], [self.parameters["y"]], [0.0]])
         # The rate of sin(turn t + phase) is turn cos(turn t + phase).
@@ -31,7 +31,7 @@ class Angles(IntegratedMotion):
         return CosineSum(turn * size, np.full((3, 1), turn), phases)
 
     def attitude(self, time):
-        return ReferenceAttitude(self._profile.rate, 16)(time)
+        return ReferenceAttitude(self.profile.rate, 16)(time)
 
 
 def angles(x: float, y: float, hertz: float, phase: float) -> Angles:

@@ -23,9 +23,6 @@ ALIASES = {"c-q31": "c-fixed32", "c-q15": "c-fixed16"}
 class _Backends(Registry[Entry]):
     """Back ends by name; one can be looked up by its other name, too."""
 
-    def _in_words(self) -> str:
-        return ", ".join(self)
-
     def __getitem__(self, name: str) -> Entry:
         return super().__getitem__(ALIASES.get(name, name))
 

@@ -48,7 +48,7 @@ GROUPS = {
     "Coning corrections": tuple(name for name in INTEGRATORS if name.startswith("coning")),
     "Exact rotations": ("fit-exact", "magnus2", "magnus4", "magnus6", "munthe-kaas4", "crouch-grossman3"),
     "Taylor series": tuple(name for name in INTEGRATORS if name.startswith("taylor")),
-    "Windows and shaped coning": tuple(name for name in METHODS if name not in TITLES | INTEGRATORS),
+    "Windows and shaped coning": tuple(name for name in METHODS if name not in {*TITLES, *INTEGRATORS}),
 }
 #: Steps whose bounds of rounding come with the page, because their proof takes seconds here and numpy there.
 PROVED = (
