@@ -60,7 +60,7 @@ def named_method(method: str | MethodSpec) -> MethodSpec | None:
     Examples
     --------
     >>> named_method("window-7-7").own_samples, named_method("rk4").title, named_method("rk5")
-    (1, 'Kutta (1901), the classical method', None)
+    (1, 'classical fourth-order Runge-Kutta method', None)
     """
     if not isinstance(method, str):
         return method if isinstance(method, MethodSpec) else None

@@ -16,10 +16,10 @@ from itertools import count
 from typing import TYPE_CHECKING, TypeVar
 
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.integer_program import FixedProgram
 from strapgen.targets.c_library import LIBRARY
 
 if TYPE_CHECKING:
-    from strapgen.ir.integer_program import FixedProgram
     from strapgen.ir.program import Program
     from strapgen.targets.renaming import Key
 
