@@ -124,6 +124,7 @@ def test_log_is_read_by_names_and_units(name, capsys, tmp_path):
             ["--rate-unit", "rad/s"],
             "contradicts",
         ),
+        ("t,gx [deg/s],gy [rad/s],gz\n0,0,0,1\n0.1,0,0,1\n", [], "the rates are in deg/s and rad/s"),
         ("t [ms],gx,gy,gz\n0,0,0,1\n10,0,0,1\n", ["--rate-unit", "rad/s", "--time-unit", "s"], "is in ms"),
         ("t,gx,gy,gz\n0,0,0,1\n0.1,0,0,1\n", [], "--rate-unit is needed"),
         ("t,gx,gy,gz\n0,0,0,1\n4000,0,0,1\n", ["--rate-unit", "rad/s"], "--time-unit s, ms, us or ns"),
