@@ -69,7 +69,7 @@ def rates_layout(header: Sequence[str] | None, width: int, stated: Stated) -> Co
     places = _stated_places(stated, cells, width) if stated.columns else _found_places(cells, width, has_time)
     unit, time_unit = stated.unit, stated.time_unit
     if cells is not None:
-        of_rates = {cells[place].unit for place in places[has_time:]} & {*units.RATES}
+        of_rates = {*units.RATES}.intersection(cells[place].unit for place in places[has_time:])
         if len(of_rates) > 1:
             raise InputError(f"the rates are in {' and '.join(sorted(of_rates))}; one unit is needed")
         for place in places[has_time:]:
