@@ -99,7 +99,7 @@ def test_the_kernel_is_generated(followed, tmp_path):
         "    int16_t state[4] = {1, 5, 7, 5}, inverse[4];\n    int status = euler_inverse_w16(state, inverse);\n"
         '    printf("%d: %d %d %d %d", status, inverse[0], inverse[1], inverse[2], inverse[3]);\n}\n'
     )
-    build = [compiler.compiler(), "-o", "main", "main.c", "firmware/euler_inverse_w16.c"]
+    build = [compiler.C.path(), "-o", "main", "main.c", "firmware/euler_inverse_w16.c"]
     subprocess.run(build, cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
     assert done.stdout == "0: -1 -5 -7 5"

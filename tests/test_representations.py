@@ -157,6 +157,10 @@ MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
     "vibration.RandomRates": lambda: strapgen.vibration.RandomRates(
         *2 * [strapgen.vibration.Rates(1.0, 1.0, 0.0)]
     ),
+    "vibration.Tone": lambda: strapgen.vibration.Tone("10", (-1e-3j, 1e-3, 0)),
+    "vibration.Rectification": lambda: strapgen.vibration.rectified(
+        strapgen.choose("euler", "rk1", 1), "0.01", [strapgen.vibration.Tone("10", (-1e-3j, 1e-3, 0))]
+    ),
 }
 #: Formulas in a notebook: kernels, series, tableaux, order conditions, coefficients, windows.
 FORMULAS = (

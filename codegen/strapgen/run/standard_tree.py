@@ -28,9 +28,8 @@ _DRAFT = re.compile(r"\.(.+)-[0-9a-f]{8}")
 
 
 def programs() -> Iterator[Program]:
-    """Derive and lower every kernel of the standard catalogue."""
-    for choice in catalogue.standard():
-        yield pipeline.lower(pipeline.derive(choice))
+    """Yield the program of every kernel of the standard catalogue."""
+    yield from map(pipeline.program, catalogue.standard())
 
 
 def folder_of(target: str) -> str:

@@ -22,7 +22,7 @@ from strapgen.ir.angle_accumulation import LARGEST_ERROR
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Operation, Program
 from strapgen.run import exact
-from strapgen.run.fixed import KEEP_THE_ATTITUDE
+from strapgen.run.backends import KEEP_THE_ATTITUDE
 
 BENCHMARK = Path(__file__).resolve().parents[3] / "benchmarks" / "adversarial_run.py"
 RATES = {"max_rate_deg_s": 400, "step": "0.01", "increments": 2}
