@@ -17,11 +17,13 @@ import hypothesis
 import numpy as np
 import pytest
 import session_library
+import typer
 import typer.main
 from covering import beyond_two_rounds, mark_combinations
 from gathering import SEED
 
 import strapgen
+from strapgen import cli
 from strapgen.catalogue import ALGORITHMS
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
@@ -233,6 +235,7 @@ def compiled(optimization: None, request: pytest.FixtureRequest) -> Iterator[Non
 @pytest.fixture(scope="session", autouse=True)
 def one_command_line() -> Iterator[None]:
     """Build the commands once: typer reads the signatures of all of them whenever its application is called."""
+    assert isinstance(cli.app, typer.Typer)  # with all commands, before one of them is asked for
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
         yield

@@ -38,11 +38,15 @@ _FOLDERS = ("tableaux", "windows", "coning_shapes")
 
 
 class Command(NamedTuple):
-    """A command: "module:function", where ``strapgen --help`` lists it; a hidden one is not listed."""
+    """A command: "module:function", where ``strapgen --help`` lists it and with what; a hidden one is not listed.
+
+    With a summary, which is the first sentence of its help, the list does not import it.
+    """
 
     function: str
     heading: str = ""
     hidden: bool = False
+    summary: str = ""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from collections import defaultdict
 import pytest
 from typer.main import get_command
 
+from strapgen import registration
 from strapgen.cli import app
 from strapgen.cli import headings as groups
-from strapgen.cli.help import PlainCommand
+from strapgen.cli.help import PlainCommand, _summary
 from strapgen.ir.suggestions import SYNONYMS
 
 
@@ -54,6 +55,16 @@ def test_commands_stand_in_groups_with_a_whole_sentence_each(monkeypatch):
     assert shown == groups()
     assert not [line for line in lines[1:] if line.endswith("...")]
     assert "stress" not in " ".join(lines)
+
+
+def test_summaries_of_the_list_are_first_sentences_of_the_commands():
+    listed = {
+        name: command.summary
+        for one in registration.built_in().values()
+        for name, command in one.commands.items()
+        if command.heading
+    }
+    assert listed == {name: _summary(EVERY[name].help) for name in listed}
 
 
 def test_an_option_and_its_value_stay_on_one_line_of_an_example(monkeypatch):

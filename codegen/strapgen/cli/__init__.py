@@ -29,17 +29,19 @@ class _Strapgen(PlainGroup):
     """The program itself."""
 
     headings: ClassVar[dict[str, list[str]]] = {heading: [] for heading in HEADINGS}
+    summaries: ClassVar[dict[str, str]] = {}
 
 
-app = typer.Typer(
+_app = typer.Typer(
     name="strapgen",
     cls=_Strapgen,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.callback()(version_option.options)
-#: Groups of commands by name.
+_app.callback()(version_option.options)
+#: Commands that were added, and groups of commands by name.
+_added: set[str] = set()
 _groups: dict[str, typer.Typer] = {}
 
 
@@ -49,20 +51,40 @@ def headings() -> dict[str, list[str]]:
 
 
 def _add(name: str, command: Command, function: Any) -> None:
-    """Add a command to the program; one of a group comes after the group."""
+    """Add a command to the program, and before it the group of which it is one."""
+    if name in _added:
+        return
+    _added.add(name)
     group, _, member = name.rpartition(" ")
     if isinstance(function, typer.Typer):
-        app.add_typer(function, name=name)
+        _app.add_typer(function, name=name)
         _groups[name] = function
-    else:
-        to = _groups[group] if group else app
-        to.command(member, cls=PlainCommand, hidden=command.hidden)(function)
-    if command.heading:
-        _Strapgen.headings.setdefault(command.heading, []).append(name)
+        return
+    if group in _OWN:
+        _add_own(group)
+    to = _groups[group] if group else _app
+    to.command(member, cls=PlainCommand, hidden=command.hidden)(function)
 
 
-#: The commands of strapgen by name.
+def _list(name: str, command: Command) -> None:
+    """Let the help list a command."""
+    names = _Strapgen.headings.setdefault(command.heading, []) if command.heading else [name]
+    if name not in names:
+        names.append(name)
+        _Strapgen.summaries[name] = command.summary
+
+
+#: The commands of strapgen by name, all of which the help lists before one is imported.
 _OWN = {name: command for one in registration.built_in().values() for name, command in one.commands.items()}
+for _name, _command in _OWN.items():
+    _list(_name, _command)
+
+
+def _add_own(*names: str) -> None:
+    """Add commands of strapgen, which are imported for that."""
+    for name in names:
+        if name not in _added:
+            _add(name, _OWN[name], registration.load(_OWN[name].function))
 
 
 def _add_installed() -> None:
@@ -70,10 +92,26 @@ def _add_installed() -> None:
     for name, command, function in registration.installed_commands():
         if not isinstance(function, InputError):
             _add(name, command, function)
+            _list(name, command)
 
 
-for _name, _command in _OWN.items():
-    _add(_name, _command, registration.load(_command.function))
+def _add_asked(words: Sequence[str]) -> None:
+    """Add the command of a command line alone; all of them where that is not enough."""
+    asked = next((word for word in words if not word.startswith("-")), "")
+    if _COMPLETING in os.environ or (asked and asked not in _OWN):
+        _add_own(*_OWN)
+    elif asked:
+        _add_own(asked, *(name for name in _OWN if name.startswith(f"{asked} ")))
+    if asked not in _OWN or asked in _groups:
+        _add_installed()
+
+
+def __getattr__(name: str) -> Any:
+    """Return the program with all commands of strapgen as `app`."""
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    _add_own(*_OWN)
+    return _app
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -84,9 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     prepare_for_derivations()
     words = _spread_settings(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
-        if words[0] in _groups or words[0] not in _OWN:
-            _add_installed()
-        status = app(words, prog_name="strapgen", standalone_mode=False)
+        _add_asked(words)
+        status = _app(words, prog_name="strapgen", standalone_mode=False)
         sys.stdout.flush()
     except StrapgenError as error:
         # A name that is not known may be that of a package that cannot be used.

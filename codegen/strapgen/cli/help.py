@@ -49,6 +49,8 @@ class PlainGroup(TyperGroup):
 
     #: Headings and their commands; a command that is listed nowhere is not shown.
     headings: ClassVar[dict[str, list[str]]] = {}
+    #: Summaries of commands that are known without them.
+    summaries: ClassVar[dict[str, str]] = {}
 
     def get_help(self, ctx: Any) -> str:
         """Return usage, text, options and the commands under their headings."""
@@ -56,7 +58,9 @@ class PlainGroup(TyperGroup):
         lines = _help(self, ctx)
         width = max(len(name) for names in headings.values() for name in names)
         for heading, names in headings.items():
-            rows = [(name, _summary(self.commands[name].help or "")) for name in names]
+            rows = [
+                (name, self.summaries.get(name) or _summary(self.commands[name].help or "")) for name in names
+            ]
             lines += ["", f"{heading}:", *_definitions(rows, width)]
         return "\n".join(lines)
 

@@ -7,8 +7,20 @@ from strapgen.registration import Command, Registration
 REGISTRATION = Registration(
     "the commands of the compiler",
     commands={
-        "list": Command(f"{__package__}.list_command:list_names", "Derive"),
-        "derive": Command(f"{__package__}.derive_command:derive", "Derive"),
-        "generate": Command(f"{__package__}.generate_command:generate", "Generate"),
+        "list": Command(
+            f"{__package__}.list_command:list_names",
+            "Derive",
+            summary="List all names that the other commands take",
+        ),
+        "derive": Command(
+            f"{__package__}.derive_command:derive",
+            "Derive",
+            summary="Show the formulas, the program or the operations of a kernel",
+        ),
+        "generate": Command(
+            f"{__package__}.generate_command:generate",
+            "Generate",
+            summary="Generate source code for an algorithm, or for the whole catalogue",
+        ),
     },
 )

@@ -7,7 +7,11 @@ from strapgen.registration import Command, Registration
 REGISTRATION = Registration(
     "verification of generated C with independent tools",
     commands={
-        "evidence": Command(f"{__package__}.evidence_command:evidence", "Generate"),
+        "evidence": Command(
+            f"{__package__}.evidence_command:evidence",
+            "Generate",
+            summary="Have independent tools examine what generated C promises",
+        ),
     },
     requires=("lab", "navigation", "firmware"),
 )

@@ -7,9 +7,21 @@ from strapgen.registration import Command, Registration
 REGISTRATION = Registration(
     "test vectors, projects, verification of files, checks of code by others",
     commands={
-        "vectors": Command(f"{__package__}.vectors.vectors_command:vectors", "Generate"),
-        "verify": Command(f"{__package__}.verify.verify_command:verify", "Generate"),
-        "check": Command(f"{__package__}.check_code.check_command:check", "Analyse"),
+        "vectors": Command(
+            f"{__package__}.vectors.vectors_command:vectors",
+            "Generate",
+            summary="Write test vectors of generated C, for a test on the processor",
+        ),
+        "verify": Command(
+            f"{__package__}.verify.verify_command:verify",
+            "Generate",
+            summary="Verify that a generated C file is what its header says",
+        ),
+        "check": Command(
+            f"{__package__}.check_code.check_command:check",
+            "Analyse",
+            summary="Test what every attitude step must do; exit with 1 if it fails",
+        ),
     },
     extensions={
         "generate.project": f"{__package__}.project:project",

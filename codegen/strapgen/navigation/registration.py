@@ -7,10 +7,26 @@ from strapgen.registration import Command, Registration
 REGISTRATION = Registration(
     "two speeds, described systems, instruments, loops, redundancy, calibration",
     commands={
-        "two-speed": Command(f"{__package__}.two_speed.two_speed_command:two_speed", "Generate"),
-        "system": Command(f"{__package__}.systems.system_command:system", "Generate"),
-        "redundancy": Command(f"{__package__}.redundancy.redundancy_command:redundancy", "Generate"),
-        "strapdown": Command(f"{__package__}.courses.strapdown_command:strapdown", "Run"),
+        "two-speed": Command(
+            f"{__package__}.two_speed.two_speed_command:two_speed",
+            "Generate",
+            summary="Generate the C code of an algorithm in two speeds",
+        ),
+        "system": Command(
+            f"{__package__}.systems.system_command:system",
+            "Generate",
+            summary="Check a described system and generate its code",
+        ),
+        "redundancy": Command(
+            f"{__package__}.redundancy.redundancy_command:redundancy",
+            "Generate",
+            summary="Derive what redundant sensors tell of their failures",
+        ),
+        "strapdown": Command(
+            f"{__package__}.courses.strapdown_command:strapdown",
+            "Run",
+            summary="Run an algorithm in two speeds along an inertial recording",
+        ),
         "study system": Command(f"{__package__}.systems.study_system_command:study_system"),
         "study attitude-form": Command(
             f"{__package__}.attitude_form.attitude_form_command:study_attitude_form"
@@ -20,7 +36,11 @@ REGISTRATION = Registration(
         "study calibration": Command(f"{__package__}.calibration.calibration_command:study_calibration"),
         "study pulse-torque": Command(f"{__package__}.torquing.pulse_torque_command:study_pulse_torque"),
         "study loops": Command(f"{__package__}.loops.loops_command:study_loops"),
-        "rate-table": Command(f"{__package__}.rate_table.rate_table_command:rate_table", "Reproduce"),
+        "rate-table": Command(
+            f"{__package__}.rate_table.rate_table_command:rate_table",
+            "Reproduce",
+            summary="Run the rate-table test of 1984 on every algorithm and back end",
+        ),
         "study velocity-position": Command(
             f"{__package__}.velocity_position.velocity_position_command:study_velocity_position"
         ),

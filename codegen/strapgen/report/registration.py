@@ -7,7 +7,11 @@ from strapgen.registration import Command, Registration
 REGISTRATION = Registration(
     "a report on an algorithm as one file",
     commands={
-        "report": Command(f"{__package__}.report_command:report", "Analyse"),
+        "report": Command(
+            f"{__package__}.report_command:report",
+            "Analyse",
+            summary="Write one HTML file with formulas, code, bounds, runs and evidence",
+        ),
     },
     requires=("lab", "design", "evidence", "thesis"),
 )

@@ -7,8 +7,16 @@ from strapgen.registration import Command, Registration
 REGISTRATION = Registration(
     "tables and statements of the thesis",
     commands={
-        "tables": Command(f"{__package__}.tables_command:tables", "Reproduce"),
-        "statements": Command(f"{__package__}.statements_command:statements", "Reproduce"),
+        "tables": Command(
+            f"{__package__}.tables_command:tables",
+            "Reproduce",
+            summary="Compute the tables of the thesis beside its printed figures",
+        ),
+        "statements": Command(
+            f"{__package__}.statements_command:statements",
+            "Reproduce",
+            summary="Run the statements of the thesis's text, and say whether they hold",
+        ),
     },
     requires=("lab", "analysis"),
 )
