@@ -7,5 +7,5 @@ from strapgen.run.backend_names import Entry
 KERNELS = {"twist-z": Recipe("rotation about z in Euler parameters", "toy_application.kernel", "twist_z")}
 METHODS = {"middle-rate": Integrator("rotation by the rate in the middle", "toy_application.method", 2)}
 MOTIONS = {"swing": MotionEntry({"angle": "rad", "frequency": "Hz"}, "toy_application.motion:swing")}
-_NUMPY = ("strapgen.run.numpy_evaluator:NumpyEvaluator", "strapgen.run.numpy_backend:NumpyBackend")
-BACKENDS = {"numpy-licensed": Entry("generated numpy code with its licence", "numpy-licensed", *_NUMPY)}
+_NUMPY = "strapgen.run.numpy_evaluator:NumpyEvaluator"
+BACKENDS = {"numpy-licensed": Entry("generated numpy code with its licence", "numpy-licensed", _NUMPY)}
