@@ -150,7 +150,9 @@ def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
             with suppress(OSError):  # another process was first: its entry is the same
                 draft.rename(place)
     except OSError as error:
-        raise InputError(f"cache folder {root()} cannot be written ({error.strerror}){advice}") from error
+        raise InputError(
+            f"cache folder {root()} cannot be written ({error.strerror or error}){advice}"
+        ) from error
     return place
 
 
