@@ -30,7 +30,7 @@ from strapgen.catalogue.user import loading
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.recipe import Description
-from strapgen.ir.suggestions import some, unknown
+from strapgen.ir.suggestions import some
 
 if TYPE_CHECKING:
     from strapgen.catalogue.constants import Constants
@@ -170,7 +170,7 @@ def _choose_method(name: str, method: AnyMethod | None, asked: Asked) -> Choice:
     if vector is not None:
         _require_vector(name, vector, method, spec, asked.rates)
     if spec is None:
-        raise InputError(unknown("method", method, METHODS))
+        raise checks.unknown_name("method", method, METHODS)
     spec, samples = spec.select(asked)
     is_named = not spec.file and is_built_in(spec.name) and named_method(spec.name) == spec
     choice = Choice(name, spec.name if is_named else spec, *samples)

@@ -30,10 +30,17 @@ def choice(what: str, value: str, allowed: Iterable[str], also: str = "", sectio
     """Return `value` if it is one of `allowed`; `also` and `section` complete the message of a refusal."""
     names = allowed if isinstance(allowed, Container) else list(allowed)  # a mapping may know other names
     if not isinstance(value, str) or value not in names:
-        error = InputError(unknown(what, value, list(names), also, section))
-        error.unknown_name = True
-        raise error
+        raise unknown_name(what, value, list(names), also, section)
     return value
+
+
+def unknown_name(
+    what: str, value: object, names: Iterable[str], also: str = "", section: str = ""
+) -> InputError:
+    """Return the refusal of a name that nothing has."""
+    error = InputError(unknown(what, value, names, also, section))
+    error.unknown_name = True
+    return error
 
 
 def double(text: str) -> float:
