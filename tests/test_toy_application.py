@@ -105,6 +105,7 @@ def test_its_methods_run_on_its_motion_and_its_back_end(method, order, strapgen_
     motion = strapgen.motion("swing", angle_deg=20, frequency_hz="0.5")
     run = strapgen.backend(strapgen.choose("euler", method, 4), backend="numpy-licensed")
     assert run.name == "numpy-licensed" and run.sources.target == "numpy-licensed"
+    assert all(entry.word is None or isinstance(entry.word, int) for entry in strapgen.BACKENDS.values())
     errors = []
     for step, steps in ((Fraction(1, 16), 52), (Fraction(1, 32), 104)):
         time = np.arange(steps + 1) * float(step)
