@@ -252,7 +252,7 @@ import strapgen
 print("ready", flush=True)
 sys.stdin.readline()
 backend = strapgen.backend("euler", "rk1", 1, backend="c")
-print(json.dumps(backend.propagate([[[0.1, 0.2, 0.3]]] * 5).tolist()))
+print(json.dumps(backend.propagate([[[0.1, 0.2, 0.3]]] * 5, orthonormalize_every=2).tolist()))
 """
 
 
