@@ -223,7 +223,7 @@ class Evaluator(ABC):
         for number in range(1, steps + 1):
             where = f" in step {loop.first + number}"
             (state,), feedback = self.call([state, self.pack(samples[:, number - 1])], feedback, where)
-            if loop.restore and number % loop.restore_every == 0:
+            if loop.restore and loop.restore_every and number % loop.restore_every == 0:
                 (state,), first = loop.restore.call([state], feedback[:words] if words else feedback, where)
                 feedback = [*first, *feedback[words:]] if words else feedback
             if number % loop.record_every == 0:
