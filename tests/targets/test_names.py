@@ -238,8 +238,7 @@ def lowered(kernel: Kernel) -> Lowered:
 
 def renamed(step: Lowered, kernel: str) -> Lowered:
     """Return a step under another name of its kernel, which its code otherwise knows nothing of."""
-    names = {"name": kernel.replace("-", "_"), "kernel": kernel}
-    program = replace(step.program, **names)
+    program = replace(step.program, info=replace(step.program.info, name=kernel), name="")
     return Lowered(program, replace(step.fixed, program=program))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from strapgen.ir.decimals import above, float_above, float_below
 from strapgen.ir.fixed_interface import ErrorFeedback, Interface
 from strapgen.ir.formats import Format
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.program import Program
 
@@ -208,6 +209,11 @@ class FixedProgram:
         )
         bounds = ", ".join(f"{name} {above(bound, 3, 'e')}" for name, bound in self.error_bounds.items())
         return f"{self.name}: {self.program.title}\n{formats}\nerror bounds of a call: {bounds}"
+
+    @property
+    def info(self) -> KernelInfo:
+        """What is said of the kernel."""
+        return self.program.info
 
     @property
     def word(self) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
@@ -32,8 +33,10 @@ class Sources:
 
     Parameters
     ----------
-    kernel, target : str
-        Names of the kernel and of the target.
+    info : KernelInfo
+        What is said of the kernel.
+    target : str
+        Name of the target.
     files : dict of str to str
         Text by file name.
     function : Function
@@ -42,12 +45,8 @@ class Sources:
         Operations of one call, see `Program.operations`.
     temporaries : int
         Intermediate values of one call.
-    companions : Companions or None
-        The kernels that go with an attitude step; None for every other kernel.
     fixed : Interface or None
         Formats, ranges and error bounds of fixed-point code; None for every other target.
-    recursion : Recursion or None
-        The outputs that are inputs of the next call.
     own : tuple of Program
         Programs of the kernels that a user's step brings.
     runs : tuple of str
@@ -56,15 +55,13 @@ class Sources:
         Error bounds of C in floating point; None for every other target.
     """
 
-    kernel: str
+    info: KernelInfo
     target: str
     files: dict[str, str]
     function: Function
     operations: dict[str, int]
     temporaries: int
-    companions: Companions | None
     fixed: Interface | None = None
-    recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
     runs: tuple[str, ...] = ()
     rounding: RoundingBounds | None = None
@@ -74,6 +71,21 @@ class Sources:
 
     def _in_words(self) -> str:
         return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"
+
+    @property
+    def kernel(self) -> str:
+        """Name of the kernel."""
+        return self.info.name
+
+    @property
+    def companions(self) -> Companions | None:
+        """The kernels that go with an attitude step; None for every other kernel."""
+        return self.info.companions
+
+    @property
+    def recursion(self) -> Recursion | None:
+        """The outputs that are inputs of the next call."""
+        return self.info.recursion
 
     @property
     def cost(self) -> str:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import sympy as sp
 
-from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.attitude_step import Companions
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import counted_shape, notebook_latex, short_repr
 from strapgen.ir.program import RESOLUTION
-from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.kernel import unknown_values
 from strapgen.kernel.evaluation import evaluate
@@ -93,17 +93,13 @@ def evaluate_stages(
 
 
 @dataclass(frozen=True)
-class Kernel:
-    """An algorithm as exact expressions.
+class Kernel(KernelInfo):
+    """An algorithm as exact expressions. Its `KernelInfo` is the words and names that every stage passes on.
 
     Parameters
     ----------
-    name : str
-        Name on the command line, lower case with hyphens.
-    title : str
-        One line that says what it computes.
-    source : str
-        Where the algorithm comes from, with the equation's number.
+    name, title, source, arguments, notes, companions, order, recursion
+        See `KernelInfo`.
     inputs : tuple of Signal
         Inputs; their elements are the free symbols of the expressions.
     outputs : tuple of Stage
@@ -112,19 +108,8 @@ class Kernel:
         Intermediate quantities in order; later expressions may use their symbols.
     transition : str or None
         Name of the stage on which the state's update depends linearly, see `Program.transition`.
-    companions : Companions or None
-        The kernels of an attitude step; None for every other kernel.
-    order : Order or None
-        Order of an attitude step.
-    recursion : Recursion or None
-        The pairs of an output and the input that it becomes in the next call.
     own : tuple of Kernel
         Kernels that `companions` names and the catalogue does not have.
-    arguments : str
-        Name and options on the command line; by default the name alone. A whole command, such as
-        ``strapgen redundancy FILE``, where another than ``strapgen generate`` generates it.
-    notes : tuple of str
-        Remarks for the reader of generated code: domain, conventions.
     unknowns : tuple of str
         Names of the coefficients that are not known yet. Series and conditions are polynomials in them; no code can be
         generated before `substitute` has replaced all of them.
@@ -133,19 +118,11 @@ class Kernel:
         addition; `companions` has those of an attitude step.
     """
 
-    name: str
-    title: str
-    source: str
     inputs: tuple[Signal, ...]
     outputs: tuple[Stage, ...]
     stages: tuple[Stage, ...] = ()
     transition: str | None = None
-    companions: Companions | None = None
-    order: Order | None = None
-    recursion: Recursion | None = None
     own: tuple[Kernel, ...] = ()
-    arguments: str = ""
-    notes: tuple[str, ...] = field(default=())
     unknowns: tuple[str, ...] = ()
     previous: int = 0
     ahead: int = 0
@@ -162,9 +139,9 @@ class Kernel:
         return f"{self.name}: {self.title}\n{ins} -> {outs}{order}"
 
     @property
-    def identifier(self) -> str:
-        """The name in generated code."""
-        return self.name.replace("-", "_")
+    def info(self) -> KernelInfo:
+        """What programs and sources of the kernel have of it."""
+        return KernelInfo(**{field.name: getattr(self, field.name) for field in fields(KernelInfo)})
 
     @property
     def takes_velocity(self) -> bool:

@@ -6,6 +6,7 @@ they are multiplied by it, and negative terms are subtracted.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 
@@ -44,18 +45,11 @@ def gate(kernel: Kernel, shared: Shared) -> Program:
 
     stages = {stage.signal.name: stage.signal for stage in kernel.stages}
     return Program(
-        name=kernel.identifier,
-        kernel=kernel.name,
-        title=kernel.title,
-        source=kernel.source,
-        arguments=kernel.arguments or kernel.name,
-        notes=kernel.notes,
+        info=replace(kernel.info, arguments=kernel.arguments or kernel.name),
         inputs=kernel.inputs,
         body=tuple(writer.body),
         outputs=tuple(result(stage.signal) for stage in kernel.outputs),
         transition=None if kernel.transition is None else result(stages[kernel.transition]),
-        companions=kernel.companions,
-        recursion=kernel.recursion,
     )
 
 

@@ -27,14 +27,12 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
     if target in TARGETS:
         return pipeline.generate(program, target, settings)
     return _ProgramSources(
-        kernel=program.kernel,
+        info=program.info,
         target=target,
         files={},
         function=Function(program.name, program.inputs, tuple(result.signal for result in program.outputs)),
         operations=program.operations,
         temporaries=program.temporaries,
-        companions=program.companions,
-        recursion=program.recursion,
         own=program.own,
         program=program,
     )

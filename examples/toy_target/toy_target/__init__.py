@@ -44,14 +44,12 @@ def emit(program: Program, target: str) -> Sources:
     scalars = [signal.name for signal in program.inputs if not signal.shape]  # they are their only element
     named, files = printed(program, lambda part, _: {f"{part.name}.py": text(part, target)}, PYTHON, scalars)
     return Sources(
-        kernel=program.kernel,
+        info=program.info,
         target=target,
         files=files,
         function=Function(named.name, program.inputs, tuple(result.signal for result in program.outputs)),
         operations=program.operations,
         temporaries=program.temporaries,
-        companions=program.companions,
-        recursion=program.recursion,
     )
 
 

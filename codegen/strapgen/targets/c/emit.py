@@ -118,14 +118,12 @@ def sources_of(
         scalars,
     )
     return Sources(
-        program.kernel,
+        program.info,
         target,
         files,
         Function(name, program.inputs, tuple(result.signal for result in program.outputs)),
         program.operations,
         program.temporaries,
-        program.companions,
-        recursion=program.recursion,
         runs=runs,
         rounding=rounding,
     )

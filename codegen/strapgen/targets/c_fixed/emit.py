@@ -42,15 +42,13 @@ def sources_of(
         name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
     )
     return Sources(
-        fixed.program.kernel,
+        fixed.info,
         target,
         texts,
         function,
         fixed.operations,
         fixed.temporaries,
-        fixed.program.companions,
         interface,
-        fixed.program.recursion,
         runs=runs,
     )
 

@@ -30,17 +30,7 @@ def emit(fixed: FixedProgram, target: str) -> Sources:
         tuple(argument.signal for argument in interface.inputs),
         tuple(argument.signal for argument in interface.outputs),
     )
-    return Sources(
-        fixed.program.kernel,
-        target,
-        files,
-        function,
-        fixed.operations,
-        fixed.temporaries,
-        fixed.program.companions,
-        interface,
-        fixed.program.recursion,
-    )
+    return Sources(fixed.info, target, files, function, fixed.operations, fixed.temporaries, interface)
 
 
 def _files(fixed: FixedProgram, other: Mapping[str, str], target: str) -> dict[str, str]:

@@ -43,16 +43,7 @@ def emit(program: Program, target: str) -> Sources:
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     named, files = printed(program, lambda part, _: _files(part, target), PYTHON, scalars)
     function = Function(named.name, program.inputs, tuple(result.signal for result in program.outputs))
-    return Sources(
-        program.kernel,
-        target,
-        files,
-        function,
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-    )
+    return Sources(program.info, target, files, function, program.operations, program.temporaries)
 
 
 def _files(program: Program, target: str) -> dict[str, str]:
