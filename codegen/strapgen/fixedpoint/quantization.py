@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 from strapgen.fixedpoint import derivation
 from strapgen.fixedpoint.comparisons import (
@@ -16,17 +15,7 @@ from strapgen.fixedpoint.comparisons import (
 )
 from strapgen.fixedpoint.format_plan import FormatPlan, format_plan, sums_of_inputs_are_exact
 from strapgen.fixedpoint.limits import Limit, limits
-from strapgen.fixedpoint.quantities import (
-    Computed,
-    Maximum,
-    NearestInteger,
-    Quantities,
-    Quantity,
-    Quotient,
-    Selection,
-    SquareRoot,
-    Sum,
-)
+from strapgen.fixedpoint.quantities import ExactOperation, Quantities, Quantity, Sum
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
 from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
@@ -46,14 +35,13 @@ _MOST_GUARD_BITS = 3
 #: Shorter formats are chosen where they cost no more than a hundredth in error.
 _WORSE = Fraction(101, 100)
 
-_LOWER: dict[type, Callable[[Quantization, Quantity, Any], None]] = {
-    Sum: lower_sum,
-    Quotient: lower_quotient,
-    SquareRoot: lower_root,
-    Maximum: lower_maximum,
-    Selection: lower_selection,
-    Computed: lower_computed,
-    NearestInteger: lower_nearest_integer,
+_LOWER: dict[str, Callable[[Quantization, Quantity, ExactOperation], None]] = {
+    "divide": lower_quotient,
+    "sqrt": lower_root,
+    "maximum": lower_maximum,
+    "select": lower_selection,
+    "computed": lower_computed,
+    "nearest": lower_nearest_integer,
 }
 
 
@@ -121,20 +109,19 @@ def _walked(
     names = _feedback_names(program, settings, quantities)
     context = Quantization(program, settings, quantities, plan, most, names)
     for quantity in quantities.items.values():
-        lower = _LOWER.get(type(quantity.definition))
-        if lower is not None and not _is_unused_constant(context, quantity):
-            lower(context, quantity, quantity.definition)
+        match quantity.definition:
+            case Sum() as total if not _is_unused_constant(context, quantity, total):
+                lower_sum(context, quantity, total)
+            case ExactOperation(kind) as operation:
+                _LOWER[kind](context, quantity, operation)
     return context
 
 
-def _is_unused_constant(context: Quantization, quantity: Quantity) -> bool:
+def _is_unused_constant(context: Quantization, quantity: Quantity, total: Sum) -> bool:
     """Tell whether a sum is a constant that no word needs to hold, or is there already."""
-    definition = quantity.definition
-    if not isinstance(definition, Sum):
-        return False
     exact = not quantity.offset and not quantity.inexact
-    constant = exact and all(not monomial for monomial, _ in definition.terms)
-    unused = (not definition.terms or constant) and quantity.name not in context.plan.words
+    constant = exact and all(not monomial for monomial, _ in total.terms)
+    unused = (not total.terms or constant) and quantity.name not in context.plan.words
     return unused or quantity.name in context.values
 
 

@@ -7,18 +7,18 @@ from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.operands import at_one_fraction
-from strapgen.fixedpoint.quantities import Quantity, Quotient, SquareRoot
+from strapgen.fixedpoint.quantities import ExactOperation, Quantity
 from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.sums import word_of
 from strapgen.fixedpoint.terms import largest_wide
 from strapgen.ir.formats import finest
-from strapgen.ir.integer_program import IntegerQuotient, IntegerRoot, Scaled
+from strapgen.ir.integer_program import IntegerOperation, Scaled
 
 
-def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotient) -> None:
+def lower_quotient(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
     """Lower a quotient to a word of the finest format for which the numerator has room."""
     word, values = context.word, context.values
-    denominator, numerator = definition.denominator, definition.numerator
+    numerator, denominator = operation.arguments[0], str(operation.arguments[1])
     if values[denominator].error:  # what is exact, a wide number too, stays so
         denominator = word_of(context, denominator)
     if isinstance(numerator, str) and values[numerator].error:
@@ -36,7 +36,7 @@ def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotie
         value = integer_value(
             context,
             quantity,
-            IntegerQuotient(Scaled(top.value, top.shift + shift), denominator),
+            IntegerOperation("divide", (Scaled(top.value, top.shift + shift), Scaled(denominator))),
             fraction,
             inherited + context.rounding_error / Fraction(2) ** fraction,
             size << max(0, shift),
@@ -49,10 +49,10 @@ def lower_quotient(context: Quantization, quantity: Quantity, definition: Quotie
     context.add(value)
 
 
-def lower_root(context: Quantization, quantity: Quantity, definition: SquareRoot) -> None:
+def lower_root(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
     """Lower a square root: as many places below the argument as a wide number has room for, an even number in all."""
-    argument = context.values[definition.argument]
-    inside = context.quantities.items[definition.argument].range
+    radicand = str(operation.arguments[0])
+    argument, inside = context.values[radicand], context.quantities.items[radicand].range
     shift = 2 * context.word - 3 - max(1, argument.high).bit_length()
     shift -= (argument.fraction + shift) % 2
     fraction = (argument.fraction + shift) // 2
@@ -63,7 +63,7 @@ def lower_root(context: Quantization, quantity: Quantity, definition: SquareRoot
     value = integer_value(
         context,
         quantity,
-        IntegerRoot(Scaled(definition.argument, shift)),
+        IntegerOperation("sqrt", (Scaled(radicand, shift),)),
         fraction,
         error + context.rounding_error / Fraction(2) ** fraction,
         argument.high << shift if shift > 0 else argument.high,

@@ -20,10 +20,10 @@ from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     ErrorPropagation,
+    ExactOperation,
     InputElement,
     Quantities,
     Quantity,
-    SquareRoot,
     Sum,
 )
 from strapgen.fixedpoint.quantization import _planned, _walked
@@ -116,7 +116,7 @@ def test_roots_functions_and_what_stands_beside_move_too():
         "b": quantity("b", InputElement("z")),
         "double": quantity("double", Sum(((("a",), 2 * one),)), beside=((("a",), -one / 2),)),
         # The root moves most from zero: to the root of what its argument moves by.
-        "root": quantity("root", SquareRoot("a"), 0),
+        "root": quantity("root", ExactOperation("sqrt", ("a",)), 0),
         "function": quantity("function", Sum(()), follows=slopes),
         "steep": quantity("steep", Sum(()), follows=replace(slopes, most=one / 8)),
     }
