@@ -9,7 +9,7 @@ import pytest
 from gathering import each
 from small_integers import GRID, Known, at_corners, context, quantity, worst
 
-from strapgen.fixedpoint.comparisons import (
+from strapgen.fixedpoint.integer_operations import (
     lower_computed,
     lower_maximum,
     lower_nearest_integer,

@@ -9,8 +9,8 @@ import pytest
 from gathering import each
 from small_integers import GRID, Known, Worst, at_corners, context, quantity, worst
 
+from strapgen.fixedpoint.integer_operations import lower_quotient, lower_root
 from strapgen.fixedpoint.quantities import ExactOperation
-from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import Value
 

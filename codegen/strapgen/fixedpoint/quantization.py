@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.comparisons import (
-    lower_computed,
-    lower_maximum,
-    lower_nearest_integer,
-    lower_selection,
-)
 from strapgen.fixedpoint.format_plan import FormatPlan, format_plan, sums_of_inputs_are_exact
+from strapgen.fixedpoint.integer_operations import LOWER
 from strapgen.fixedpoint.limits import Limit, limits
 from strapgen.fixedpoint.quantities import ExactOperation, Quantities, Quantity, Sum
 from strapgen.fixedpoint.quantization_context import Quantization
-from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
 from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
 from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
@@ -34,15 +28,6 @@ from strapgen.ir.signals import CYCLE, Signal
 _MOST_GUARD_BITS = 3
 #: Shorter formats are chosen where they cost no more than a hundredth in error.
 _WORSE = Fraction(101, 100)
-
-_LOWER: dict[str, Callable[[Quantization, Quantity, ExactOperation], None]] = {
-    "divide": lower_quotient,
-    "sqrt": lower_root,
-    "maximum": lower_maximum,
-    "select": lower_selection,
-    "computed": lower_computed,
-    "nearest": lower_nearest_integer,
-}
 
 
 def lowered(program: Program, settings: Settings) -> FixedProgram:
@@ -113,7 +98,7 @@ def _walked(
             case Sum() as total if not _is_unused_constant(context, quantity, total):
                 lower_sum(context, quantity, total)
             case ExactOperation(kind) as operation:
-                _LOWER[kind](context, quantity, operation)
+                LOWER[kind](context, quantity, operation)
     return context
 
 
