@@ -28,7 +28,7 @@ from strapgen.catalogue import ALGORITHMS
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.results import figures
-from strapgen.run import compiler, octave_process, processes
+from strapgen.run import compiler, octave, processes
 from strapgen.run.backends import BACKENDS, Backend
 from strapgen.run.compiler import COMPILERS
 from strapgen.targets import BUILT_IN
@@ -116,7 +116,7 @@ def _other_language(values: Mapping[str, object]) -> Callable[[], object] | None
         if target in BUILT_IN and BUILT_IN[target].language in COMPILERS:
             return COMPILERS[BUILT_IN[target].language].path
         if target == "matlab":
-            return octave_process.command
+            return octave.command
     return None
 
 
@@ -162,7 +162,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             )
         elsewhere = (
             IN_OCTAVE not in item.path.parents
-            if program is octave_process.command
+            if program is octave.command
             else program is not None
             and not {*NOT_IN_OTHER_LANGUAGES}.isdisjoint(item.path.relative_to(config.rootpath).parts)
         )

@@ -110,13 +110,7 @@ class Registry(Mapping[str, T], Generic[T]):
             yield point.name, Item(point, point.value, lambda point=point: loaded(point, point.value))  # type: ignore[misc]
 
     def item(self, name: str) -> Item | None:
-        """Return what an installed package brings under a name; None for a name of strapgen, or of nobody.
-
-        Raises
-        ------
-        InputError
-            If several packages have it.
-        """
+        """Return what an installed package brings under a name; None for a name of strapgen, or of nobody."""
         if name in self.own:
             return None
         items = {item.place: item for other, item in self._items() if other == name}

@@ -22,19 +22,8 @@ resolution = sp.Symbol(RESOLUTION, real=True)
 
 
 def symbols(signal: Signal) -> sp.Matrix:
-    """Return the real symbols of a signal as a column vector, or as a matrix if it is one.
+    """Return the real symbols of a signal: 3 x 3 for a matrix, otherwise one column.
 
-    Parameters
-    ----------
-    signal : Signal
-
-    Returns
-    -------
-    Matrix
-        3 x 3 for a matrix, otherwise one column.
-
-    Examples
-    --------
     >>> symbols(Signal.vector("rate", "w")).T
     Matrix([[w_x, w_y, w_z]])
     """
@@ -70,20 +59,9 @@ def evaluate_stages(
     number: Callable[[sp.Rational], Any] | None = None,
     function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the given values together with those of all elements of the stages.
+    """Return the given values together with those of all elements of the stages, each of which may use those before.
 
-    Parameters
-    ----------
-    stages : iterable of Stage
-        Each may use the inputs and the stages before it.
-    values : mapping of str to number or ring element
-        A value for every symbol that no stage defines.
-    number, function : callable, optional
-        Convert rational numbers and evaluate functions, as for `algebra.evaluate`.
-
-    Returns
-    -------
-    dict of str to number or ring element
+    There is a value for every symbol that no stage defines; `number` and `function` are those of `algebra.evaluate`.
     """
     known = {RESOLUTION: sp.S.Zero, **values}
     for stage in stages:

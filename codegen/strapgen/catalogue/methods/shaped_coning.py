@@ -160,24 +160,7 @@ SHAPE_TITLES: Merged[str] = Merged(
 
 
 def read(path: str | Path) -> ShapedConing:
-    """Read coefficients from a file and check what they are said to be.
-
-    Parameters
-    ----------
-    path : path
-        A TOML file with the keys of `KEYS`; a coefficient is a whole number or a string, see `coefficients.number`.
-
-    Returns
-    -------
-    ShapedConing
-        Named after its key `name`, in lower case with hyphens.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key or number is wrong, a power of the frequency is not annulled, or the level is
-        another one.
-    """
+    """Read coefficients from a TOML file with the keys of `KEYS`, and check what they are said to be."""
     data = toml_files.content(path, "a file of coning coefficients", MOST_BYTES)
     try:
         coefficient_files.check_keys(data, KEYS, OPTIONAL)
@@ -193,17 +176,7 @@ def read(path: str | Path) -> ShapedConing:
 
 
 def verify(shape: ShapedConing) -> None:
-    """Check that the conditions hold exactly, and that the level is right to its digits.
-
-    Parameters
-    ----------
-    shape : ShapedConing
-
-    Raises
-    ------
-    InputError
-        If it is not so.
-    """
+    """Check that the conditions hold exactly, and that the level is right to its digits."""
     from strapgen.catalogue.methods import coning_drift
 
     of = coning_drift.ConingShape(shape.samples, shape.previous, shape.gyro)
