@@ -1,16 +1,17 @@
-"""`KernelInfo` is what is said of a kernel beside its formulas; every stage passes it on whole."""
+"""What is said of a kernel beside its formulas; every stage passes it on whole."""
 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 
 from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.recursion import Recursion
 
 
 @dataclass(frozen=True)
 class KernelInfo:
-    """The name, the words and the calls of a kernel, as its programs and sources have them too.
+    """What is said of a kernel beside its formulas: it is the `info` of a kernel, its programs and its sources.
 
     Parameters
     ----------
@@ -42,6 +43,8 @@ class KernelInfo:
     companions: Companions | None = None
     order: Order | None = None
     recursion: Recursion | None = None
+
+    __repr__ = short_repr
 
     @property
     def identifier(self) -> str:

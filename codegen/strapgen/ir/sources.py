@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_interface import Interface
@@ -15,6 +15,7 @@ from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 
 if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
     from strapgen.ir.program import Program
 
 
@@ -68,6 +69,25 @@ class Sources:
 
     __repr__ = short_repr
     _repr_html_ = notebook_html
+
+    @classmethod
+    def of(
+        cls,
+        program: Program | FixedProgram,
+        target: str,
+        function: str,
+        files: dict[str, str],
+        /,
+        **rest: Any,
+    ) -> Self:
+        """Return what a target prints of a program, whose function has this name; `rest` are further fields."""
+        from strapgen.ir.integer_program import FixedProgram  # sources from the cache are there without it
+
+        code = program.program if isinstance(program, FixedProgram) else program
+        fixed = program.interface if isinstance(program, FixedProgram) else None
+        signature = Function(function, code.inputs, tuple(result.signal for result in code.outputs))
+        counts = program.operations, program.temporaries
+        return cls(program.info, target, files, signature, *counts, fixed=fixed, **rest)
 
     def _in_words(self) -> str:
         return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"

@@ -13,21 +13,15 @@ from strapgen.ir.integer_program import (
     Value,
     cases_of,
 )
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
     """Print a module whose function takes and returns integers, or arrays of them."""
-    interface = fixed.interface
     named, files = printed(fixed, lambda part, other: _files(part, other, target), PYTHON)
-    function = Function(
-        named.name,
-        tuple(argument.signal for argument in interface.inputs),
-        tuple(argument.signal for argument in interface.outputs),
-    )
-    return Sources(fixed.info, target, files, function, fixed.operations, fixed.temporaries, interface)
+    return Sources.of(fixed, target, named.name, files)
 
 
 def _files(fixed: FixedProgram, other: Mapping[str, str], target: str) -> dict[str, str]:
