@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run
 from languages import DOUBLE, check_bits_of_c, check_lines
 
 import strapgen
 from strapgen import catalogue, pipeline
-from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.run.backends import of_sources
 from strapgen.run.compiler import COMPILERS
@@ -146,9 +146,7 @@ def test_fused_operations_and_fast_mathematics_are_refused(cxx, tmp_path):
 
 def test_without_a_compiler_one_line_says_which_is_missing(monkeypatch, capsys):
     monkeypatch.setenv("CXX", "no-such-compiler")
-    with pytest.raises(SystemExit) as caught:
-        main([*SIMULATE.split(), "--duration", "2", "--backend", "cpp"])
-    assert caught.value.code == 2
+    run([*SIMULATE.split(), "--duration", "2", "--backend", "cpp"], 2)
     assert capsys.readouterr().err == (
         "strapgen: no C++ compiler: 'no-such-compiler' is not on the PATH; install g++ (or set CXX), or use the numpy "
         "back end\n"

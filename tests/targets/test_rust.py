@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from gathering import each
+from commands import run
 from languages import DOUBLE, check_bits_of_c, check_lines
 
 import strapgen
 from strapgen import catalogue, pipeline
-from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.run.backends import of_sources
 from strapgen.run.compiler import COMPILERS
@@ -44,7 +43,7 @@ def test_every_kernel_has_the_bits_of_c(rustc, other, c, rng):
     check_bits_of_c(catalogue.standard(), other, c, rng)
 
 
-@each("value", [0, 1, 15, 16, 17, 31, 48, 2**40 - 1, 2**40, 2**40 + 1, -16, -31, -(2**40)])
+@pytest.mark.parametrize("value", [0, 1, 15, 16, 17, 31, 48, 2**40 - 1, 2**40, 2**40 + 1, -16, -31, -(2**40)])
 def test_a_wide_constant_is_its_integer_and_a_power_of_two_from_16_on_says_its_type(value):
     printer = object.__new__(_RustStatementPrinter)
     printer.word = _WORDS[32]
@@ -113,9 +112,7 @@ def test_words_of_rust_name_nothing():
 
 def test_without_a_compiler_one_line_says_which_is_missing(monkeypatch, capsys):
     monkeypatch.setenv("RUSTC", "no-such-compiler")
-    with pytest.raises(SystemExit) as caught:
-        main([*SIMULATE.split(), "--duration", "2", "--backend", "rust"])
-    assert caught.value.code == 2
+    run([*SIMULATE.split(), "--duration", "2", "--backend", "rust"], 2)
     assert capsys.readouterr().err == (
         "strapgen: no Rust compiler: 'no-such-compiler' is not on the PATH; install rustc (or set RUSTC), or use the "
         "numpy back end\n"
