@@ -242,8 +242,8 @@ def test_the_header_states_format_unit_range_and_error():
         assert f"{argument.signal.name}[{argument.signal.size}]: {argument.signal.meaning};" in text
         assert f"format {argument.format}, unit {unit}; range {argument.low} to {argument.high} (" in text
     worst = fixed.error_bounds["next"]
-    assert f"error at most {above(worst)}, {places_above(worst * 2**30)} of the last place" in text
-    assert "Over a run of N steps rounding turns the attitude by at most" in text
+    assert f"error <= {above(worst)} ({places_above(worst * 2**30)} ulp)" in text
+    assert "Attitude error by rounding after N steps: at most" in text
     assert "--max-rate-deg-s 400 --step 0.01 --rounding nearest --carry full --drift-allowance 1/16" in text
 
 
