@@ -20,7 +20,7 @@ import derived
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
+from languages import cases
 from precisions import single
 from tolerances import certified
 
@@ -145,7 +145,7 @@ def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
             strapgen_says(" ".join(map(shlex.quote, words)).replace(*LESS.get(command, ("", ""))))
 
 
-@each("command", ["list", "tableau", "derive", "generate", "simulate", "tables"])
+@pytest.mark.parametrize("command", ["list", "tableau", "derive", "generate", "simulate", "tables"])
 def test_help_says_what_the_format_may_be(command, strapgen_says):
     assert "--format" in strapgen_says(f"{command} --help")
 
@@ -378,7 +378,7 @@ def test_vibration_under_a_spectrum(strapgen_says, tmp_path):
 # coning
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "wanted"),
     [
         ("--samples 2", "2/3"),
@@ -466,7 +466,7 @@ def test_derive_program(strapgen_says):
     )
 
 
-@each("show", ["text", "latex", "program", "operations"])
+@pytest.mark.parametrize("show", ["text", "latex", "program", "operations"])
 def test_derive_json(show, strapgen_says):
     data = json.loads(strapgen_says(f"derive euler --show {show} --format json"))
     wanted = [
@@ -645,7 +645,7 @@ def test_generate_all_as_json(strapgen_says, tmp_path, monkeypatch):
 # simulate on a motion
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", cases(BACKENDS))
 @pytest.mark.parametrize(
     ("motion", "settings"),
     [
@@ -811,7 +811,7 @@ def test_plot(strapgen_says, tmp_path):
 # simulate on recorded data
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", cases(BACKENDS))
 def test_recorded_increments(backend, strapgen_says):
     options = f"--method rk3 --increments 4 --backend {backend} --increments-csv {DATA}/increments.csv"
     table = list(csv.reader(io.StringIO(strapgen_says(f"simulate euler {options}"))))

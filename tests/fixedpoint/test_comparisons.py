@@ -6,7 +6,6 @@ import math
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from small_integers import GRID, Known, at_corners, context, quantity, worst
 
 from strapgen.fixedpoint.integer_operations import (
@@ -31,7 +30,7 @@ def lowered(lower, known, definition, low, high, **settings):
     return walk.values["y"], walk
 
 
-@each(
+@pytest.mark.parametrize(
     ("known", "arguments", "exact"),
     [
         ({"a": FINE, "b": COARSE}, ("a", "b"), max),
@@ -92,7 +91,7 @@ def test_numbers_that_have_no_room_beside_each_other_cannot_be_compared():
         lowered(lower_maximum, known, ExactOperation("maximum", ("a", "b")), -100, 100)
 
 
-@each(
+@pytest.mark.parametrize(
     ("low", "high"),
     [(-2, 2), (-2, Fraction(1, 5)), (Fraction(-1, 5), 2), (Fraction(-3, 8), Fraction(3, 8)), (0, 0)],
 )

@@ -8,7 +8,6 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from derived import FIXED_POINT, program
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -213,7 +212,7 @@ def test_a_user_fixes_formats():
     assert formats["p_y"] != "Q0.31"
 
 
-@each(
+@pytest.mark.parametrize(
     ("formats", "said"),
     [
         ({"increments": "Q-9.40"}, "format Q-9.40 of increments does not hold its range of \\+-0.125"),

@@ -6,7 +6,6 @@ import math
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from small_integers import GRID, Known, Worst, at_corners, context, quantity, worst
 
 from strapgen.fixedpoint.integer_operations import lower_quotient, lower_root
@@ -25,7 +24,7 @@ def quotient(known, definition, exact, **options) -> tuple[Value, Worst]:
     return walk.values["y"], worst(walk, "y", known, exact)
 
 
-@each(
+@pytest.mark.parametrize(
     ("known", "numerator", "exact", "fraction"),
     [
         # 15/16 in eighths is 7 and a half: the largest quotient is at the smallest divisor, and is rounded up by half a

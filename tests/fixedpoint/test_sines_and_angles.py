@@ -11,7 +11,6 @@ from fractions import Fraction
 
 import mpmath
 import pytest
-from gathering import each
 from small_integers import quantity
 
 from strapgen.fixedpoint import functions
@@ -194,7 +193,7 @@ def slopes(links: Chain) -> dict[str, Fraction | None]:
 ROOT = {0: ExactOperation("sqrt", ("q",))}
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "ranges", "options", "expected"),
     [
         # The largest derivatives: of sine and cosine 1, of sin(x)/x 0.43618 at 2.0816, by its square -1/6 at 0, and of
@@ -231,7 +230,7 @@ def test_an_error_of_the_argument_goes_on_by_the_largest_slope(kind, ranges, opt
     assert links.links[-1].follows.most >= inside.highest - inside.lowest
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "ranges", "ends"),
     [
         ("sin", [(-1, 1)], (-1, 1)),
@@ -268,7 +267,7 @@ def test_the_smaller_and_the_larger_argument_have_their_ranges():
     assert [one for one in larger.definition.arguments if isinstance(one, Fraction)] == [Fraction(1, 1 << 16)]
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "ranges"),
     [
         ("sin", [(-60, 60)]),
@@ -303,7 +302,7 @@ def test_links_stay_in_their_ranges_and_lead_to_the_function(kind, ranges):
         assert abs(known[links.links[-1].name] - exact) <= inexact
 
 
-@each(("digits", "terms"), [(1, 3), (5, 3), (6, 4), (12, 8)])
+@pytest.mark.parametrize(("digits", "terms"), [(1, 3), (5, 3), (6, 4), (12, 8)])
 def test_an_arctangent_has_as_many_terms_as_its_tolerance_needs(digits, terms):
     coefficients, left_out = arctangent_series(Fraction(1, 10**digits))
     assert len(coefficients) == terms

@@ -5,7 +5,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import (
@@ -92,7 +91,7 @@ def test_run_is_exact_on_fractions():
     assert made.run({"x": x, "y": y}) == {"result": [(x + y) / 3 / y, x, Fraction(2, 5)]}
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "arguments", "expected"),
     [
         ("add", (5, 3), 8),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from gathering import each
+import pytest
 
 from strapgen import pipeline
 from strapgen.catalogue import choose
@@ -13,7 +13,7 @@ from strapgen.ir.integer_program import IntegerSum, Value
 from strapgen.targets.contract import argument_text, value_text
 
 
-@each(
+@pytest.mark.parametrize(
     ("settings", "limits", "error"),
     [
         # A product is rounded by half a place.

@@ -41,18 +41,6 @@ COMMON = {
     ),
     *("sqrt", "zeros"),
 }
-SIMULATE = [
-    "simulate",
-    "euler",
-    "--motion",
-    "constant",
-    "--set",
-    "x_deg_s=1",
-    "--step",
-    "1",
-    "--duration",
-    "2",
-]
 #: Steps of a run, in more than one block of the loop.
 STEPS = 1003
 WORDS = {"function", "end", "if", "for"}
@@ -267,14 +255,3 @@ def test_octave_that_has_ended_is_told_and_started_again(has_octave):
     process._process.wait()
     assert kernel([0.6, 0, 0, 0.8])[0] == 0.6
     assert not process._folder.exists()
-
-
-def test_without_octave_one_line_says_so(monkeypatch, capsys):
-    monkeypatch.setenv("OCTAVE", "no-such-octave --some-option")
-    with pytest.raises(SystemExit) as caught:
-        main([*SIMULATE, "--backend", "octave"])
-    assert caught.value.code == 2
-    assert capsys.readouterr().err == (
-        "strapgen: no Octave: 'no-such-octave' is not on the PATH; install octave (or set OCTAVE), or use the numpy "
-        "back end\n"
-    )

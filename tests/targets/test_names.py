@@ -16,7 +16,6 @@ import cffi
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -457,7 +456,7 @@ def test_functions_of_the_headers_that_generated_code_includes_are_no_kernels():
     assert sorted(name for name in functions if names.external(name) == name) == []
 
 
-@each("word", sorted({*keyword.kwlist, "__debug__"}))
+@pytest.mark.parametrize("word", sorted({*keyword.kwlist, "__debug__"}))
 def test_keywords_of_python_are_no_names(word):
     assert not names.PYTHON.allows(word)
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 from cffi import FFI
-from gathering import each
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
@@ -116,7 +115,7 @@ def test_python_text_has_the_value_of_the_tree(tree):
     assert got == wanted or (math.isnan(got) and math.isnan(wanted)), text
 
 
-@each(
+@pytest.mark.parametrize(
     ("tree", "text"),
     [
         (op("add", op("add", x, y), z), "x_1 + x_2 + x_3"),

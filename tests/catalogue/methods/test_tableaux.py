@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from gathering import each
 
 import strapgen
 from strapgen.catalogue import METHODS, STANDARD_METHODS
@@ -247,7 +246,7 @@ WRONG = {
 }
 
 
-@each("said", WRONG)
+@pytest.mark.parametrize("said", WRONG)
 def test_what_is_wrong_is_told_in_one_line(said, written):
     with pytest.raises(InputError) as caught:
         read(written(**WRONG[said]))
@@ -256,7 +255,7 @@ def test_what_is_wrong_is_told_in_one_line(said, written):
     assert "\n" not in message and len(message) < 250
 
 
-@each(
+@pytest.mark.parametrize(
     ("content", "said"),
     [
         (b"name = ", "mine.toml is not TOML (Invalid value"),

@@ -7,7 +7,6 @@ from random import Random
 
 import mpmath
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen import choose, derive, lower
@@ -162,7 +161,7 @@ def test_names_of_windows_choose_their_samples():
         assert choose("euler", window) == choose("euler", window.name)
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"increments": 2}, "increments is 2; a step of window-3-3 has 1"),

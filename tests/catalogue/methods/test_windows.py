@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.catalogue.methods import window_conditions, windows
 from strapgen.catalogue.methods.window import GyroResponse
@@ -264,7 +263,7 @@ def test_a_gyro_needs_filters_for_both_sides(written):
         read(written(gyro=gyro, one_sided=f"[{sides}]"))
 
 
-@each(
+@pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"name": None}, "key name is missing; needed: name, source, previous, ahead, conditions, band"),

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from peano_baker import evaluated, generic_rate, increments, local_error, true_rotation
 
 import strapgen
@@ -356,7 +355,7 @@ def test_an_attitude_kernel_must_turn_the_state_into_a_matrix(folder):
         strapgen.derive("mrp.py")
 
 
-@each(
+@pytest.mark.parametrize(
     ("file", "chosen", "said"),
     [
         ("none.py", {}, "algorithm none.py is no file; a Python file with a function algorithm is needed"),
