@@ -16,7 +16,7 @@ from strapgen.ir.suggestions import unknown
 from strapgen.ir.timing import timed
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coefficients import Number
+    from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.methods.method import Method
     from strapgen.kernel.kernel import Kernel
 

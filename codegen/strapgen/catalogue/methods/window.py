@@ -5,9 +5,10 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -17,7 +18,8 @@ from strapgen.ir.suggestions import counted
 Taps = tuple[Fraction, ...]
 
 
-class GyroResponse(NamedTuple):
+@dataclass(frozen=True)
+class GyroResponse:
     """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2).
 
     Parameters
@@ -30,9 +32,9 @@ class GyroResponse(NamedTuple):
         Sampling frequency in Hz.
     """
 
-    bandwidth_hz: Fraction
-    damping: Fraction
-    sample_hz: Fraction
+    bandwidth_hz: Annotated[Fraction, Key("Natural frequency", "Hz", above=0)]
+    damping: Annotated[Fraction, Key("Damping ratio", "1", above=0)]
+    sample_hz: Annotated[Fraction, Key("Sampling frequency", "Hz", above=0)]
 
 
 @dataclass(frozen=True)
