@@ -3,7 +3,7 @@
 A field of a model is ``Annotated[type, Key(...)]``. The type says what is read:
 
 - ``Fraction`` and ``float``: a number, or a text such as "1/3"; exactly, or rounded to double;
-- ``Number``: the same with square roots; ``int``, ``bool`` and ``str`` themselves;
+- ``Number``: the same with square roots; ``int`` and ``str`` themselves;
 - ``tuple[X, ...]`` and ``tuple[X, X, X]``: a list, of any length or of this one;
 - ``Mapping[str, X]``: a table with names of the user's; a dataclass: a table with the keys of its fields;
 - ``X | None``: a key that may be left out; ``X | tuple[X, X, X]``: either, by what stands there;
@@ -249,9 +249,10 @@ class _List(_Form):
 
 
 def _label(where: str, number: int, entry: Any) -> str:
-    """Return the path of an entry of a list: by its name if it has one."""
+    """Return the path of an entry of a list: by its name if it has a short one."""
     name = entry.get("name") if isinstance(entry, dict) else None
-    return f"{where}[{name if isinstance(name, str) and name.isprintable() and name else number}]"
+    is_label = isinstance(name, str) and name.isprintable() and 0 < len(name) <= 40
+    return f"{where}[{name if is_label else number}]"
 
 
 class _Names(_Form):
@@ -294,8 +295,6 @@ class _Either(_Form):
 
 class _Own(_Form):
     """A class with a form of its own, a `Readable`."""
-
-    takes = (object,)
 
     def __init__(self, kind: Any) -> None:
         self.words, self._kind = kind.WORDS, kind

@@ -83,7 +83,11 @@ class Sampling:
     ] = 0.0
     lost: Annotated[float, Key("Probability that a sample is lost", "1", least=0, most=0.99)] = 0.0
     lost_as: Annotated[
-        str, Key("What stands in the place of a lost sample", choices=("late", "repeat", "zero"))
+        str,
+        Key(
+            "A lost sample: its increment comes late, with the next one, or repeats the one before, or is zero",
+            choices=("late", "repeat", "zero"),
+        ),
     ] = "late"
 
     __repr__ = short_repr

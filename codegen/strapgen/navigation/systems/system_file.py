@@ -21,7 +21,7 @@ from strapgen.navigation.systems.reserved import check_names
 #: Most stages of a system, and most cycles from one call of a stage to the next.
 MOST_STAGES, MOST_CYCLES = 64, 1 << 20
 _NAME = Key(
-    "Name in generated code",
+    "Name; those of inputs and stages are all different",
     pattern="(?!.*__)[a-z][a-z0-9_]{0,30}(?<!_)",
     form="a name of at most 31 lower-case letters, digits and single underscores, which begins with a letter,",
 )
@@ -161,12 +161,12 @@ class InputFile:
     frame: Annotated[
         str,
         Key(
-            "Frame, or an attitude as b to n",
+            "b body, n navigation, e earth-fixed, i inertial, g geographic, an attitude as b to n; none without it",
             pattern=f"(({_FRAME})( to ({_FRAME}))?)?",
             form=f"one of {', '.join(FRAMES)}, an attitude such as b to n, or no frame",
         ),
     ] = ""
-    meaning: Annotated[str, Key("What it is; by default its name")] = ""
+    meaning: Annotated[str, Key("Words for the header; by default its name")] = ""
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class StageFile:
     """A stage: a kernel with its rate, its wires and its numbers; in these T is the cycle of the stage in s."""
 
     name: Annotated[str, _NAME]
-    kernel: Annotated[str, Key("Name of the kernel or algorithm")]
+    kernel: Annotated[str, Key("A kernel of strapgen list kernels, an algorithm, or a Python file")]
     every: Annotated[
         int | str,
         Key(
@@ -185,35 +185,43 @@ class StageFile:
             form="a text as '50 Hz'",
         ),
     ]
-    method: Annotated[str | None, Key("Method of an attitude step")] = None
+    method: Annotated[str | None, Key("Method of an attitude step, as for generate")] = None
     increments: Annotated[int | None, Key("Samples of a step", "1")] = None
     previous: Annotated[int | None, Key("Samples from before it", "1")] = None
     ahead: Annotated[int | None, Key("Samples from after it", "1")] = None
     word: Annotated[
-        int | None, Key("Length of its words in fixed point", "bit", least=SHORTEST_WORD, most=LONGEST_WORD)
+        int | None,
+        Key(
+            "Length of its words in fixed point, in place of --word",
+            "bit",
+            least=SHORTEST_WORD,
+            most=LONGEST_WORD,
+        ),
     ] = None
     carry: Annotated[
-        str, Key("Rounding that fixed point carries to the next call", choices=tuple(CARRIES))
+        str, Key("Error feedback in fixed point, in place of --carry", choices=tuple(CARRIES))
     ] = ""
-    wires: Annotated[Mapping[str, str], Key('Sources of inputs: an input, or "stage.output"')] = field(
-        default_factory=dict
-    )
-    writes: Annotated[Mapping[str, str], Key("Values of other stages that outputs replace")] = field(
-        default_factory=dict
-    )
-    delay: Annotated[Mapping[str, int], Key("Cycles by which a wire lags, by input", "1", choices=(1,))] = (
+    wires: Annotated[
+        Mapping[str, str], Key('Where each input comes from: "input", "stage.output" or "stage.state"')
+    ] = field(default_factory=dict)
+    writes: Annotated[
+        Mapping[str, str], Key('States that outputs replace, as { output = "stage.state" }')
+    ] = field(default_factory=dict)
+    delay: Annotated[Mapping[str, int], Key("{ input = 1 } for a wire that goes back", "1", choices=(1,))] = (
         field(default_factory=dict)
     )
-    constants: Annotated[Mapping[str, Numbers], Key("Constant inputs, in the units of the kernel")] = field(
-        default_factory=dict
-    )
-    initial: Annotated[Mapping[str, Numbers], Key("Values before the first cycle, by state or output")] = (
-        field(default_factory=dict)
-    )
-    ranges: Annotated[Mapping[str, PositiveMultiple], Key("Largest magnitudes of inputs, in their units")] = (
-        field(default_factory=dict)
-    )
-    formats: Annotated[Mapping[str, str], Key('Formats of inputs and outputs, as "Q3.28"')] = field(
+    constants: Annotated[
+        Mapping[str, Numbers], Key("Inputs with a fixed value, which is folded into the code")
+    ] = field(default_factory=dict)
+    initial: Annotated[
+        Mapping[str, Numbers],
+        Key("States and outputs before the first cycle; by default no rotation, or zero"),
+    ] = field(default_factory=dict)
+    ranges: Annotated[
+        Mapping[str, PositiveMultiple],
+        Key("Largest magnitudes of inputs and states that do not follow from a wire or from the kernel"),
+    ] = field(default_factory=dict)
+    formats: Annotated[Mapping[str, str], Key('Formats that you choose yourself, as "Q1.14"')] = field(
         default_factory=dict
     )
 
@@ -237,13 +245,23 @@ class StageFile:
 class SystemFile:
     """A described system: its samples, its stages from the fastest to the slowest, and what a run records."""
 
-    sample_hz: Annotated[Fraction, Key("Rate of the samples", "Hz", above=0)]
-    inputs: Annotated[Mapping[Annotated[str, _NAME], InputFile], Key("Samples of each cycle, by name")]
-    stage: Annotated[tuple[StageFile, ...], Key("The stages", least=1, most=MOST_STAGES)]
-    name: Annotated[str, replace(_NAME, text="Name in generated code; by default that of the file")] = ""
-    title: Annotated[str, Key("Title in generated code")] = "A described system"
+    sample_hz: Annotated[
+        Fraction, Key("Cycles of the fastest rate in a second; --sample-hz replaces it", "Hz", above=0)
+    ]
+    inputs: Annotated[
+        Mapping[Annotated[str, _NAME], InputFile], Key("What is measured in every cycle, by name")
+    ]
+    stage: Annotated[
+        tuple[StageFile, ...],
+        Key("Kernels at their rates, from the fastest to the slowest", least=1, most=MOST_STAGES),
+    ]
+    name: Annotated[str, replace(_NAME, text="Name in code; by default that of the file")] = ""
+    title: Annotated[str, Key("One line for the head of the files")] = "A described system"
     outputs: Annotated[
-        tuple[str, ...], Key('Values "stage.output" that a run records; by default all that no stage takes')
+        tuple[str, ...],
+        Key(
+            'Values that a run records, as "stage.output"; by default the attitudes, and what no stage reads'
+        ),
     ] = ()
 
     def described(self, name: str, sample_hz: Fraction | None = None) -> SystemText:
