@@ -12,8 +12,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from gathering import each
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen import registration
@@ -78,7 +77,7 @@ def properties(schema: dict[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
-@each("kind", SCHEMAS)
+@pytest.mark.parametrize("kind", SCHEMAS)
 def test_every_key_is_described_with_its_unit(kind):
     schema = SCHEMAS[kind]
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -113,6 +112,7 @@ def places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [one for key, value in entries for one in [(*path, key), *places(value, (*path, key))]]
 
 
+@settings(deadline=None)
 @given(data=st.data())
 def test_what_a_schema_refuses_the_reader_refuses_in_one_line(data):
     path = data.draw(st.sampled_from([path for path in EXAMPLES if path.stat().st_size < 10_000]))

@@ -7,16 +7,14 @@ form, the newest sample times a weighted sum of older ones. It suits coning, and
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from strapgen.catalogue.methods import coefficient_files
-from strapgen.catalogue.methods.coefficient_files import Band, Gyro, InstalledFiles, Source, Title
+from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles, Gyro, Source, Title
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
@@ -189,28 +187,9 @@ class ShapeFile:
 SHAPE = UserFile("a file of coning coefficients", ShapeFile, 100_000)
 
 
-class _BuiltInShapes(Mapping[str, ShapedConing]):
-    """The coefficients of strapgen by name; a file is read when it is first used."""
-
-    def __init__(self, files: Mapping[str, Path]) -> None:
-        self._files = files
-        self._shapes: dict[str, ShapedConing] = {}
-
-    @cached_property
-    def titles(self) -> dict[str, str]:
-        """Titles by name."""
-        return {name: str(SHAPE.content(path)["name"]) for name, path in self._files.items()}
-
-    def __getitem__(self, name: str) -> ShapedConing:
-        if name not in self._shapes:
-            self._shapes[name] = SHAPE.read(self._files[name]).shape(name)
-        return self._shapes[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._files)
-
-    def __len__(self) -> int:
-        return len(self._files)
+def _shipped(path: Path, name: str) -> ShapedConing:
+    """Read coefficients of strapgen, whose file the tests verify."""
+    return SHAPE.read(path).shape(name)
 
 
 def _installed(path: Path, name: str) -> ShapedConing:
@@ -219,33 +198,19 @@ def _installed(path: Path, name: str) -> ShapedConing:
 
 
 _FILES = Registry("coning_shapes", Path)
-_BUILT_IN = _BuiltInShapes(_FILES.own)
-_INSTALLED = InstalledFiles(_FILES, _installed)
+_BUILT_IN = CoefficientFiles(_FILES.own, _shipped)
+_INSTALLED = CoefficientFiles(_FILES, _installed, without=_FILES.own)
 
 #: The coefficients of strapgen and of installed packages, by name, and their titles.
 SHAPES: Merged[ShapedConing] = Merged(_BUILT_IN, _INSTALLED)
-SHAPE_TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
+SHAPE_TITLES: Merged[str] = Merged(
+    {name: str(SHAPE.content(path)["name"]) for name, path in _FILES.own.items()},
+    Titles(_INSTALLED),
+)
 
 
 def read(path: str | Path) -> ShapedConing:
-    """Read coefficients from a file and check what they are said to be.
-
-    Parameters
-    ----------
-    path : path
-        A TOML file with the keys of `ShapeFile`.
-
-    Returns
-    -------
-    ShapedConing
-        Named after its key `name`, in lower case with hyphens.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key or number is wrong, a power of the frequency is not annulled, or the level is
-        another one.
-    """
+    """Read coefficients from a TOML file with the keys of `ShapeFile`, and check what they are said to be."""
 
     def shape(stated: ShapeFile) -> ShapedConing:
         name = coefficient_files.slug(stated.name)
@@ -258,17 +223,7 @@ def read(path: str | Path) -> ShapedConing:
 
 
 def verify(shape: ShapedConing) -> None:
-    """Check that the conditions hold exactly, and that the level is right to its digits.
-
-    Parameters
-    ----------
-    shape : ShapedConing
-
-    Raises
-    ------
-    InputError
-        If it is not so.
-    """
+    """Check that the conditions hold exactly, and that the level is right to its digits."""
     from strapgen.catalogue.methods import coning_drift
 
     of = coning_drift.ConingShape(shape.samples, shape.previous, shape.gyro)

@@ -20,20 +20,10 @@ Taps = tuple[Fraction, ...]
 
 @dataclass(frozen=True)
 class GyroResponse:
-    """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2).
+    """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2)."""
 
-    Parameters
-    ----------
-    bandwidth_hz : Fraction
-        Natural frequency w/(2 pi) in Hz.
-    damping : Fraction
-        zeta.
-    sample_hz : Fraction
-        Sampling frequency in Hz.
-    """
-
-    bandwidth_hz: Annotated[Fraction, Key("Natural frequency", "Hz", above=0)]
-    damping: Annotated[Fraction, Key("Damping ratio", "1", above=0)]
+    bandwidth_hz: Annotated[Fraction, Key("Natural frequency w/(2 pi)", "Hz", above=0)]
+    damping: Annotated[Fraction, Key("Damping ratio zeta", "1", above=0)]
     sample_hz: Annotated[Fraction, Key("Sampling frequency", "Hz", above=0)]
 
 

@@ -204,12 +204,12 @@ class StageFile:
     wires: Annotated[
         Mapping[str, str], Key('Where each input comes from: "input", "stage.output" or "stage.state"')
     ] = field(default_factory=dict)
-    writes: Annotated[
-        Mapping[str, str], Key('States that outputs replace, as { output = "stage.state" }')
-    ] = field(default_factory=dict)
-    delay: Annotated[Mapping[str, int], Key("{ input = 1 } for a wire that goes back", "1", choices=(1,))] = (
-        field(default_factory=dict)
+    writes: Annotated[Mapping[str, str], Key('States that outputs replace: "stage.state" by output')] = field(
+        default_factory=dict
     )
+    delay: Annotated[
+        Mapping[str, int], Key("Calls by which a wire lags that goes back, by input", "1", choices=(1,))
+    ] = field(default_factory=dict)
     constants: Annotated[
         Mapping[str, Numbers], Key("Inputs with a fixed value, which is folded into the code")
     ] = field(default_factory=dict)
