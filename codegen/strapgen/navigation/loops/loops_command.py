@@ -56,7 +56,7 @@ def study_loops(
     """
     output.check(file)
     checks.choice("backend", backend, ("numpy", "c"))
-    from strapgen.navigation.loops.loop_schedule_file import BUILT_IN, read
+    from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
     from strapgen.navigation.loops.loops_report import LoopStudy, loops_image, loops_report
     from strapgen.navigation.loops.loops_study import LOOPS, LoopErrors, cycles_of_modes, designs, run_loops
 
