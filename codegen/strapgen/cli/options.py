@@ -119,6 +119,33 @@ Sculling = Annotated[
 Duration = Annotated[
     Positive, option("--duration", metavar="S", help="Duration of each run in s.", panel="Input")
 ]
+GyroRate = Annotated[Positive, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")]
+#: An attitude step of the catalogue
+StepName = Annotated[
+    str,
+    option(
+        "--algorithm",
+        metavar="NAME",
+        help="Algorithm: dcm, euler or cayley-klein.",
+        panel="Algorithm",
+        read=names("strapgen.catalogue:ALGORITHMS"),
+    ),
+]
+#: A language of microcontrollers
+CTarget = Annotated[
+    str, option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm")
+]
+#: A processor whose instructions are counted
+Processor = Annotated[
+    str | None,
+    option(
+        "--cpu",
+        metavar="NAME",
+        help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
+        "instance cortex-m3.",
+        panel="Run",
+    ),
+]
 #: A number of increments, or as many as a method needs.
 Samples = int | Literal["enough"]
 

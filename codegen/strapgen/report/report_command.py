@@ -11,17 +11,15 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, command_line, grouped
-from strapgen.cli.options import FastBackends, SeveralMethods, option
+from strapgen.cli.options import Duration, FastBackends, GyroRate, SeveralMethods, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.rules import Needs, Rule, rules
 from strapgen.cli.values import Positive
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.simulate.sample_source import (
-    MOTION_FILE,
-    RUN_MOTION_NAMES,
     MotionSettings,
-    a_motion,
+    motion_option,
 )
 from strapgen.thesis.tables_command import runnable
 
@@ -52,22 +50,10 @@ class ReportRuns:
     panel: ClassVar[str] = "Input"
     rules: ClassVar[tuple[Rule, ...]] = (Needs("--set", "--motion"),)
 
-    motion: Annotated[
-        str | None,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: coning]",
-            read=a_motion("strapgen.lab.motions.motion_names:MOTIONS"),
-        ),
-    ] = None
+    motion: Annotated[str | None, motion_option("coning")] = None
     settings: MotionSettings = None
-    sample_hz: Annotated[
-        Positive, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
-    ] = Positive("100")
-    duration: Annotated[Positive, option("--duration", metavar="S", help="Duration of each run in s.")] = (
-        Positive("20")
-    )
+    sample_hz: GyroRate = Positive("100")
+    duration: Duration = Positive("20")
 
     @property
     def files(self) -> list[str]:

@@ -10,7 +10,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.help import PlainCommand
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import option
+from strapgen.cli.options import CTarget, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import waiting
 from strapgen.cli.rules import Needs, rules
@@ -35,10 +35,7 @@ def generate(
         str,
         option("--algorithm", metavar="NAME", help="Attitude: euler or dcm.", panel="Algorithm"),
     ] = "euler",
-    target: Annotated[
-        str,
-        option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm"),
-    ] = "c",
+    target: CTarget = "c",
     sample_hz: Annotated[
         Positive | None,
         option(

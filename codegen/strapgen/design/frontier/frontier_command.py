@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import option
+from strapgen.cli.options import Duration, GyroRate, option
 from strapgen.cli.output import Output
 from strapgen.cli.rules import Needs, rules
 from strapgen.cli.values import Positive
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.simulate.sample_source import (
-    MOTION_FILE,
-    RUN_MOTION_NAMES,
     MotionSettings,
-    a_motion,
+    motion_option,
 )
 from strapgen.lab.study.worker_options import WorkerOptions
 
@@ -31,12 +29,8 @@ class StudyRun:
 
     panel: ClassVar[str] = "Run"
 
-    sample_hz: Annotated[
-        Positive, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
-    ] = Positive("100")
-    duration: Annotated[Positive, option("--duration", metavar="S", help="Duration of each run in s.")] = (
-        Positive("60")
-    )
+    sample_hz: GyroRate = Positive("100")
+    duration: Duration = Positive("60")
     results: Annotated[
         Path | None,
         option(
@@ -67,16 +61,7 @@ def frontier(
             panel="Algorithm",
         ),
     ] = None,
-    motion: Annotated[
-        str | None,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: cones, random rates and slews]",
-            panel="Input",
-            read=a_motion("strapgen.lab.motions.motion_names:MOTIONS"),
-        ),
-    ] = None,
+    motion: Annotated[str | None, motion_option("cones, random rates and slews")] = None,
     settings: MotionSettings = None,
     run: StudyRun,
     workers: WorkerOptions,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -107,38 +107,53 @@ def compare(
         return system.compare(algorithm, methods, refused, *to_run, source, fixed, output)
     choices = _taking_increments(methods.choices(algorithm))
     requests = {path: _source_files().header_command_of(path).request([algorithm]) for path in files or ()}
-    counts = {path: request.settings for path, request in requests.items()}
     source.check()
     _check_fixed(fixed, {*names, reference})
 
-    import numpy as np
-
-    from strapgen.lab.compare import comparison
     from strapgen.lab.compare.comparison_plot import comparison_image
-    from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
-    from strapgen.lab.compare.file_counts import counted
+    from strapgen.lab.compare.comparison_report import comparison_report
 
-    kernels = []
-    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        for choice in choices:
-            inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
-            rows = comparison.compare(
-                choice,
-                backends=[*names, *_of_files(requests, choice, run_differing)],
-                increments=inputs.increments,
-                reference=reference,
-                truth=inputs.truth,
-                settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
-            )
-            kernels.append(
-                ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
-            )
+    kernels = [
+        _compared(
+            choice, [*names, *_of_files(requests, choice, run_differing)], reference, source, fixed, requests
+        )
+        for choice in choices
+    ]
     drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
     output.report(
         comparison_report(kernels, reference, drift),
         lambda path: comparison_image(kernels, reference, path),
     )
     _fail_above(kernels, fail_above, f"further from {reference} than {fail_above} rad")
+
+
+def _compared(
+    choice: Choice,
+    backends: Sequence[str | Backend],
+    reference: str,
+    source: SampleSource,
+    fixed: FixedOptions,
+    requests: Mapping[Path, Request],
+) -> ComparedKernel:
+    """Run one step on all back ends."""
+    import numpy as np
+
+    from strapgen.lab.compare import comparison
+    from strapgen.lab.compare.comparison_report import ComparedKernel
+    from strapgen.lab.compare.file_counts import counted
+
+    counts = {path: request.settings for path, request in requests.items()}
+    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+        inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
+        rows = comparison.compare(
+            choice,
+            backends=backends,
+            increments=inputs.increments,
+            reference=reference,
+            truth=inputs.truth,
+            settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
+        )
+    return ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
 
 
 def _taking_increments(choices: list[Choice]) -> list[Choice]:

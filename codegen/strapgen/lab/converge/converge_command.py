@@ -21,7 +21,6 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Positive
 from strapgen.lab.simulate.sample_source import (
-    MOTION_FILE,
     MOTION_NAMES,
     MotionSettings,
     a_motion,
@@ -51,8 +50,8 @@ class Ladder:
         option(
             "--motion",
             metavar="NAME",
-            help=f"Motion: {MOTION_NAMES}{MOTION_FILE}.  [default: coning]",
-            read=a_motion(),
+            help=f"Motion: {MOTION_NAMES}, or a Python file of your own.  [default: coning]",
+            read=a_motion,
         ),
     ] = None
     settings: MotionSettings = None

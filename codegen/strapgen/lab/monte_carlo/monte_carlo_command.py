@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, StepAlgorithm, option
+from strapgen.cli.options import STEP_OPTIONS, GyroRate, MethodOptions, StepAlgorithm, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Number, Positive, names, whole
@@ -30,9 +30,7 @@ class RandomRunOptions:
 
     panel: ClassVar[str] = "Run"
 
-    sample_hz: Annotated[
-        Positive, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
-    ] = Positive("100")
+    sample_hz: GyroRate = Positive("100")
     rate: Annotated[
         Number, option("--turn-deg-s", metavar="DEG_S", help="Rate of the steady turn about z in deg/s.")
     ] = Number("10")

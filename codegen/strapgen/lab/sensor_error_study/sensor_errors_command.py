@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepName, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.rules import OneOf, rules
@@ -39,12 +39,7 @@ def study_sensor_errors(
         ),
     ],
     *,
-    algorithm: Annotated[
-        str,
-        option(
-            "--algorithm", metavar="NAME", help="Algorithm: dcm, euler or cayley-klein.", panel="Algorithm"
-        ),
-    ] = "euler",
+    algorithm: StepName = "euler",
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     backend: OneBackend = "numpy",
     source: Annotated[SampleSource, Shown(only=("motion", "settings", "step", "duration", "specific_force"))],

@@ -13,7 +13,7 @@ import typer
 from strapgen.cli.options import option
 from strapgen.cli.progress import say_unused, waiting
 from strapgen.cli.rules import Needs, OneOf, Rule
-from strapgen.cli.values import Positive, Reader, Vector, names
+from strapgen.cli.values import Positive, Vector, names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_files import is_file
@@ -30,17 +30,25 @@ _Text = str | None
 
 #: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
-RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
+_RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
 
 
-def a_motion(registry: str = "strapgen.catalogue:MOTIONS") -> Reader:
-    """Return a reader of a motion of a registry, by default those with a closed form, or of a file."""
-    name = names(registry)
-    return lambda option, text: text if is_file(text) else name(option, text)
+def a_motion(option: str, text: str) -> str:
+    """Read a motion with a closed form, or the file of one."""
+    return text if is_file(text) else names("strapgen.catalogue:MOTIONS")(option, text)
 
 
-#: What --motion takes beside these names.
-MOTION_FILE = ", or a Python file of your own"
+def _motion_of_a_run(option: str, text: str) -> str:
+    return text if is_file(text) else names("strapgen.lab.motions.motion_names:MOTIONS")(option, text)
+
+
+def motion_option(default: str = "") -> Any:
+    """Return the option of a motion that a run can have; `default` is what is run without one, in words."""
+    remark = f"  [default: {default}]" if default else ""
+    text = f"Motion: {_RUN_MOTION_NAMES}, or a Python file of your own.{remark}"
+    return option("--motion", metavar="NAME", help=text, panel="Input", read=_motion_of_a_run)
+
+
 MotionSettings = Annotated[
     dict[str, str] | None,
     option(
@@ -90,15 +98,7 @@ class SampleSource:
         ),
     )
 
-    motion: Annotated[
-        _Text,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.",
-            read=a_motion("strapgen.lab.motions.motion_names:MOTIONS"),
-        ),
-    ] = None
+    motion: Annotated[_Text, motion_option()] = None
     settings: MotionSettings = None
     step: Annotated[Positive | None, option("--step", metavar="S", help="Step length in s.")] = None
     duration: Annotated[

@@ -9,13 +9,13 @@ import typer
 
 from strapgen.cli.help import PlainCommand, PlainGroup
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import Duration, option
+from strapgen.cli.options import Duration, StepName, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.values import NotNegative, Positive, names
+from strapgen.cli.values import NotNegative, Positive
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.simulate.sample_source import MOTION_FILE, RUN_MOTION_NAMES, a_motion
+from strapgen.lab.simulate.sample_source import motion_option
 from strapgen.lab.study.worker_options import WorkerOptions
 
 app = typer.Typer(cls=PlainGroup, rich_markup_mode=None)
@@ -88,27 +88,9 @@ class Sweep:
 @grouped
 def word_length(
     *,
-    algorithm: Annotated[
-        str,
-        option(
-            "--algorithm",
-            metavar="NAME",
-            help="Algorithm: dcm, euler or cayley-klein.",
-            panel="Algorithm",
-            read=names("strapgen.catalogue:ALGORITHMS"),
-        ),
-    ] = "euler",
+    algorithm: StepName = "euler",
     sweep: Sweep,
-    motion: Annotated[
-        str,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.",
-            panel="Input",
-            read=a_motion("strapgen.lab.motions.motion_names:MOTIONS"),
-        ),
-    ] = "coning",
+    motion: Annotated[str, motion_option()] = "coning",
     settings: Annotated[
         dict[str, str] | None,
         option(

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import option
+from strapgen.cli.options import Processor, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Number, Positive
@@ -55,16 +55,7 @@ def study_attitude_form(
             panel="Run",
         ),
     ] = None,
-    cpu: Annotated[
-        str | None,
-        option(
-            "--cpu",
-            metavar="NAME",
-            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
-            "instance cortex-m3.",
-            panel="Run",
-        ),
-    ] = None,
+    cpu: Processor = None,
     fixed: Annotated[FixedOptions, Shown(only=("word",))],
     output: Output,
 ) -> None:

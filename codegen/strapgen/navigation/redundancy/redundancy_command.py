@@ -10,7 +10,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
-from strapgen.cli.output import Format, check_format
+from strapgen.cli.output import Format, NewFolder, check_format
 from strapgen.cli.progress import track, waiting
 from strapgen.cli.rules import Needs, rules
 from strapgen.cli.source_options import SourceOptions
@@ -42,10 +42,7 @@ def redundancy(
         ),
     ] = "c",
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry"))],
-    out: Annotated[
-        Path | None,
-        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
-    ] = None,
+    out: NewFolder = None,
     output: Annotated[SourceOptions, Shown(only=("force",))],
     format: Format = "text",
 ) -> None:

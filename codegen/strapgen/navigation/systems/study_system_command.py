@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Duration, a_backend, option
+from strapgen.cli.options import Duration, Processor, a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.values import Number, Positive
 
@@ -54,16 +54,7 @@ def study_system(
             panel="Input",
         ),
     ] = None,
-    cpu: Annotated[
-        str | None,
-        option(
-            "--cpu",
-            metavar="NAME",
-            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
-            "instance cortex-m3.",
-            panel="Run",
-        ),
-    ] = None,
+    cpu: Processor = None,
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry", "allowance"))],
     output: Output,
 ) -> None:

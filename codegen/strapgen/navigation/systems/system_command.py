@@ -13,7 +13,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
-from strapgen.cli.output import Format, WithRuns, check_format, print_json
+from strapgen.cli.output import Format, NewFolder, WithRuns, check_format, print_json
 from strapgen.cli.rules import Excludes, Needs, rules
 from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.values import Positive
@@ -92,10 +92,7 @@ def system(
             )
         ),
     ],
-    out: Annotated[
-        Path | None,
-        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
-    ] = None,
+    out: NewFolder = None,
     with_runs: WithRuns = False,
     output: Annotated[SourceOptions, Shown(only=("check", "force"))],
     draw: Annotated[

@@ -11,7 +11,7 @@ import typer
 from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option
+from strapgen.cli.options import CTarget, Sculling, TwoSpeedAlgorithm
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.source_options import SourceOptions
 from strapgen.ir.exceptions import InputError
@@ -26,10 +26,7 @@ def two_speed(
     algorithm: TwoSpeedAlgorithm,
     *,
     sculling: Sculling = 2,
-    target: Annotated[
-        str,
-        option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm"),
-    ] = "c",
+    target: CTarget = "c",
     fixed: Annotated[
         FixedOptions,
         Shown(

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import a_backend, option
+from strapgen.cli.options import Duration, a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import Positive, names
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import MOTION_FILE, RUN_MOTION_NAMES, a_motion, in_words
+from strapgen.lab.simulate.sample_source import in_words, motion_option
 
 
 @dataclass(frozen=True)
@@ -20,15 +20,7 @@ class FlightOptions:
 
     panel: ClassVar[str] = "Input"
 
-    motion: Annotated[
-        str,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.",
-            read=a_motion("strapgen.lab.motions.motion_names:MOTIONS"),
-        ),
-    ] = "random"
+    motion: Annotated[str, motion_option()] = "random"
     settings: Annotated[
         dict[str, str] | None,
         option(
@@ -57,9 +49,7 @@ class FlightOptions:
     sample_hz: Annotated[Positive, option("--sample-hz", metavar="HZ", help="Sampling rate in Hz.")] = (
         Positive("100")
     )
-    duration: Annotated[Positive, option("--duration", metavar="S", help="Duration of each run in s.")] = (
-        Positive("60")
-    )
+    duration: Duration = Positive("60")
 
     def described(self) -> str:
         """Return the motion and the force in words."""
