@@ -23,6 +23,7 @@ from strapgen.fixedpoint import can_lower, function_series, quantize
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.c import CEvaluator
@@ -78,8 +79,7 @@ def program_of(kind: str, bounds: tuple[Fraction, ...], body: Any = None) -> Pro
     signals = tuple(Signal.scalar(n, bound=b, meaning="argument") for n, b in zip(names, bounds, strict=True))
     arguments = tuple((body or (lambda node: node))(Reference(name)) for name in names)
     return Program(
-        *("tested", "tested", "a function", "none", "tested"),
-        notes=(),
+        KernelInfo("tested", "a function", "none", arguments="tested"),
         inputs=signals,
         body=(Assignment("value", Operation(kind, arguments)),),
         outputs=(Result(Signal.scalar("result", meaning="value"), (Reference("value"),)),),

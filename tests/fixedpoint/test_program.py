@@ -19,6 +19,7 @@ from strapgen.fixedpoint.quantization_context import _is_polynomial
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.fixed import ModelEvaluator
@@ -32,12 +33,7 @@ def hand_made(body: dict[str, object], *outputs: str, bound: object = 1) -> Prog
     y = Signal("y", (len(outputs),), tuple(f"y_{k}" for k in range(len(outputs))))
     assignments = tuple(Assignment(name, value) for name, value in body.items())
     return Program(
-        "made",
-        "made",
-        "Made by hand",
-        "",
-        "made",
-        (),
+        KernelInfo("made", "Made by hand", "", arguments="made"),
         (x,),
         assignments,
         (Result(y, tuple(map(Reference, outputs))),),

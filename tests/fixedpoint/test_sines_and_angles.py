@@ -16,16 +16,8 @@ from small_integers import quantity
 from strapgen.fixedpoint import functions
 from strapgen.fixedpoint.chain import Chain
 from strapgen.fixedpoint.function_series import PI_ERROR, arctangent_series, pi
-from strapgen.fixedpoint.quantities import (
-    Computed,
-    InputElement,
-    Maximum,
-    NearestInteger,
-    Quotient,
-    Selection,
-    SquareRoot,
-    Sum,
-)
+from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Sum
+from strapgen.ir.integer_program import cases_of
 
 PRECISE = mpmath.mp.clone()
 PRECISE.prec = 400
@@ -72,18 +64,18 @@ def values(links: Chain, *arguments: Fraction) -> dict[str, Fraction]:
                     (c * math.prod((known[n] for n in names), start=Fraction(1)) for names, c in terms),
                     Fraction(0),
                 )
-            case Quotient(numerator, denominator):
+            case ExactOperation("divide", (numerator, denominator)):
                 known[link.name] = of(numerator) / of(denominator)
-            case SquareRoot(argument):
+            case ExactOperation("sqrt", (argument,)):
                 known[link.name] = fraction(PRECISE.sqrt(real(known[argument])))
-            case Maximum(several):
+            case ExactOperation("maximum", several):
                 known[link.name] = max(map(of, several))
-            case Selection(cases, otherwise):
-                chosen = (value for left, right, value in cases if of(left) >= of(right))
+            case ExactOperation("select", (*_, otherwise) as operands):
+                chosen = (value for left, right, value in cases_of(operands) if of(left) >= of(right))
                 known[link.name] = of(next(chosen, otherwise))
-            case Computed(argument):
+            case ExactOperation("computed", (argument,)):
                 known[link.name] = known[argument]
-            case NearestInteger(argument, factor):
+            case ExactOperation("nearest", (argument, factor)):
                 known[link.name] = Fraction(math.floor(known[argument] * factor + Fraction(1, 2)))
     return known
 
@@ -162,7 +154,7 @@ def test_the_rest_of_a_turn_reaches_the_end_of_its_range():
     """
     last = Fraction(13, 2) * Fraction(128, 81)
     links = chain("cos", (-last, last), word=8)
-    assert link(links, "quarters").definition.factor == Fraction(81, 128)
+    assert link(links, "quarters").definition.arguments[1] == Fraction(81, 128)
     just_below = last - Fraction(1, 1 << 60)
     largest = max(abs(values(links, angle)["f_rest"]) for angle in (just_below, -last))
     assert largest <= link(links, "rest").range.highest <= largest + Fraction(1, 1 << 50)
@@ -198,7 +190,7 @@ def slopes(links: Chain) -> dict[str, Fraction | None]:
     return dict(links.links[-1].follows.slopes)
 
 
-ROOT = {0: SquareRoot("q")}
+ROOT = {0: ExactOperation("sqrt", ("q",))}
 
 
 @pytest.mark.parametrize(

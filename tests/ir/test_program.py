@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import pytest
 
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import (
     COUNTED_AS,
     OPERATIONS,
@@ -28,12 +29,7 @@ def program(*body: Assignment, result: tuple = ("r",), **rest) -> Program:
     nodes = tuple(Reference(name) if isinstance(name, str) else name for name in result)
     signal = Signal("result", (len(nodes),), tuple(f"result_{k}" for k in range(len(nodes))))
     return Program(
-        name="made_up",
-        kernel="made-up",
-        title="Made up",
-        source="this test",
-        arguments="made-up",
-        notes=(),
+        KernelInfo("made-up", "Made up", "this test", arguments="made-up"),
         inputs=(Signal.scalar("x"), Signal.scalar("y")),
         body=body,
         outputs=(Result(signal, nodes),),

@@ -22,17 +22,7 @@ class Request(NamedTuple):
 
 
 def generated_data(choice: Choice, sources: Sources, target: str, files: Sequence[str]) -> dict[str, Any]:
-    """Return generated sources as plain JSON data.
-
-    Parameters
-    ----------
-    choice : Choice
-    sources : Sources
-    target : str
-        Name of the target, as it was asked for.
-    files : sequence of str
-        Where they were written.
-    """
+    """Return sources for a target, as it was asked for, and the paths of their files as plain JSON data."""
     operations = sources.operations
     data = {
         "kernel": sources.kernel,

@@ -188,7 +188,7 @@ def test_vectors_take_windows_whose_rotation_has_one():
 def test_a_file_of_ones_own_goes_wherever_a_method_goes(tmp_path):
     from strapgen.catalogue.methods import windows
 
-    source = windows._BUILT_IN._files["window-3-3"]
+    source = windows._BUILT_IN.files["window-3-3"]
     path = tmp_path / "mine.toml"
     path.write_text(source.read_text().replace('name = "Window 1+3+3', 'name = "Mine 1+3+3', 1))
     window = read(path)

@@ -86,12 +86,12 @@ def test_options_reach_the_algorithm_and_the_command_in_its_code(here, chosen, n
     kernel = strapgen.derive("mrp.py", **chosen)
     assert (kernel.name, kernel.arguments) == (name, arguments)
     choice = catalogue.choose("mrp.py", **chosen)
-    assert catalogue.increments(choice) == chosen.get("increments", 2)
-    assert catalogue.previous(choice) == chosen.get("previous", 0)
+    assert choice.increments == chosen.get("increments", 2)
+    assert choice.previous == chosen.get("previous", 0)
     backend = strapgen.backend("mrp.py", **chosen)
     assert (backend.increments, backend.previous) == (
-        catalogue.increments(choice),
-        catalogue.previous(choice),
+        choice.increments,
+        choice.previous,
     )
 
 
