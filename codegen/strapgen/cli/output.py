@@ -18,6 +18,7 @@ from strapgen.ir.suggestions import alternatives
 
 if TYPE_CHECKING:
     from strapgen.results.report import Report
+    from strapgen.results.result import Result
 
 _TABLE = ("text", "json", "csv", "markdown", "latex")
 _PLAIN = ("text", "json")
@@ -101,6 +102,13 @@ class Output:
     def file(self) -> Path | None:
         """The file for the output; None for the terminal."""
         return None if self.out == _TERMINAL else self.out
+
+    def show(self, result: Result) -> None:
+        """Deliver a result in the format of the options, and its plot if one is asked for."""
+        from strapgen.results.result import plot
+
+        text = result.written(self.format or "text")
+        self.deliver(text, None if self.plot is None else plot(result, self.plot))
 
     def report(self, report: Report, image: Callable[[Path], bytes] | bytes | None = None) -> None:
         """Deliver a report in the format of the options; `image` is called with the file of --plot, if there is one."""

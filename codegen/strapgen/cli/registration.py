@@ -12,6 +12,11 @@ REGISTRATION = Registration(
             "Derive",
             summary="List all names that the other commands take",
         ),
+        "schema": Command(
+            f"{__package__}.schema_command:schema",
+            "Derive",
+            summary="Print the JSON Schema of a result, or list the names of all",
+        ),
         "derive": Command(
             f"{__package__}.derive_command:derive",
             "Derive",

@@ -11,9 +11,9 @@ from strapgen.design.frontier.frontier import Standing
 from strapgen.design.frontier.frontier_report import frontier_report
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
-from strapgen.lab.converge.convergence_report import convergence_report
-from strapgen.lab.simulate.runs_report import run_data, step_facts
+from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
+from strapgen.lab.converge.convergence_report import ConvergenceResult
+from strapgen.lab.simulate.runs_report import RunResult, step_facts
 from strapgen.report.conditions import Conditions
 from strapgen.report.dossier import REFERENCE, AlgorithmDossier, StepRuns, run_settings
 from strapgen.report.gathering import motions
@@ -71,7 +71,7 @@ def _of_runs(known: AlgorithmDossier, runs: StepRuns, conditions: Conditions) ->
         "step_s": float(schedule.step),
         "duration_s": float(schedule.duration),
     }
-    results = {"simulate": CommandResult(simulate, run_data(runs.run, facts))}
+    results = {"simulate": CommandResult(simulate, RunResult(facts, runs.run).data())}
     if runs.comparison:
         names = ",".join(row.backend for row in runs.comparison)
         rounding = _rounding(runs.settings) if any("fixed" in row.backend for row in runs.comparison) else ""
@@ -79,8 +79,8 @@ def _of_runs(known: AlgorithmDossier, runs: StepRuns, conditions: Conditions) ->
             f"strapgen compare {step} --backend {names} --reference {REFERENCE} {where}{rounding} {_JSON}"
         )
         compared = ComparedKernel(known.choice.kernel, "", runs.comparison)
-        results["compare"] = CommandResult(compare, comparison_report([compared], REFERENCE, "").data())
-    ladder = convergence_report([runs.ladder], "").data()
+        results["compare"] = CommandResult(compare, ComparisonResult([compared], REFERENCE, "").data())
+    ladder = ConvergenceResult([runs.ladder], "").data()
     results["converge"] = CommandResult(f"strapgen converge {step} {_JSON}", ladder)
     return results
 

@@ -111,8 +111,7 @@ def compare(
     import numpy as np
 
     from strapgen.lab.compare import comparison
-    from strapgen.lab.compare.comparison_plot import comparison_image
-    from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
+    from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
     from strapgen.lab.compare.file_counts import counted
 
     kernels = []
@@ -131,10 +130,7 @@ def compare(
                 ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
             )
     drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
-    output.report(
-        comparison_report(kernels, reference, drift),
-        lambda path: comparison_image(kernels, reference, path),
-    )
+    output.show(ComparisonResult(kernels, reference, drift))
     _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
 
 

@@ -123,13 +123,11 @@ def converge(
     words, cases = ladder.words(), ladder.cases(choices, names)
 
     from strapgen.lab.converge import convergence
-    from strapgen.lab.converge.convergence_plot import convergence_image
-    from strapgen.lab.converge.convergence_report import convergence_report
+    from strapgen.lab.converge.convergence_report import ConvergenceResult
 
     runs = track(convergence.converge_all(cases, count, cluster), "running", len(cases))
     orders = [outcome for _, outcome in sorted(runs, key=lambda run: run[0])]
-    title = f"{words}; {', '.join(names)}"
-    output.report(convergence_report(orders, title), lambda path: convergence_image(orders, title, path))
+    output.show(ConvergenceResult(orders, f"{words}; {', '.join(names)}"))
     far = [order.kernel for order in orders if most is not None and not _within(order, most)]
     if far:
         typer.echo(

@@ -120,7 +120,7 @@ def study_monte_carlo(
     whole = checks.count("of", checks.whole("of", run.of), largest=_MOST)
     sweep, hertz = run.sweep(method.choose(algorithm)), float(checks.number("sample-hz", run.sample_hz))
     from strapgen.lab.monte_carlo.random_runs import MeanSquare, cases, predicted, random_runs
-    from strapgen.lab.monte_carlo.random_runs_report import RandomStudy, random_report
+    from strapgen.lab.monte_carlo.random_runs_report import RandomRunsResult
     from strapgen.run.backends import backend
 
     backend(sweep.algorithm, backend=sweep.backend)  # generated and compiled before the time counts
@@ -129,4 +129,4 @@ def study_monte_carlo(
     parts = list(track(random_runs(sweep, run.results, jobs, cluster), "running", len(cases(sweep))))
     seconds = None if resumed else time.monotonic() - begin
     mean = predicted(sweep.algorithm, sweep.errors, sweep.steps)
-    output.report(random_report(RandomStudy(sweep, MeanSquare.of(parts), mean, hertz, seconds, whole)))
+    output.show(RandomRunsResult.of(sweep, MeanSquare.of(parts), mean, hertz, seconds, whole))

@@ -153,8 +153,6 @@ def word_length(
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
         outcomes = {done.case: done for done in track(run(planned, count, cluster), "running", len(planned))}
-    from strapgen.lab.word_length.word_length_plot import word_length_image
-    from strapgen.lab.word_length.word_length_report import word_length_report
+    from strapgen.lab.word_length.word_length_report import WordLengthResult
 
-    rows = [outcomes[case] for case in planned]
-    output.report(word_length_report(rows), lambda path: word_length_image(rows, path))
+    output.show(WordLengthResult([outcomes[case] for case in planned]))

@@ -1,0 +1,108 @@
+"""JSON Schemas: what every command prints as JSON is what its schema says, and the files in docs are in step."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from shutil import which
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from strapgen import registration
+from strapgen.cli import main
+from strapgen.results.records import UNITS
+
+ROOT = Path(__file__).resolve().parents[2]
+RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
+#: Command lines by the schema of what they print with --format json.
+COMMANDS = {
+    f"simulate euler {RUN} --matrices --title a --initial-deg 1,2,3": "run",
+    f"simulate euler --rates --method rk1 {RUN}": "run",
+    "simulate two-speed-euler --motion constant --set y_deg_s=10 --duration 1": "run",
+    "simulate dcm --increments-csv tests/data/increments.csv --title a": "attitude",
+    f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
+    "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
+    "cost euler --cpu cortex-m3": "cost",
+    "study word-length --method rk1 --word 16 --carry none --duration 1": "word-length",
+    "study monte-carlo euler --runs 20 --length 10 --jobs 1": "random-runs",
+    f"study sensor-errors examples/sensors/ins-1.toml {RUN} --runs 10": "sensor-errors",
+}
+SCHEMAS = registration.schemas()
+
+
+def strict(schema):
+    """Return a schema that allows no keys but those that it names."""
+    if isinstance(schema, list):
+        return [strict(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    closed = {"additionalProperties": False} if isinstance(schema.get("properties"), dict) else {}
+    return closed | {key: strict(part) for key, part in schema.items()}
+
+
+def answer(line: str, capsys) -> str:
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(line))
+    said = capsys.readouterr()
+    assert stop.value.code in (0, 1), said.err
+    return said.out
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_json_is_what_its_schema_says(line, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(ROOT)
+    name = COMMANDS[line]
+    if name == "cost" and which("arm-none-eabi-gcc") is None:
+        pytest.skip("no cross compiler")
+    data = json.loads(answer(f"{line.replace('OUT', str(tmp_path))} --format json", capsys))
+    schema = SCHEMAS[name].read()
+    for one in data if isinstance(data, list) else [data]:
+        assert one["schema"] == f"strapgen/{name}/1" == schema["$id"]
+    wrong = [
+        f"{error.json_path}: {error.message}"
+        for error in Draft202012Validator(strict(schema)).iter_errors(data)
+    ]
+    assert not wrong
+
+
+def test_every_result_is_printed_by_a_command_above():
+    assert {name for name, one in SCHEMAS.items() if one.kind == "result"} == {*COMMANDS.values()}
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_schema_is_one_and_stands_in_docs(name):
+    schema = SCHEMAS[name].read()
+    Draft202012Validator.check_schema(schema)
+    assert json.loads((ROOT / "docs" / "schemas" / f"{name}.json").read_text()) == schema
+
+
+def test_docs_have_no_other_schemas():
+    assert {path.stem for path in (ROOT / "docs" / "schemas").iterdir()} == {*SCHEMAS}
+
+
+def test_numbers_have_the_units_that_their_names_end_with():
+    rows = SCHEMAS["comparison"].read()["items"]["properties"]
+    assert {name: rows[name].get("unit") for name in ("rms_rad", "drift_deg", "ns_per_step", "kernel")} == {
+        "rms_rad": "rad",
+        "drift_deg": "deg",
+        "ns_per_step": "ns",
+        "kernel": None,
+    }
+    ends = list(UNITS)
+    assert not [one for k, one in enumerate(ends) for long in ends[k + 1 :] if long.endswith(f"_{one}")]
+
+
+def test_a_name_that_is_none_is_told(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["schema", "comparisons"])
+    said = capsys.readouterr()
+    assert stop.value.code == 2 and not said.out
+    assert said.err.startswith("strapgen: schema 'comparisons' is not known") and said.err.count("\n") == 1
+
+
+def test_schema_lists_all_names_and_prints_each(capsys):
+    listed = [line.split() for line in answer("schema", capsys).splitlines()]
+    assert listed == [[one.kind, name] for name, one in SCHEMAS.items()]
+    assert json.loads(answer("schema comparison", capsys)) == SCHEMAS["comparison"].read()
