@@ -345,7 +345,7 @@ def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
 @pytest.mark.long
 def test_vibration_of_several(strapgen_says, tmp_path):
     several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
-    data = json.loads(strapgen_says(f"{several} --format json"))
+    data = json.loads(strapgen_says(f"{several} --format json"))["results"]
     assert [(one["kernel"], one["increments"]) for one in data] == [
         (f"euler-{method}-{count}", count) for method in ("rk2", "rk4") for count in (1, 2)
     ]
@@ -666,7 +666,7 @@ def test_simulate_json(backend, motion, settings, strapgen_says):
     )
     data = json.loads(said, parse_constant=pytest.fail)
     assert list(data) == [
-        *("algorithm", "method", "increments", "backend", "motion", "step_s", "duration_s"),
+        *("schema", "algorithm", "method", "increments", "backend", "motion", "step_s", "duration_s"),
         *("time_s", "scale", "skew_deg", "drift_deg", "mean_drift_deg"),
     ]
     named = {"algorithm": "euler", "method": "rk4", "increments": 2, "backend": backend, "motion": motion}
@@ -831,7 +831,7 @@ def test_recorded_rates(strapgen_says):
     options = f"--rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s --resample-hz 100"
     data = json.loads(strapgen_says(f"simulate dcm {options} --record 0.5 --orthonormalize 1 --format json"))
     assert list(data) == [
-        *("algorithm", "method", "increments", "backend", "source"),
+        *("schema", "algorithm", "method", "increments", "backend", "source"),
         *("step_s", "duration_s", "unused_increments", "elements", "time_s", "attitude"),
     ]
     assert data["source"] == f"{DATA}/rates_uneven.csv"

@@ -15,6 +15,7 @@ from gathering import each
 import strapgen
 from strapgen.analysis.vibration.curves import Curve
 from strapgen.analysis.vibration.vibration_plot import vibration_image
+from strapgen.analysis.vibration.vibration_report import VibrationResult
 from strapgen.design.frontier.frontier import MOTIONS, Standing
 from strapgen.design.frontier.frontier_plot import frontier_image
 from strapgen.ir.attitude_step import Order
@@ -125,7 +126,7 @@ def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
         for label, part in (("one", 1e-9), ("two", -1e-8))
         for unit, true in (("rad/s", 1e-6), ("m/s^2", 1e-3))
     ]
-    vibration_image(curves, "A title", "vibration.png", 10.0)
+    vibration_image(VibrationResult([], [], "", curves, "A title", 10.0), "vibration.png")
     (figure,) = figures
     drift, acceleration = figure.axes
     assert (drift.get_ylabel(), acceleration.get_ylabel()) == (
@@ -139,7 +140,7 @@ def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
         np.testing.assert_allclose(lines[2].get_ydata(), 1e-8 * hertz**3 * factor)
     assert len(figure.legends[0].get_texts()) == 3
     still = [("still", Curve("still", "rad/s", hertz, 0 * hertz, 0 * hertz))]
-    vibration_image(still, "Nothing moves", "vibration.png")
+    vibration_image(VibrationResult([], [], "", still, "Nothing moves"), "vibration.png")
 
 
 def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):

@@ -16,6 +16,7 @@ from strapgen.results.records import UNITS
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
+WAVE = "--step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
 #: Command lines by the schema of what they print with --format json.
 COMMANDS = {
     f"simulate euler {RUN} --matrices --title a --initial-deg 1,2,3": "run",
@@ -28,6 +29,22 @@ COMMANDS = {
     "study word-length --method rk1 --word 16 --carry none --duration 1": "word-length",
     "study monte-carlo euler --runs 20 --length 10 --jobs 1": "random-runs",
     f"study sensor-errors examples/sensors/ins-1.toml {RUN} --runs 10": "sensor-errors",
+    "tableau rk4": "tableau",
+    "tableau dormand-prince5": "tableau",
+    "tableau examples/heun3.toml": "tableau-families",
+    "solve examples/three_samples.py --order 4 --set a=57/80": "solution",
+    "solve examples/three_samples.py --order 5 --on polynomial": "solution",
+    "series euler --method rk1,rk2 --terms 1": "series",
+    "series dcm --method rk1 --motion constant --terms 1": "series",
+    "series examples/three_samples.py --terms 1": "series",
+    "series velocity-position --method rk1": "velocity-series",
+    "series dcm --all --method rk1": "overview",
+    "series dcm --method rk1 --motion constant --versus euler": "ratio",
+    f"vibration euler --method rk1,rk2 {WAVE} --acceleration-y 3": "vibration",
+    f"vibration euler --method rk1 {WAVE}": "vibration",
+    "vibration dcm --step 0.02 --spectrum examples/vibration.csv": "vibration",
+    "vibration examples/three_samples.py": "vibration-closed-forms",
+    "stability dcm --method rk1,magnus4": "stability",
 }
 SCHEMAS = registration.schemas()
 

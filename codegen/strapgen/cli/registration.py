@@ -12,11 +12,6 @@ REGISTRATION = Registration(
             "Derive",
             summary="List all names that the other commands take",
         ),
-        "schema": Command(
-            f"{__package__}.schema_command:schema",
-            "Derive",
-            summary="Print the JSON Schema of a result, or list the names of all",
-        ),
         "derive": Command(
             f"{__package__}.derive_command:derive",
             "Derive",
@@ -26,6 +21,11 @@ REGISTRATION = Registration(
             f"{__package__}.generate_command:generate",
             "Generate",
             summary="Generate source code for an algorithm, or for the whole catalogue",
+        ),
+        "schema": Command(
+            f"{__package__}.schema_command:schema",
+            "Derive",
+            summary="Print the JSON Schema of a result, or list the names of all",
         ),
     },
 )

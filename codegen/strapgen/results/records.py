@@ -60,13 +60,13 @@ class Entry:
     key: str = ""
     #: Type of what is written, in place of the annotation
     kind: Any = None
-    #: Returns plain data from the value
+    #: Returns what is written of a value that is not None
     write: Callable[[Any], Any] | None = None
     #: Returns the cell of a table for a reader
     cell: Callable[[Any], Any] | None = None
     #: Left out if the value is None
     optional: bool = False
-    #: The parts of a mapping stand beside the other fields
+    #: The parts of a record or a mapping stand beside the other fields; for None they are null
     spread: bool = False
     #: A table for programs has a column for each part of a mapping
     split: bool = False
@@ -93,10 +93,15 @@ def entry(
 INTERNAL = {_METADATA: Entry(internal=True)}
 
 
-class Record:
-    """A dataclass as plain data; `computed` names the properties that are written after its fields."""
+def properties(**metadata: Mapping[str, Entry]) -> Mapping[str, Mapping[str, Entry]]:
+    """Return the properties that a record writes, with their metadata."""
+    return metadata
 
-    computed: ClassVar[tuple[str, ...]] = ()
+
+class Record:
+    """A dataclass as plain data; `computed` has the metadata of the properties that are written after its fields."""
+
+    computed: ClassVar[Mapping[str, Mapping[str, Entry]]] = {}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data."""
@@ -104,23 +109,23 @@ class Record:
 
 
 def entries(kind: type) -> dict[str, Entry]:
-    """Return what a dataclass writes, by name: its fields, then the properties that it names in `computed`."""
-    fields = {one.name: one.metadata.get(_METADATA, Entry()) for one in dataclasses.fields(kind)}
-    computed = getattr(kind, "computed", ())
-    return {name: one for name, one in fields.items() if not one.internal} | {
-        name: Entry() for name in computed
-    }
+    """Return how a dataclass is written, by name: its fields, then the properties that it has in `computed`."""
+    metadata = {one.name: one.metadata for one in dataclasses.fields(kind)} | getattr(kind, "computed", {})
+    return {name: one.get(_METADATA, Entry()) for name, one in metadata.items()}
 
 
 def plain_record(record: Any) -> dict[str, Any]:
     """Return a dataclass as an object of plain JSON data."""
     data: dict[str, Any] = {}
     for name, one in entries(type(record)).items():
-        value = getattr(record, name)
-        if one.optional and value is None:
+        value = None if one.internal else getattr(record, name)
+        written = value if one.write is None or value is None else one.write(value)
+        if one.internal or (one.optional and written is None):
             continue
-        written = plain(value if one.write is None else one.write(value))
-        data |= written if one.spread else {one.key or name: written}
+        if not one.spread:
+            data[one.key or name] = plain(written)
+        else:
+            data |= plain(written) if written is not None else dict.fromkeys(entries(one.kind))
     return data
 
 
@@ -213,6 +218,8 @@ def record_schema(kind: type) -> dict[str, Any]:
     more: Any = None
     meanings = _meanings(kind)
     for name, one in entries(kind).items():
+        if one.internal:
+            continue
         schema = type_schema(one.kind if one.kind is not None else _annotation(kind, name))
         if one.spread and "properties" in schema:
             properties |= schema["properties"]
@@ -231,7 +238,11 @@ def record_schema(kind: type) -> dict[str, Any]:
         properties[key] = words | schema
         if not one.optional:
             required.append(key)
-    result: dict[str, Any] = {"type": "object", "properties": properties, "required": required}
+    result: dict[str, Any] = {
+        "type": "object",
+        "properties": properties,
+        "required": list(dict.fromkeys(required)),
+    }
     return result if more is None else result | {"additionalProperties": more}
 
 

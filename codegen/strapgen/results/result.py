@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,6 +21,9 @@ class Result(Record):
 
     #: The dataclass of the rows, if JSON is the list of these
     row: ClassVar[type | None] = None
+    #: The dataclass of each, if the command answers for several algorithms or targets: JSON has their list under
+    #: the key results, and beside it the keys of the first where it is alone
+    each: ClassVar[type | None] = None
     #: The function "module:name" of a result and a file that returns the image; "" for none
     drawn_by: ClassVar[str] = ""
     #: Whether JSON has a line for each part
@@ -32,6 +36,10 @@ class Result(Record):
     def rows(self) -> Any:
         """Return the sequence of the records of its tables; None if it has no tables."""
         return None
+
+    def results(self) -> Sequence[Any]:
+        """Return the records of a result with `each`."""
+        raise NotImplementedError
 
     def table(self) -> TextTable:
         """Return the rows as a table for programs."""
@@ -48,9 +56,12 @@ class Result(Record):
     def data(self) -> Any:
         """Return the result as plain JSON data, with the name of its schema."""
         mark = {"schema": identifier(name)} if (name := name_of(type(self))) else {}
-        if self.row is None:
+        if self.row is not None:
+            return [mark | plain_record(row) for row in self.rows()]
+        if self.each is None:
             return mark | plain_record(self)
-        return [mark | plain_record(row) for row in self.rows()]
+        results = [plain_record(one) for one in self.results()]
+        return mark | (results[0] if len(results) == 1 else {}) | {"results": results}
 
     def written(self, format: str) -> str:
         """Return the result as "text", "json", "csv", "markdown" or "latex"."""
@@ -74,7 +85,10 @@ class Result(Record):
     def schema(cls) -> dict[str, Any]:
         """Return the JSON Schema of the result."""
         name = name_of(cls)
-        one = record_schema(cls.row or cls)
+        one = record_schema(cls.row or cls.each or cls)
+        if cls.each is not None:
+            results = {"results": {"title": "results", "type": "array", "items": one}}
+            one = one | {"properties": one["properties"] | results, "required": ["results"]}
         one["properties"] = {"schema": {"title": "schema", "const": identifier(name)}} | one["properties"]
         one["required"] = ["schema", *one["required"]]
         title = (cls.__doc__ or "").partition("\n")[0].rstrip(".")

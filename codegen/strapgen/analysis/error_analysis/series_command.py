@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -24,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, pairs
 
 if TYPE_CHECKING:
+    from strapgen.analysis.agreement.agreement import Agreement
     from strapgen.catalogue import Choice
 
 _Text = str | None
@@ -88,10 +90,9 @@ class DriftPlot:
     ] = None
     duration: Duration = "2"
 
-    def draw(self, choice: Choice, motion: str, count: int | None, path: Path) -> bytes:
-        """Return the image of the drift on a motion of the catalogue."""
+    def agreements(self, choice: Choice, motion: str, count: int | None) -> tuple[Sequence[Agreement], str]:
+        """Return the drift on a motion of the catalogue, predicted and simulated, with a title."""
         from strapgen.analysis.agreement import agreement
-        from strapgen.analysis.agreement.agreement_plot import agreement_image
         from strapgen.catalogue import MOTIONS
         from strapgen.lab.motions import motions
 
@@ -110,7 +111,7 @@ class DriftPlot:
             f"{agreements[0].kernel}: drift, predicted and simulated\n"
             f"{self.duration} s of {motion} motion, {words}"
         )
-        return agreement_image(agreements, title, path)
+        return agreements, title
 
 
 @dataclass(frozen=True)
@@ -199,16 +200,16 @@ def series(
     most = 2 if count is None else count
     if versus.versus is not None:
         from strapgen.analysis.ratios import ratios
-        from strapgen.analysis.ratios.ratios_report import ratio_report
+        from strapgen.analysis.ratios.ratios_report import RatioResult
 
         second = versus.choose(versus.versus, methods)
-        output.report(ratio_report(ratios.versus(choices[0], second, motion, most)))
+        output.show(RatioResult(ratios.versus(choices[0], second, motion, most)))
         return
     from strapgen.analysis.error_analysis.error_analysis import analyse
-    from strapgen.analysis.error_analysis.series_report import series_report
+    from strapgen.analysis.error_analysis.series_report import SeriesResult
 
-    image = None if output.plot is None else plot.draw(choices[0], motion, count, output.plot)
-    output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)
+    drawn = ((), "") if output.plot is None else plot.agreements(choices[0], motion, count)
+    output.show(SeriesResult([analyse(choice, motion, most) for choice in choices], *drawn))
 
 
 def _may_be_velocity(algorithm: str) -> bool:
@@ -227,10 +228,10 @@ def _of_velocity(
             f"series of {choices[0].name} hold for any motion; --motion, --versus and --plot go with an attitude"
         )
     from strapgen.analysis.series import velocity_series
-    from strapgen.analysis.series.velocity_series_report import velocity_series_report
+    from strapgen.analysis.series.velocity_series_report import VelocitySeriesResult
 
     most = 1 if terms is None else terms
-    output.report(velocity_series_report([velocity_series.series(choice, most) for choice in choices]))
+    output.show(VelocitySeriesResult([velocity_series.series(choice, most) for choice in choices]))
 
 
 def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:
@@ -261,7 +262,7 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
             raise InputError(f"--all and {name} do not go together")
     from strapgen import catalogue
     from strapgen.analysis.error_analysis import overview
-    from strapgen.analysis.error_analysis.overview_report import overview_report
+    from strapgen.analysis.error_analysis.overview_report import OverviewResult
 
     algorithms = list(catalogue.ALGORITHMS)
     if algorithm is not None:
@@ -272,4 +273,4 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
             checks.choice("method", name, catalogue.METHODS) for name in listed("--method", method.method)
         ]
     choices = overview.choices(algorithms, names)
-    output.report(overview_report(list(track(overview.overview(choices), "deriving", len(choices)))))
+    output.show(OverviewResult(list(track(overview.overview(choices), "deriving", len(choices)))))

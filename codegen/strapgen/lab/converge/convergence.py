@@ -66,10 +66,9 @@ class PredictedOrders:
     predicted_order: int | None
 
     @staticmethod
-    def of(order: Order | None) -> PredictedOrders:
+    def of(order: Order) -> PredictedOrders:
         """Return the orders of a step."""
-        parts = ("method", "attitude", "extraction", "step")
-        return PredictedOrders(*(None if order is None else getattr(order, part) for part in parts))
+        return PredictedOrders(order.method, order.attitude, order.extraction, order.step)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.simulate.runs import attitude, drift_between
 from strapgen.lab.study.clusters import Bundle, Cluster, moved
 from strapgen.lab.study.resumable import side_by_side
-from strapgen.results.records import Record, entry
+from strapgen.results.records import Record, entry, properties
 from strapgen.run.backends import backend
 from strapgen.run.increments import pulses
 from strapgen.storage import cache
@@ -110,7 +110,7 @@ class Outcome(Record):
         independent; None without pulses. See `quantization_noise`.
     """
 
-    computed = ("dominates",)
+    computed = properties(dominates=entry())
 
     case: Case = field(metadata=entry(spread=True))
     drift_deg: float | None
