@@ -18,6 +18,7 @@ from strapgen.analysis.vibration.vibration_plot import vibration_image
 from strapgen.analysis.vibration.vibration_report import VibrationResult
 from strapgen.design.frontier.frontier import MOTIONS, Standing
 from strapgen.design.frontier.frontier_plot import frontier_image
+from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.lab.compare.comparison import AngleHistory, Comparison
@@ -34,7 +35,9 @@ from strapgen.navigation.rate_table.rate_table import Row
 from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
 from strapgen.results import figures as drawing
 from strapgen.thesis.predicted_tables import PredictedEntry
+from strapgen.thesis.predicted_tables_report import PredictedTablesResult
 from strapgen.thesis.tables_plot import predicted_tables_image, thesis_tables_image
+from strapgen.thesis.tables_report import ThesisTablesResult
 from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES, TableEntry
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
@@ -225,7 +228,7 @@ def test_the_frontier_has_a_panel_a_motion_and_labels_for_the_best(figures):
         standing("good", 40, 1e-3),
         standing("lost", 50, None),
     ]
-    frontier_image(standings, 100.0, "title", "a.png")
+    frontier_image(FrontierResult(standings, 100.0, 2.0), "a.png")
     (figure,) = figures
     assert [axes.get_title("left") for axes in figure.axes][:2] == [
         "cone of 1 deg at 10 Hz",
@@ -259,13 +262,13 @@ def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figur
         for algorithm in ALGORITHMS
         for order, printed in zip(ORDERS, table.printed[algorithm], strict=True)
     ]
-    thesis_tables_image(entries, "tables.png")
+    thesis_tables_image(ThesisTablesResult(entries), "tables.png")
     predicted = [
         PredictedEntry(4, e.algorithm, e.order, 0.5, e.normalised, 0.5, 1.0, e.thesis, True)
         for e in entries
         if (e.table, e.backend) == (4, "numpy")
     ]
-    predicted_tables_image(predicted, "predicted.png")
+    predicted_tables_image(PredictedTablesResult(predicted, []), "predicted.png")
     whole, single = figures
     assert [axes.get_visible() for axes in whole.axes] == [True] * 5 + [False]
     for axes, table in zip(whole.axes, TABLES, strict=False):

@@ -17,6 +17,10 @@ from strapgen.results.records import UNITS
 ROOT = Path(__file__).resolve().parents[2]
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
 WAVE = "--step 0.02 --frequency-hz 10 --theta-x-rad 0.01 --theta-y-rad 0.02 --phase-rad 1.1"
+FOREIGN = (
+    "examples/check_foreign_c/correct.c --function integrator_update --arguments 'state[4], increments[3] -> state[4]' "
+    "--scalar first --init integrator_init"
+)
 #: Command lines by the schema of what they print with --format json.
 COMMANDS = {
     f"simulate euler {RUN} --matrices --title a --initial-deg 1,2,3": "run",
@@ -45,6 +49,24 @@ COMMANDS = {
     "vibration dcm --step 0.02 --spectrum examples/vibration.csv": "vibration",
     "vibration examples/three_samples.py": "vibration-closed-forms",
     "stability dcm --method rk1,magnus4": "stability",
+    "coning --samples 2 --previous 1 --form combined --terms": "coning",
+    "coning --samples 1 --previous 3 --objective band --band-hz 20 --sample-hz 100": "shaped-coning",
+    "coning --samples 1 --previous 3 --objective worst --spectrum examples/vibration.csv --sample-hz 200": (
+        "shaped-coning"
+    ),
+    "window show window-3-3": "window",
+    "window generate window-3-3 --target c --out OUT": "late-sources",
+    "frontier --method rk4:2 --duration 1 --jobs 1": "frontier",
+    "design examples/briefs/ahrs.toml --method coning-compressed --simulate 1 --jobs 1": "selection",
+    "tables --table 3 --backend numpy": "thesis-tables",
+    "tables --predict": "predicted-tables",
+    "statements": "statements",
+    "vectors euler --max-rate-deg-s 400 --step 0.01 --count 20 --out OUT": "vectors",
+    "check euler --method rk1": "findings",
+    "check FOREIGN": "foreign-check",
+    "verify generated/c_fixed/euler_rk4_2_w32.c": "verification",
+    "two-speed euler --sculling 1 --target c-fixed --out OUT; verify OUT": "whole-verification",
+    "evidence euler --method rk1 --tool gappa": "evidence",
 }
 SCHEMAS = registration.schemas()
 
@@ -73,7 +95,10 @@ def test_json_is_what_its_schema_says(line, capsys, monkeypatch, tmp_path):
     name = COMMANDS[line]
     if name == "cost" and which("arm-none-eabi-gcc") is None:
         pytest.skip("no cross compiler")
-    data = json.loads(answer(f"{line.replace('OUT', str(tmp_path))} --format json", capsys))
+    *before, last = line.replace("OUT", str(tmp_path)).replace("FOREIGN", FOREIGN).split("; ")
+    for one in before:
+        answer(one, capsys)
+    data = json.loads(answer(f"{last} --format json", capsys))
     schema = SCHEMAS[name].read()
     for one in data if isinstance(data, list) else [data]:
         assert one["schema"] == f"strapgen/{name}/1" == schema["$id"]

@@ -143,6 +143,11 @@ def check_format(value: str) -> str:
     return checks.choice("format", value, _PLAIN)
 
 
+def show(result: Result, format: str) -> None:
+    """Print the result of a command that writes source files."""
+    typer.echo(result.written(format).rstrip("\n"))
+
+
 def print_json(data: Any) -> None:
     """Print data as JSON."""
     from strapgen.results.report import as_json

@@ -28,6 +28,14 @@ REGISTRATION = Registration(
             summary="Select the cheapest algorithm that meets a brief",
         ),
     },
+    results={
+        "coning": f"{__package__}.coning.coning_report:ConingResult",
+        "shaped-coning": f"{__package__}.coning.coning_report:ShapedResult",
+        "window": f"{__package__}.windows.window_report:WindowResult",
+        "late-sources": f"{__package__}.commit_late.commit_late_sources:LateResult",
+        "frontier": f"{__package__}.frontier.frontier_report:FrontierResult",
+        "selection": f"{__package__}.selection.selection_report:SelectionResult",
+    },
     extensions={"lab.whole-recordings": f"{__package__}.commit_late:whole_recordings"},
     requires=("lab", "analysis"),
 )

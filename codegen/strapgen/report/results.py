@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.design.frontier.frontier import Standing
-from strapgen.design.frontier.frontier_report import frontier_report
+from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
@@ -20,7 +20,7 @@ from strapgen.report.gathering import motions
 from strapgen.results.display.formulas import formulas_report
 from strapgen.run.generation import generated_data
 from strapgen.targets import contract
-from strapgen.thesis.tables_report import thesis_tables_report
+from strapgen.thesis.tables_report import ThesisTablesResult
 from strapgen.thesis.thesis_tables import TableEntry
 
 #: What makes every command print its data.
@@ -97,7 +97,7 @@ def _rounding(settings: Settings) -> str:
 def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> CommandResult:
     """Return the tables of the thesis as the result of `tables`."""
     command = f"strapgen tables --backend {','.join(backends)} {_JSON}"
-    return CommandResult(command, thesis_tables_report([*entries]).data())
+    return CommandResult(command, ThesisTablesResult([*entries]).data())
 
 
 def of_frontier(
@@ -108,4 +108,4 @@ def of_frontier(
     names = shlex.quote(",".join(methods))
     command = f"strapgen frontier --method {names} {conditions.options} {words} {_JSON}"
     hertz, seconds = (float(checks.number("", text)) for text in (conditions.sample_hz, conditions.duration))
-    return CommandResult(command, frontier_report(standings, hertz, seconds, motions(conditions)).data())
+    return CommandResult(command, FrontierResult(standings, hertz, seconds, motions(conditions)).data())

@@ -62,8 +62,7 @@ def tables(
         return
     from strapgen.ir import checks
     from strapgen.run.backends import BACKENDS
-    from strapgen.thesis.tables_plot import thesis_tables_image
-    from strapgen.thesis.tables_report import thesis_tables_report
+    from strapgen.thesis.tables_report import ThesisTablesResult
     from strapgen.thesis.thesis_tables import (
         ALGORITHMS,
         DURATION,
@@ -87,22 +86,19 @@ def tables(
     for _ in track(build_all(names, settings, chosen), "building", cases):
         pass
     entries = list(track(run_tables(names, settings, chosen, interval), "simulating", cases * len(chosen)))
-    output.report(thesis_tables_report(entries), lambda path: thesis_tables_image(entries, path))
+    output.show(ThesisTablesResult(entries))
 
 
 def _predict(output: Output) -> None:
     """Deliver the tables as the series predict them, and the ratios that the thesis reads from its tables."""
     from strapgen.analysis.ratios import ratios
     from strapgen.thesis import predicted_tables
-    from strapgen.thesis.predicted_tables_report import predicted_report
-    from strapgen.thesis.tables_plot import predicted_tables_image
+    from strapgen.thesis.predicted_tables_report import PredictedTablesResult
     from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
     entries = list(track(predicted_tables.predicted(), "predicting", cases))
-    output.report(
-        predicted_report(entries, ratios.claims()), lambda path: predicted_tables_image(entries, path)
-    )
+    output.show(PredictedTablesResult(entries, ratios.claims()))
 
 
 def runnable() -> tuple[str, ...]:

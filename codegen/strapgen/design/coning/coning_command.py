@@ -206,7 +206,7 @@ def coning(
     output.check(design.spectrum)
     from strapgen import catalogue
     from strapgen.catalogue.methods import coning_coefficients
-    from strapgen.design.coning.coning_report import coning_data, coning_report
+    from strapgen.design.coning.coning_report import ConingResult
 
     count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
     before = checks.count(
@@ -228,7 +228,7 @@ def coning(
             f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + before} are given"
         )
     coefficients = coning_coefficients.design(count, before, form)
-    output.report(coning_report(coefficients, coning_data(coefficients, terms)))
+    output.show(ConingResult.of(coefficients, terms))
 
 
 def _deliver_design(options: ConingDesign, samples: int, previous: int, output: ConingOutput) -> None:
@@ -236,14 +236,14 @@ def _deliver_design(options: ConingDesign, samples: int, previous: int, output: 
     brief = options.brief(samples, previous)
     from strapgen.catalogue.methods import shaped_coning
     from strapgen.design.coning import coning, coning_file
-    from strapgen.design.coning.coning_report import ShapedDrift, figure_lines, shaped_report
+    from strapgen.design.coning.coning_report import ShapedDrift, ShapedResult, figure_lines
 
     with waiting("designing"):
         shape = coning.design(brief)
         shaped_coning.verify(shape)
         drift = ShapedDrift(shape, brief.lines)
         if output.format != _FILE_FORMAT:
-            output.report(shaped_report(drift))
+            output.show(ShapedResult.of(drift))
             return
         figures = figure_lines(drift)
     out = None if output.file is None else output.file.name

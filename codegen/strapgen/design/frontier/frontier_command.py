@@ -104,20 +104,13 @@ def frontier(
     several = study.candidates(None if methods is None else listed("--method", methods))
     runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs, cluster, motions)
     standings = study.in_order(track(runs, "running", len(several)), several)
-    from strapgen.design.frontier.frontier_plot import frontier_image
-    from strapgen.design.frontier.frontier_report import frontier_report
+    from strapgen.design.frontier.frontier_report import FrontierResult
 
     hertz, seconds = (
         float(checks.number("sample_hz", run.sample_hz)),
         float(checks.number("duration", run.duration)),
     )
-    title = (
-        f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what halves the drift of all that costs less"
-    )
-    output.report(
-        frontier_report(standings, hertz, seconds, motions),
-        lambda path: frontier_image(standings, hertz, title, path),
-    )
+    output.show(FrontierResult(standings, hertz, seconds, motions))
 
 
 def _motions(name: str | None, settings: list[str] | None) -> Motions:
