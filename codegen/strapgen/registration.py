@@ -226,7 +226,8 @@ def broken() -> list[str]:
         parts: list[Any] = [one]
         if isinstance(one, Registration):
             parts += [loaded(point, place, kind) for kind in KINDS for place in getattr(one, kind)]
-            parts += [loaded(point, place) for place in [*one.lists.values(), *one.extensions.values()]]
+            others = (one.lists, one.results, one.files, one.extensions)
+            parts += [loaded(point, place) for names in others for place in names.values()]
             parts += [_function(point, one, name) for name in one.commands]
         lines += [str(part) for part in parts if isinstance(part, InputError)][:1]
     return lines

@@ -166,7 +166,7 @@ def test_version_names_all_that_shapes_the_output(strapgen_says):
 def test_list(strapgen_says):
     data = json.loads(strapgen_says("list --format json"))
     kinds = ["algorithms", "methods", "vectors", "kernels", "systems", "motions", "targets", "backends"]
-    assert list(data) == kinds
+    assert list(data) == ["schema", *kinds]
     assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
     assert data["vectors"].keys() == catalogue.VECTORS.keys()
@@ -470,6 +470,7 @@ def test_derive_program(strapgen_says):
 def test_derive_json(show, strapgen_says):
     data = json.loads(strapgen_says(f"derive euler --show {show} --format json"))
     wanted = [
+        "schema",
         "kernel",
         "title",
         "source",
@@ -636,7 +637,7 @@ def test_generate_all_as_json(strapgen_says, tmp_path, monkeypatch):
     few = [derived.program(Choice(*choice)) for choice in (("euler", "rk4", 2), ("dcm-product",))]
     monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))  # of all, in tests/library
     data = json.loads(strapgen_says("generate --all --out out --format json"))
-    assert list(data) == ["files"]
+    assert list(data) == ["schema", "files"]
     written = {str(path.relative_to(tmp_path)) for path in (tmp_path / "out").rglob("*") if path.is_file()}
     assert set(data["files"]) == written
     assert strapgen_says("generate --all --check --out out").endswith(f"{len(written)} files, in step\n")

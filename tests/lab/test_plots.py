@@ -33,6 +33,7 @@ from strapgen.lab.simulate.runs_plot import history_image, run_image
 from strapgen.lab.simulate.runs_report import HistoryResult, RunResult
 from strapgen.navigation.rate_table.rate_table import Row
 from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
+from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 from strapgen.results import figures as drawing
 from strapgen.thesis.predicted_tables import PredictedEntry
 from strapgen.thesis.predicted_tables_report import PredictedTablesResult
@@ -306,7 +307,7 @@ def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures)
         for backend, column in drifts.items()
         for name, drift in zip(names, column, strict=True)
     ]
-    rate_table_image(rows, "20", "0.01", "rate.png")
+    rate_table_image(RateTableResult(rows, "20", "0.01"), "rate.png")
     (figure,) = figures
     for axes, motion in zip(figure.axes, ("linear", "oscillating"), strict=True):
         assert axes.get_title(loc="left").startswith(motion)

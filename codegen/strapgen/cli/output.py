@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -17,7 +15,6 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.suggestions import alternatives
 
 if TYPE_CHECKING:
-    from strapgen.results.report import Report
     from strapgen.results.result import Result
 
 _TABLE = ("text", "json", "csv", "markdown", "latex")
@@ -110,13 +107,6 @@ class Output:
         text = result.written(self.format or "text")
         self.deliver(text, None if self.plot is None else plot(result, self.plot))
 
-    def report(self, report: Report, image: Callable[[Path], bytes] | bytes | None = None) -> None:
-        """Deliver a report in the format of the options; `image` is called with the file of --plot, if there is one."""
-        text = report.written(self.format or "text")
-        if callable(image):
-            image = None if self.plot is None else image(self.plot)
-        self.deliver(text, image)
-
     def deliver(self, text: str, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr names those written."""
         from strapgen.storage.files import write_files
@@ -146,10 +136,3 @@ def check_format(value: str) -> str:
 def show(result: Result, format: str) -> None:
     """Print the result of a command that writes source files."""
     typer.echo(result.written(format).rstrip("\n"))
-
-
-def print_json(data: Any) -> None:
-    """Print data as JSON."""
-    from strapgen.results.report import as_json
-
-    sys.stdout.write(as_json(data) + "\n")

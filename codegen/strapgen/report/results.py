@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from strapgen.cli.generated_result import GeneratedSources, GenerateResult
 from strapgen.design.frontier.frontier import Standing
 from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir import checks
@@ -17,8 +18,7 @@ from strapgen.lab.simulate.runs_report import RunResult, step_facts
 from strapgen.report.conditions import Conditions
 from strapgen.report.dossier import REFERENCE, AlgorithmDossier, StepRuns, run_settings
 from strapgen.report.gathering import motions
-from strapgen.results.display.formulas import formulas_report
-from strapgen.run.generation import generated_data
+from strapgen.results.display.formulas import KernelResult
 from strapgen.targets import contract
 from strapgen.thesis.tables_report import ThesisTablesResult
 from strapgen.thesis.thesis_tables import TableEntry
@@ -49,13 +49,13 @@ def arguments(known: AlgorithmDossier) -> str:
 
 def of_algorithm(known: AlgorithmDossier, conditions: Conditions) -> dict[str, CommandResult]:
     """Return the results of one algorithm by the names of the commands; `generate` is that of fixed point."""
-    formulas = formulas_report(known.kernel, known.program, "operations")
+    formulas = KernelResult.of(known.kernel, known.program, "operations")
     derive = f"strapgen derive {arguments(known)} --show operations {_JSON}"
     results = {"derive": CommandResult(derive, formulas.data())}
     if known.fixed is not None:
         command = f"{contract.command(known.fixed, 'c-fixed')} {_JSON}"
-        data = generated_data(known.choice, known.sources["c-fixed"], "c-fixed", ())
-        results["generate"] = CommandResult(command, data)
+        generated = GeneratedSources.of(known.choice, known.sources["c-fixed"], "c-fixed", ())
+        results["generate"] = CommandResult(command, GenerateResult([generated]).data())
     if known.runs is not None:
         results |= _of_runs(known, known.runs, conditions)
     return results

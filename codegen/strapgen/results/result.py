@@ -24,6 +24,8 @@ class Result(Record):
     #: The dataclass of each, if the command answers for several algorithms or targets: JSON has their list under
     #: the key results, and beside it the keys of the first where it is alone
     each: ClassVar[type | None] = None
+    #: The field that has the rows; "" for a result without tables, or one that has a method for them
+    rows_in: ClassVar[str] = ""
     #: The function "module:name" of a result and a file that returns the image; "" for none
     drawn_by: ClassVar[str] = ""
     #: Whether JSON has a line for each part
@@ -35,7 +37,7 @@ class Result(Record):
 
     def rows(self) -> Any:
         """Return the sequence of the records of its tables; None if it has no tables."""
-        return None
+        return getattr(self, self.rows_in) if self.rows_in else None
 
     def results(self) -> Sequence[Any]:
         """Return the records of a result with `each`."""

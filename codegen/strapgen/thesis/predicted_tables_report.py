@@ -50,14 +50,11 @@ def predicted_text(entries: Sequence[PredictedEntry]) -> str:
 class PredictedTablesResult(Result):
     """The tables of the thesis as the series predict them, and the ratios that the thesis reads from them."""
 
+    rows_in = "entries"
     drawn_by = "strapgen.thesis.tables_plot:predicted_tables_image"
 
     entries: Sequence[PredictedEntry]
     ratios: Sequence[Claim]
-
-    def rows(self) -> Sequence[PredictedEntry]:
-        """Return the figures."""
-        return self.entries
 
     def text(self) -> str:
         """Return the tables and the ratios."""

@@ -19,13 +19,10 @@ _WIDTH = 100
 class StatementsResult(Result):
     """What the text of the thesis says, and what runs say of it: a row for each statement."""
 
+    rows_in = "statements"
     row = Statement
 
     statements: Sequence[Statement]
-
-    def rows(self) -> Sequence[Statement]:
-        """Return the statements."""
-        return self.statements
 
     def reader(self) -> TextTable:
         """Return the statements in words."""

@@ -56,14 +56,11 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
 class ThesisTablesResult(Result):
     """The tables of the thesis beside simulations: a row for each figure and back end."""
 
+    rows_in = "entries"
     row = TableEntry
     drawn_by = "strapgen.thesis.tables_plot:thesis_tables_image"
 
     entries: Sequence[TableEntry]
-
-    def rows(self) -> Sequence[TableEntry]:
-        """Return the figures."""
-        return self.entries
 
     def text(self) -> str:
         """Return one table after the other."""

@@ -29,13 +29,10 @@ _NOTES = (
 class OverviewResult(Result):
     """Orders, leading errors and operations side by side: a row for each algorithm and method."""
 
+    rows_in = "algorithms"
     row = OverviewRow
 
     algorithms: Sequence[OverviewRow]
-
-    def rows(self) -> Sequence[OverviewRow]:
-        """Return the algorithms."""
-        return self.algorithms
 
     def reader(self) -> TextTable:
         """Return what fits side by side."""

@@ -17,14 +17,11 @@ from strapgen.results.table import TextTable
 class StabilityResult(Result):
     """The growth of states in steps at a constant rate: a row for each step."""
 
+    rows_in = "steps"
     row = Stability
     drawn_by = "strapgen.analysis.growth.growth_plot:stability_image"
 
     steps: Sequence[Stability]
-
-    def rows(self) -> Sequence[Stability]:
-        """Return the steps."""
-        return self.steps
 
     def table(self) -> TextTable:
         """Return the steps as a table."""

@@ -247,6 +247,8 @@ class DriftRow:
 class ShapedResult(Result):
     """Coning coefficients for a band or a spectrum, and their drift; the coefficients are text, exact."""
 
+    rows_in = "drift"
+
     shaped: ShapedDrift = field(metadata=INTERNAL)
     name: str
     title: str
@@ -290,10 +292,6 @@ class ShapedResult(Result):
             figures=drift.figures(),
             drift=[DriftRow(*row) for row in drift.rows],
         )
-
-    def rows(self) -> list[DriftRow]:
-        """Return the drift over frequency."""
-        return self.drift
 
     def text(self) -> str:
         """Return the coefficients, and what they reach."""

@@ -24,6 +24,7 @@ def finding_text(finding: Finding) -> str:
 class FindingsResult(Result):
     """What was found of an attitude step."""
 
+    rows_in = "findings"
     computed = properties(holds=entry())
 
     kernel: str
@@ -34,10 +35,6 @@ class FindingsResult(Result):
     def holds(self) -> bool:
         """Whether the step does all that is required."""
         return all(finding.holds is not False for finding in self.findings)
-
-    def rows(self) -> Sequence[Finding]:
-        """Return the findings."""
-        return self.findings
 
     def text(self) -> str:
         """Return the findings, a line each."""

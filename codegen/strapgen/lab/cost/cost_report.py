@@ -26,15 +26,12 @@ function and of the deepest function of its file that it calls.
 class CostResult(Result):
     """What kernels cost on microcontrollers: a row for each kernel and processor."""
 
+    rows_in = "costs"
     row = Cost
 
     costs: Sequence[Cost]
     #: Whether they are all of the standard catalogue, which is a page in Markdown
     of_catalogue: bool = False
-
-    def rows(self) -> Sequence[Cost]:
-        """Return the costs."""
-        return self.costs
 
     def table(self) -> TextTable:
         """Return the numbers without the compiler."""

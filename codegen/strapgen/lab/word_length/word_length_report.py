@@ -44,14 +44,11 @@ def by_method_step_and_pulse(outcomes: Sequence[Outcome]) -> dict[tuple[str, str
 class WordLengthResult(Result):
     """Drift against word length, with its parts: a row for each run."""
 
+    rows_in = "outcomes"
     row = Outcome
     drawn_by = "strapgen.lab.word_length.word_length_plot:word_length_image"
 
     outcomes: Sequence[Outcome]
-
-    def rows(self) -> Sequence[Outcome]:
-        """Return the outcomes."""
-        return self.outcomes
 
     def text(self) -> str:
         """Return a table for each method, step and pulse, with a row for each word and carry."""

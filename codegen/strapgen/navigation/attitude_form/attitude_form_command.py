@@ -80,10 +80,7 @@ def study_attitude_form(
 
     from strapgen.lab.cost import cost
     from strapgen.navigation.attitude_form import attitude_form as forms
-    from strapgen.navigation.attitude_form.attitude_form_report import (
-        attitude_form_image,
-        attitude_form_report,
-    )
+    from strapgen.navigation.attitude_form.attitude_form_report import FormResult
 
     numbers = {"navigation-hz": navigation_hz, "orthonormalize-hz": orthonormalize_hz}
     values = {name: float(checks.number(name, text)) for name, text in numbers.items()}
@@ -100,4 +97,4 @@ def study_attitude_form(
     settings = fixed.settings(1) if cpu else None
     costs = forms.part_costs(which, rates, cpu or "", settings)
     study = forms.FormStudy(rates, tuple(track(costs, "counting", len(which))), loss, cpu or "")
-    output.report(attitude_form_report(study), lambda path: attitude_form_image(study, path))
+    output.show(FormResult.of(study))

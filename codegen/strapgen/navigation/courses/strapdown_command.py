@@ -58,8 +58,7 @@ def strapdown(
     import numpy as np
 
     from strapgen.lab.recordings import recording
-    from strapgen.navigation.courses.course_plot import course_image
-    from strapgen.navigation.courses.course_report import course_report
+    from strapgen.navigation.courses.course_report import CourseResult
     from strapgen.navigation.courses.courses import course
 
     fixed.check_backend(backend)
@@ -86,6 +85,4 @@ def strapdown(
     facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
     title = f"{facts['algorithm']}, {backend}: {increments.name}"
-    replace(output, format=format).report(
-        course_report(covered, facts), lambda path: course_image(covered, title, path)
-    )
+    replace(output, format=format).show(CourseResult(facts, covered, title))

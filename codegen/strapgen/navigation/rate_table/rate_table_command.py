@@ -51,8 +51,7 @@ def rate_table(
     """
     output.check()
     from strapgen.navigation.rate_table import rate_table as experiment
-    from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
-    from strapgen.navigation.rate_table.rate_table_report import rate_table_report
+    from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 
     names = experiment.ALGORITHMS if algorithm is None else listed("--algorithm", algorithm)
     places = backends("--backend", backend, experiment.DEFAULT_BACKENDS)
@@ -60,7 +59,4 @@ def rate_table(
     count = len(list(experiment.cases(names, places, methods)))
     runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1), methods)
     rows = list(track(runs, "running", count))
-    output.report(
-        rate_table_report(rows, duration, sample),
-        lambda path: rate_table_image(rows, duration, sample, path),
-    )
+    output.show(RateTableResult(rows, duration, sample))

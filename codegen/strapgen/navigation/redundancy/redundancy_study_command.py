@@ -62,7 +62,7 @@ def study_redundancy(
     from strapgen.navigation.redundancy.geometry_file import read
     from strapgen.navigation.redundancy.parity_equations import HEXAD_SET
     from strapgen.navigation.redundancy.redundancy_study import SensorErrors, redundancy_study, study_steps
-    from strapgen.navigation.redundancy.redundancy_study_report import redundancy_image, redundancy_report
+    from strapgen.navigation.redundancy.redundancy_study_report import RedundancyResult
 
     stated = pairs(settings or [])
     for key in stated:
@@ -74,6 +74,4 @@ def study_redundancy(
     sensors = HEXAD_SET if file is None else read(file)
     steps = redundancy_study(sensors, errors, count, number, backend)
     rows = list(track(steps, "running", len(study_steps(sensors.geometry))))
-    output.report(
-        redundancy_report(sensors, errors, rows), lambda path: redundancy_image(sensors, rows, path)
-    )
+    output.show(RedundancyResult(sensors, errors, rows))

@@ -80,7 +80,7 @@ def study_system(
 
     from strapgen.analysis.vibration.spectrum import read_spectrum
     from strapgen.navigation.systems.system_study import study
-    from strapgen.navigation.systems.system_study_report import system_study_report
+    from strapgen.navigation.systems.system_study_report import SystemStudyResult
     from strapgen.navigation.systems.turning_vehicle import TurningVehicle
     from strapgen.navigation.systems.wiring import described
     from strapgen.run.backends import BACKENDS
@@ -92,4 +92,4 @@ def study_system(
     seconds = checks.number("duration", duration, positive=True)
     vehicle = TurningVehicle(latitude, turning, None if spectrum is None else read_spectrum(spectrum))
     result = study(described(file, rate), vehicle, seconds, names, fixed.settings(1), cpu or "")
-    output.report(system_study_report(result))
+    output.show(SystemStudyResult.of(result))

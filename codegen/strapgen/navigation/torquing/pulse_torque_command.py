@@ -37,7 +37,7 @@ def study_pulse_torque(
     """
     output.check()
     from strapgen.navigation.torquing.torquing import TorqueLoop
-    from strapgen.navigation.torquing.torquing_report import torquing_image, torquing_report
+    from strapgen.navigation.torquing.torquing_report import TorquingResult
     from strapgen.navigation.torquing.torquing_study import PRINTED, torquing_rows
 
     kinds = {
@@ -55,4 +55,4 @@ def study_pulse_torque(
     loop = TorqueLoop(**stated)
     loop.require_stable()
     rows = list(track(torquing_rows(loop), "running", len(PRINTED)))
-    output.report(torquing_report(loop, rows), lambda path: torquing_image(loop, path))
+    output.show(TorquingResult(loop, rows))
