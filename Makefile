@@ -8,7 +8,7 @@ TOOLS := .venv/.ready-to-test
 BENCH := .venv-bench/.ready
 DOCS := .venv/.ready-for-docs
 
-.PHONY: help demo test test-lowest test-long test-modules mutants check bench generate clean \
+.PHONY: help demo test test-lowest test-long mutants check bench generate clean \
   check-generated check-style check-layout check-types check-prose firmware-tools cost evidence evidence-page \
   evidence-tools language-tools site-tools faults fuzz release-check docs docs-serve docs-check
 
@@ -17,7 +17,6 @@ help:
 	@echo "make test      set up, with what tests need; run the test suite"
 	@echo "make test-lowest  the same with the lowest versions that pyproject.toml allows, in .venv-lowest"
 	@echo "make test-long the tests that take long: more words, roundings, methods and motions, long runs"
-	@echo "make test-modules  list anew which compiled kernels the tests load"
 	@echo "make mutants   put the written faults and 240 drawn ones into copies of the code; half an hour a run, which goes on where the last one stopped"
 	@echo "make check     generated code in step, ruff, mypy, spelling and prose"
 	@echo "make bench     measure against other code generators, and the back ends; about a quarter of an hour"
@@ -109,15 +108,6 @@ test-lowest:
 
 test-long: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
-
-# What is listed already is compiled together; what the tests load is listed.
-test-modules: $(TOOLS)
-	for which in "not long" long; do \
-	  folder=$$(mktemp -d) && STRAPGEN_CACHE_DIR=$$folder/cache $(BIN)/python -m pytest -n auto --dist worksteal \
-	    -m "$$which" --record-modules $$folder/modules || exit 1; \
-	  case $$which in long) file=modules-long ;; *) file=modules ;; esac; \
-	  sort -u $$folder/modules > tests/data/$$file.jsonl && rm -r $$folder; \
-	done
 
 # It goes on where it was stopped: the outcomes are in .mutants/. More with MUTANTS="--only rotations --list", see --help.
 mutants: $(TOOLS)

@@ -19,18 +19,7 @@ from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import (
-    IntegerDefinition,
-    IntegerInput,
-    IntegerMaximum,
-    IntegerQuotient,
-    IntegerRoot,
-    IntegerSelection,
-    IntegerSum,
-    Scaled,
-    Term,
-    Value,
-)
+from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Scaled, Term, Value, cases_of
 
 #: Bounds are rounded up to numbers of so many bits below the point, a few times each.
 GRID = Fraction(1, 1 << 150)
@@ -76,7 +65,7 @@ def context(
         quantities.items[name] = Quantity(name, InputElement(name), zero, exact)
         top = max(abs(value.low), abs(value.high))
         values[name] = Value(
-            name, IntegerInput(), value.fraction, value.wide, value.low, value.high, zero, value.error, top
+            name, None, value.fraction, value.wide, value.low, value.high, zero, value.error, top
         )
     quantities.items |= {item.name: item for item in items}
     plan = FormatPlan((), values, forced or {}, frozenset({*words, *(forced or {})}))
@@ -146,24 +135,24 @@ def _partial(terms: Sequence[int]) -> list[int]:
 
 
 def computed(
-    definition: IntegerDefinition, integers: Mapping[str, int], nearest: bool
+    definition: IntegerSum | IntegerOperation, integers: Mapping[str, int], nearest: bool
 ) -> tuple[int, list[int]]:
     """Return the integer that the code computes, and the sizes of the integers on the way."""
     match definition:
         case IntegerSum():
             return _sum(definition, integers, nearest)
-        case IntegerQuotient(numerator, denominator):
+        case IntegerOperation("divide", (numerator, denominator)):
             top = _scaled(numerator, integers)
-            size = _quotient(Fraction(top, integers[denominator]), nearest)
+            size = _quotient(Fraction(top, _scaled(denominator, integers)), nearest)
             return size, [abs(top)]
-        case IntegerRoot(argument):
+        case IntegerOperation("sqrt", (argument,)):
             square = _scaled(argument, integers)
             root = math.isqrt(square)
             return root + (nearest and square - root * root > root), [square]
-        case IntegerMaximum(arguments):
+        case IntegerOperation("maximum", arguments):
             return max(_scaled(argument, integers) for argument in arguments), []
-        case IntegerSelection(cases, otherwise):
-            for left, right, result in cases:
+        case IntegerOperation("select", (*_, otherwise) as arguments):
+            for left, right, result in cases_of(arguments):
                 if _scaled(left, integers) >= _scaled(right, integers):
                     return _scaled(result, integers), []
             return _scaled(otherwise, integers), []

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import OPERATIONS, Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.exact import FUNCTIONS
@@ -33,7 +34,7 @@ def program(body: Mapping[str, Node], bounds: Mapping[str, Fraction | int], resu
     inputs = tuple(Signal.scalar(name, bound=Fraction(bound)) for name, bound in bounds.items())
     output = Result(Signal.scalar("out"), (Reference(result),))
     assignments = tuple(Assignment(name, value) for name, value in body.items())
-    return Program("small", "small", "small", "", "", (), inputs, assignments, (output,))
+    return Program(KernelInfo("small", "small", ""), inputs, assignments, (output,))
 
 
 def _fraction(value: mpmath.mpf) -> Fraction:

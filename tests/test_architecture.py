@@ -12,7 +12,6 @@ from pathlib import Path
 
 import grimp
 import pytest
-from gathering import each
 from without_applications import APPLICATIONS
 
 from strapgen import registration
@@ -175,7 +174,7 @@ def test_only_the_front_door_composes_stages():
     assert not offenders, "\n".join(offenders)
 
 
-@each(
+@pytest.mark.parametrize(
     "text",
     [
         "from strapgen.catalogue import derive",
@@ -227,7 +226,9 @@ def test_one_module_lays_out_tables():
     assert not offenders, "\n".join(offenders)
 
 
-@each("text", ["name.ljust(3)", "f'{x:>10.3e}'", "f'{x:<{width}}'", "f'{x:{align}{width}}'", "w.writerow(r)"])
+@pytest.mark.parametrize(
+    "text", ["name.ljust(3)", "f'{x:>10.3e}'", "f'{x:<{width}}'", "f'{x:{align}{width}}'", "w.writerow(r)"]
+)
 def test_a_layout_is_seen(text):
     assert list(layouts(ast.parse(text)))
     assert not list(layouts(ast.parse("f'{x:.3e} {x:+.2%} {x:{spec}}'")))

@@ -33,6 +33,7 @@ FAULTY = {
 }
 
 
+@pytest.mark.long
 def test_a_good_page_has_no_fault(browser, tmp_path):
     page = tmp_path / "page.html"
     page.write_text(HEAD + GOOD)
@@ -41,6 +42,7 @@ def test_a_good_page_has_no_fault(browser, tmp_path):
         assert not faults(browser, f"{address}/page.html")
 
 
+@pytest.mark.long
 def test_every_fault_is_seen(browser, tmp_path):
     page = tmp_path / "page.html"
     page.write_text(f"{HEAD}<body>{''.join(FAULTY)}")
@@ -50,6 +52,7 @@ def test_every_fault_is_seen(browser, tmp_path):
     assert len(lines) >= len(FAULTY)
 
 
+@pytest.mark.long
 def test_a_fault_of_one_width_alone_is_reported_with_it(browser, tmp_path):
     page = tmp_path / "page.html"
     page.write_text(f"{HEAD}<body style='margin:0'><p style='width:900px'>as wide as a table")

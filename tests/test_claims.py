@@ -18,28 +18,11 @@ from tolerances import certified, roundoff
 import strapgen
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.simulate.runs import simulate
-from strapgen.run.backends import BACKENDS
-from strapgen.run.compiler import COMPILERS
-from strapgen.targets import BUILT_IN
 
 #: Every combination has its own number in the source.
 pytestmark = pytest.mark.every_combination
 
 ORDERS = (1, 2, 3, 4)
-
-#: C++ and Rust have the bits of C, in fixed point too, as tests/targets holds of kernels and tests/backends of runs:
-#: what holds of the C holds of them.
-CLAIMED = [
-    pytest.param(name, marks=pytest.mark.long) if name in ("c-float", "c-fixed16", "fixed-model") else name
-    for name, entry in BACKENDS.items()
-    if entry.target not in BUILT_IN or BUILT_IN[entry.target].language not in COMPILERS
-]
-
-
-@pytest.fixture(params=CLAIMED)
-def backend_name(request: pytest.FixtureRequest) -> str:
-    """Name of a back end: a claim is tried on every one."""
-    return str(request.param)
 
 
 def lost(order: int, x: float, algorithm: str) -> float:

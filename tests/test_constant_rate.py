@@ -7,7 +7,6 @@ import derived
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from sympy.polys.ring_series import rs_integrate, rs_mul, rs_series_inversion
 from sympy.polys.rings import PolyElement
 
@@ -85,7 +84,7 @@ def test_the_loss_is_that_of_a_truncated_exponential(method):
         assert sp.expand(cosine + sp.I * sine - sum(powers)) == 0
 
 
-@each(
+@pytest.mark.parametrize(
     ("method", "printed"),
     [
         ("rk1", sp.Rational(1, 4) + 9 * X**2 / 80),

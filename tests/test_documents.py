@@ -25,7 +25,7 @@ from strapgen.catalogue import METHODS, Choice
 from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.cli import app, main
-from strapgen.run import octave_process, standard_tree
+from strapgen.run import octave, standard_tree
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "paths").glob("*.md")])
@@ -361,7 +361,7 @@ def test_a_command_of_a_page(command, workplace, capsys, monkeypatch):
     for program in [compiler[1], *needed] if compiler else needed:
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not on this machine")
-    if "octave" in command and (reason := octave_process.missing()):
+    if "octave" in command and (reason := octave.missing()):
         pytest.skip(reason)
     if command.startswith("strapgen generate --all"):  # of all, in tests/targets
         few = [derived.program(Choice("euler", "rk4", 2))]

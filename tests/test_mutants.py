@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import ast
-import json
-import random
+import time
 import tomllib
-from dataclasses import replace
 from functools import cache
 from itertools import accumulate
 from pathlib import Path
 
-import execution_map
 import mutants
 import mutation_operators
 import pytest
-from chosen_tests import ordered
-from gathering import each
+from coverage import CoverageData
 from mutation_operators import Site
 
 SOURCE = '''\
@@ -133,108 +129,61 @@ def test_shares_are_in_proportion_and_none_is_empty():
     assert mutation_operators._shares({"a": 1, "b": 900, "c": 99}, 13) == {"a": 1, "b": 10, "c": 2}
 
 
-def test_a_line_belongs_to_the_innermost_block():
-    assert execution_map.block_of_line(SOURCE, 6) == 3
-    assert execution_map.block_of_line(SOURCE, 8) == 8
-    assert execution_map.block_of_line(SOURCE, 2) is None
-
-
-def test_probes_tell_what_runs(monkeypatch):
-    blocks: set[int] = set()
-    values: dict[str, object] = {execution_map._PROBE: blocks.add, "g": max}
-    exec(compile(execution_map._probed(SOURCE, 100), "f.py", "exec"), values)
-    assert values["f"](1) == "no"
-    assert blocks == {103}
-    assert values["f"].__doc__ == "Return 1 + 1."
-    with pytest.raises(ValueError):
-        values["f"](0)
-    assert blocks == {103, 105}
-
-
 @pytest.fixture
-def tests() -> list[mutants.MappedTest]:
-    base = execution_map._LINES
-    return [
-        mutants.MappedTest("tests/b/test_g.py::test_far", 0.1, frozenset({base + 3})),
-        mutants.MappedTest("tests/b/test_f.py::test_mirrored", 0.1, frozenset({base + 3, base + 8})),
-        mutants.MappedTest("tests/b/test_f.py::test_narrow", 0.1, frozenset({base + 3})),
-        mutants.MappedTest("tests/b/test_f.py::test_other", 0.1, frozenset({base + 5})),
-        mutants.MappedTest("tests/c/test_h.py::test_elsewhere", 0.1, frozenset({2 * base + 3})),
-    ]
+def executed(tmp_path) -> CoverageData:
+    data = CoverageData(str(tmp_path / "coverage"))
+    for test, lines in {
+        "": [1],
+        "tests/b/test_g.py::test_far|run": [6],
+        "tests/b/test_f.py::test_mirrored[1]|run": [6, 8],
+        "tests/b/test_f.py::test_mirrored[2]|setup": [6],
+        "tests/c/test_h.py::test_elsewhere|run": [9],
+    }.items():
+        data.set_context(test)
+        data.add_lines({"codegen/strapgen/b/f.py": lines})
+    return data
 
 
-def test_the_tests_of_a_line_execute_it_and_the_nearest_come_first(tests):
-    numbers = {"codegen/strapgen/b/f.py": 1}
-
+def test_the_tests_of_a_line_execute_it_and_the_nearest_come_first(executed):
     def names(line: int) -> list[str]:
-        chosen = mutants.executing_tests("codegen/strapgen/b/f.py", line, SOURCE, tests, numbers)
-        return [test.name.partition("::")[2] for test in chosen]
+        found = mutants.executing(executed, "codegen/strapgen/b/f.py", line)
+        return [test.partition("::")[2] for test in found]
 
-    assert names(6) == ["test_narrow", "test_mirrored", "test_far"]
+    assert names(6) == ["test_mirrored", "test_far"]
     assert names(8) == ["test_mirrored"]
-    assert set(names(1)) == {"test_narrow", "test_mirrored", "test_far", "test_other"}  # when it is imported
+    assert names(1) == ["test_mirrored", "test_far", "test_elsewhere"]  # when it is imported
 
 
-def test_the_first_session_has_two_cases_of_every_function_before_more(tests):
-    cases = [mutants.MappedTest(f"tests/b/test_f.py::test_x[{k}]", 0.1, frozenset()) for k in range(4)]
-    names = [test.name.partition("::")[2] for test in mutants.first_of([*cases, *tests])]
-    assert names[:3] == ["test_x[0]", "test_x[1]", "test_far"]
-    assert names[-2:] == ["test_x[2]", "test_x[3]"]
-    long = mutants.MappedTest("tests/b/test_f.py::test_long", 2.0 * mutants.FIRST_S, frozenset())
-    assert mutants.first_of([long, *tests]) == mutants.first_of(tests)
-
-
-def test_the_second_session_begins_with_the_files_whose_tests_execute_most(tests):
-    wide = mutants.MappedTest("tests/w.py::test_all", 1.0, frozenset(range(50)))
-    narrow = mutants.MappedTest("tests/w.py::test_one", 1.0, frozenset())
-    session = mutants.second_of([*tests, narrow, wide])
-    assert session[:2] == [narrow, wide]
-    assert set(session) == {*tests, narrow, wide}
-
-
-def test_chosen_tests_come_in_their_order_and_others_after_them():
-    names = list("abcde")
-    assert ordered(names, {"first": ["d", "x", "b"], "without": ["c"], "others": True}) == [
-        "d",
-        "b",
-        "a",
-        "e",
-    ]
-    assert ordered(names, {"first": ["d", "b"], "without": [], "others": False}) == ["d", "b"]
-
-
-@each(
-    ("status", "by"),
+@pytest.mark.parametrize(
+    ("status", "said", "result"),
     [
-        (0, None),
-        (5, None),
-        (1, "t::failed"),
-        (None, "time or memory, in t::running"),
-        (-11, "signal 11, in t::running"),
+        (0, "1 passed", ("passed", "")),
+        (5, "no tests ran", ("passed", "")),
+        (4, "ERROR: not found: tests/a.py::test_b", ("passed", "")),
+        (4, "ImportError while loading conftest", ("failed", "status 4")),
+        (1, "x\nFAILED tests/a.py::test_b[1 - 2] - assert 1\n", ("failed", "tests/a.py::test_b[1")),
+        (2, "ERROR tests/a.py\n", ("failed", "tests/a.py")),
+        (-11, "", ("failed", "status -11")),
     ],
 )
-def test_a_fault_is_noticed_by_a_failure_a_crash_or_a_test_without_end(status, by):
-    assert mutants.verdict(status, "t::failed", "t::running") == by
+def test_a_fault_is_noticed_by_a_failure_a_crash_or_an_import(status, said, result):
+    assert mutants.verdict(status, said) == result
 
 
 def test_the_requirement_is_all_written_and_most_drawn_faults():
     def fault(part: str, number: int) -> mutants.Fault:
-        return mutants.Fault(part, Site("f.py", number, number, "", "sign"), number, f"a{number}", "b")
+        return mutants.Fault(part, Site("f.py", number, number, "", "sign"), number, f"{part}{number}", "b")
 
     draw = mutants.DRAWS["random"]
     listed = [fault("seeded", k) for k in range(2)] + [fault("random", k) for k in range(draw.count)]
-    outcomes = {f.key: mutants.Outcome(f.key, "caught", "a test", 1.0) for f in listed}
-    assert mutants.summary(listed, outcomes)[1]
-    spared = random.Random(0).sample(listed[2:], draw.count - draw.least)
-    few = outcomes | {f.key: mutants.Outcome(f.key, "survived", "", 9.0) for f in spared}
+    caught = {f.key: ("caught", "a test") for f in listed}
+    few = caught | {f.key: ("survived", "") for f in listed[2 + draw.least :]}
     lines, met = mutants.summary(listed, few)
     assert met
-    assert sum("survived" in line for line in lines) == len(spared)
-    assert "a test" in mutants.table(listed, few)
-    for fault_too_many in (listed[0], next(f for f in listed[2:] if f not in spared)):
-        del few[fault_too_many.key]
-        assert not mutants.summary(listed, few)[1]
-        few[fault_too_many.key] = outcomes[fault_too_many.key]
+    assert sum("survived" in line for line in lines) == draw.count - draw.least
+    for fault_too_many in listed[1:3]:
+        known = {key: outcome for key, outcome in few.items() if key != fault_too_many.key}
+        assert not mutants.summary(listed, known)[1]
 
 
 def test_tests_that_read_the_lists_of_faults_notice_none():
@@ -242,39 +191,30 @@ def test_tests_that_read_the_lists_of_faults_notice_none():
     assert f"--ignore={mutants.ABOUT_FAULTS}" in mutants.command(["-x"])
 
 
-def test_a_fault_is_put_into_a_copy_and_taken_out_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(mutants, "ROOT", tmp_path / "root")
-    for folder in ("root", "copy"):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "f.py").write_text(SOURCE)
-    place = SOURCE.index("x + (y")
-    fault = mutants.Fault("seeded", Site("f.py", place, place + 5, "x - (", "sign"), 6, "", "")
-    copy = tmp_path / "copy" / "f.py"
-    mutants.put(tmp_path / "copy", fault, 1)
-    first = copy.stat().st_mtime_ns
-    assert "x - (y" in copy.read_text()
-    mutants.take_out(tmp_path / "copy", fault, 2)
-    assert copy.read_text() == SOURCE == (tmp_path / "root" / "f.py").read_text()
-    assert copy.stat().st_mtime_ns // 10**9 != first // 10**9
-
-
-def test_a_fault_meets_first_what_noticed_it_before_in_whatever_line_it_stands(tests, tmp_path, monkeypatch):
-    monkeypatch.setattr(mutants, "ROOT", tmp_path)
-    file = "codegen/strapgen/b/f.py"
-    (tmp_path / file).parent.mkdir(parents=True)
-    (tmp_path / file).write_text(SOURCE)
-    place = SOURCE.index("x + (y")
-    fault = mutants.Fault("seeded", Site(file, place, place + 5, "x - (", "sign"), 6, "x + (y", "x - (y")
-    first, *_ = mutants.sessions_of(fault, tests, {file: 1}, "tests/c/test_h.py::test_elsewhere")
-    assert first.tests[0].name == "tests/c/test_h.py::test_elsewhere"
-    assert len(first.tests) == len(set(first.tests)) > 1
-    state = tmp_path / "state"
-    (tmp_path / "noticed.jsonl").write_text(
-        json.dumps({"fault": fault.lasting_key, "test": "t::last"}) + "\n"
-    )
-    moved = replace(fault, line=60)
-    assert mutants.noticed_before(state)[moved.lasting_key] == "t::last"
-    assert mutants.noticed_before(tmp_path / "other" / "state") == {}
+@pytest.mark.long
+@pytest.mark.parametrize(("text", "outcome"), [("return 2", "caught"), ("return 1 + 0", "survived")])
+def test_a_fault_is_put_into_a_copy_and_noticed_or_not(text, outcome, tmp_path, monkeypatch):
+    root = tmp_path / "root"
+    files = {
+        "codegen/strapgen/__init__.py": "",
+        "codegen/strapgen/f.py": "def f():\n    return 1\n",
+        "tests/test_f.py": "from strapgen import f\ndef test_f():\n    assert f.f() == 1\n",
+        "pyproject.toml": "[tool.pytest.ini_options]\nmarkers = ['long']\n"
+        "[tool.coverage.run]\nrelative_files = true\n",
+    }
+    for name, content in files.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(content)
+    monkeypatch.setattr(mutants, "ROOT", root)
+    monkeypatch.setattr(mutants, "_files", lambda: [*files])
+    start = files["codegen/strapgen/f.py"].index("return 1")
+    fault = mutants.Fault.of("seeded", Site("codegen/strapgen/f.py", start, start + 8, text, "term"))
+    (tmp_path / "state").mkdir()
+    runner = mutants.Runner(tmp_path / "state", ["tests"], time.monotonic() + 300)
+    mutants.run_all(runner, [fault], 1)
+    by = "tests/test_f.py::test_f" if outcome == "caught" else ""
+    assert mutants.outcomes(runner.state) == {fault.key: (outcome, by)}
+    assert (runner.folder / "copy0" / "codegen/strapgen/f.py").read_text() == files["codegen/strapgen/f.py"]
 
 
 @pytest.mark.long

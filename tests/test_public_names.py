@@ -13,7 +13,6 @@ import venv
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.kernel import evaluation, rotations
@@ -129,7 +128,7 @@ def test_every_public_name_is_on_the_page_of_the_api():
     assert [name for name in strapgen.__all__ if not re.search(rf"\b{name}\b", page)] == []
 
 
-@each("page", ["docs/python-api.md", "docs/own-algorithms.md", "README.md", "examples"])
+@pytest.mark.parametrize("page", ["docs/python-api.md", "docs/own-algorithms.md", "README.md", "examples"])
 def test_pages_and_examples_need_no_module_but_the_package(page):
     paths = sorted((ROOT / page).glob("*.py")) if page == "examples" else [ROOT / page]
     for path in paths:

@@ -87,6 +87,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "RoundingBounds": lambda: strapgen.rounding_bounds(program()),
     "Format": lambda: strapgen.Format(32, 30),
     "FixedProgram": lambda: strapgen.quantize(program()),
+    "KernelInfo": lambda: program().info,
     "Program": program,
     "Recursion": lambda: strapgen.derive("coning-fast").recursion,
     "Signal": lambda: kernel().inputs[1],

@@ -11,7 +11,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-import session_library
 
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.storage import resources
@@ -29,13 +28,10 @@ def run(*command: str | Path, cwd: Path, environment: dict[str, str] | None = No
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    checkout = resources.checkout()
+    checkout, folder = resources.checkout(), tmp_path_factory.mktemp("wheel")
     assert checkout is not None, "the tests run from a checkout"
-
-    def fill(folder: Path) -> None:
-        run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, checkout, cwd=folder)
-
-    (built,) = session_library.place(tmp_path_factory, "wheel", fill).glob("strapgen-*.whl")
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, checkout, cwd=folder)
+    (built,) = folder.glob("strapgen-*.whl")
     return built
 
 
@@ -73,14 +69,12 @@ def test_the_source_archive_has_what_a_wheel_is_built_from(tmp_path):
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory):
     """Return a function that runs the strapgen of a clean environment, in a folder of its own."""
 
-    def fill(folder: Path) -> None:
-        venv.create(folder / "venv")
-        # The pip of this environment works on the other: nothing is compiled but what is imported.
-        pip = [sys.executable, "-m", "pip", "--python", folder / "venv" / "bin" / "python"]
-        run(*pip, "install", "--quiet", "--no-compile", wheel, cwd=folder)
-        (folder / "home").mkdir()
-
-    folder = session_library.place(tmp_path_factory, "installed", fill)
+    folder = tmp_path_factory.mktemp("installed")
+    venv.create(folder / "venv")
+    # The pip of this environment works on the other: nothing is compiled but what is imported.
+    pip = [sys.executable, "-m", "pip", "--python", folder / "venv" / "bin" / "python"]
+    run(*pip, "install", "--quiet", "--no-compile", wheel, cwd=folder)
+    (folder / "home").mkdir()
     binaries, home = folder / "venv" / "bin", folder / "home"
     kept = {name: os.environ[name] for name in ("PATH", "LANG", "TMPDIR") if name in os.environ}
     environment = kept | {"HOME": str(home), "STRAPGEN_CACHE_DIR": str(folder / "cache")}

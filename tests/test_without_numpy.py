@@ -73,7 +73,7 @@ def test_a_bound_that_was_not_proved_is_not_stated(both):
     program, seen = both
     (header,) = (text for name, text in seen["unproved"].items() if name == f"{program.name}.h")
     assert proved.WITHOUT_NUMPY.split()[0] in header
-    assert "units in the last place" not in header
+    assert " ulp" not in header
     sources = [name for name in seen["unproved"] if name.endswith(".c")]
     assert sources
     assert all(seen["unproved"][name] == seen["files"]["c"][name] for name in sources)

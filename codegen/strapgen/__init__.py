@@ -52,6 +52,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.float_interface import RoundingBounds as RoundingBounds
     from strapgen.ir.formats import Format as Format
     from strapgen.ir.integer_program import FixedProgram as FixedProgram
+    from strapgen.ir.kernel_info import KernelInfo as KernelInfo
     from strapgen.ir.program import Program as Program
     from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
@@ -177,6 +178,7 @@ _NAMES = {
     "ir.float_interface": ("RoundingBounds",),
     "ir.formats": ("Format",),
     "ir.integer_program": ("FixedProgram",),
+    "ir.kernel_info": ("KernelInfo",),
     "ir.program": ("Program",),
     "ir.recursion": ("Recursion",),
     "ir.signals": ("Signal",),

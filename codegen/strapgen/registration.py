@@ -234,13 +234,7 @@ def broken() -> list[str]:
 
 
 def extension(point: str, needed: str) -> Any:
-    """Return what an application adds at an extension point.
-
-    Raises
-    ------
-    InputError
-        If none does; `needed` is the option or argument that asks for it.
-    """
+    """Return what an application adds at an extension point; `needed` is the option or argument that asks for it."""
     added = next(extensions(point), None)
     if added is None:
         raise InputError(f"{needed} needs an application of strapgen that is not installed ({point})")

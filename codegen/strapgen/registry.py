@@ -30,7 +30,7 @@ class Item(NamedTuple):
     record: Callable[[], Any]
 
 
-class Own(Mapping[str, T], Generic[T]):
+class _Own(Mapping[str, T], Generic[T]):
     """What strapgen's folders bring of a kind, by name, without what installed packages bring."""
 
     __repr__ = short_repr
@@ -78,7 +78,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
     Attributes
     ----------
-    own : Own
+    own : mapping
         What strapgen's folders bring.
     """
 
@@ -92,7 +92,7 @@ class Registry(Mapping[str, T], Generic[T]):
         group: str = "",
         first: str = "",
     ) -> None:
-        self.own: Own[T] = Own(kind, keep, first)
+        self.own: _Own[T] = _Own(kind, keep, first)
         self._kind, self._record, self._keep, self._group = kind, record, keep, group
 
     def _in_words(self) -> str:
@@ -110,13 +110,7 @@ class Registry(Mapping[str, T], Generic[T]):
             yield point.name, Item(point, point.value, lambda point=point: loaded(point, point.value))  # type: ignore[misc]
 
     def item(self, name: str) -> Item | None:
-        """Return what an installed package brings under a name; None for a name of strapgen, or of nobody.
-
-        Raises
-        ------
-        InputError
-            If several packages have it.
-        """
+        """Return what an installed package brings under a name; None for a name of strapgen, or of nobody."""
         if name in self.own:
             return None
         items = {item.place: item for other, item in self._items() if other == name}

@@ -9,7 +9,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int cayley_klein_rk1_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))

@@ -9,7 +9,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int cayley_klein_rk2_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -124,7 +124,7 @@ int cayley_klein_rk2_2_w32(const int32_t state[4], const int32_t increments[6], 
     /* its scalar part */
     const int32_t p_s = cayley_klein_rk2_2_w32_fit(cayley_klein_rk2_2_w32_mul(sigma_dot_sigma,
         3) * (INT32_C(1) << 27) - d1_dot_d2 + (INT32_C(1) << 29), 30);
-        /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stands for p_s - 1 */
+        /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stores p_s - 1 */
     /* Cayley-Klein parameters, body to reference, scalar first, after the step */
     const int32_t next_s = a_s + cayley_klein_rk2_2_w32_fit(cayley_klein_rk2_2_w32_mul(a_s, p_s)
         - cayley_klein_rk2_2_w32_mul(a_x, p_x) - cayley_klein_rk2_2_w32_mul(a_y, p_y)

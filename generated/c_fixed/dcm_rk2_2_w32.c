@@ -9,7 +9,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk2_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -146,7 +146,7 @@ int dcm_rk2_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         /* Q-3.34, -0.0521 .. 0.0834, error 9.8e-11 */
     /* multiple of the unit matrix */
     const int64_t diagonal = dcm_rk2_2_w32_mul(turn_0_scaled_dot_turn_1_scaled, 9);
-        /* Q28.35, -0.235 .. 0.376, error 4.4e-10; stands for diagonal - 1 */
+        /* Q28.35, -0.235 .. 0.376, error 4.4e-10; stores diagonal - 1 */
     const int32_t A_11 = (INT32_C(1) << 30)
         + dcm_rk2_2_w32_fit(dcm_rk2_2_w32_shr(dcm_rk2_2_w32_mul(partner_left_x,
         turn_0_scaled_x), 1) + diagonal * (INT32_C(1) << 28) + (INT64_C(1) << 32), 33);

@@ -10,7 +10,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk3_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -138,7 +138,7 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     /* weight of sigma in skew */
     const int32_t skew_sigma = dcm_rk3_2_w32_fit(-dcm_rk3_2_w32_mul(sigma_dot_sigma,
         INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
-        /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stands for skew_sigma - 1 */
+        /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stores skew_sigma - 1 */
     const int32_t sigma_dot_delta = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x, sigma_x)
         + dcm_rk3_2_w32_mul(delta_y, sigma_y) + dcm_rk3_2_w32_mul(delta_z, sigma_z)
         + (INT32_C(1) << 28), 29); /* Q-4.35, -0.0469 .. 0.0469, error 1.5e-11 */
@@ -189,23 +189,23 @@ int dcm_rk3_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     const int64_t diagonal = -dcm_rk3_2_w32_mul(delta_dot_delta,
         INT32_C(1431655765) /* 2/3 in Q31 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30);
-        /* Q-1.64, -0.126 .. 9.71e-11, error 9.8e-11; stands for diagonal - 1 */
+        /* Q-1.64, -0.126 .. 9.71e-11, error 9.8e-11; stores diagonal - 1 */
     /* half of u y' + y u' on the diagonal */
     const int64_t half_xx = dcm_rk3_2_w32_mul(partner_sigma_x, sigma_x);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
     const int32_t A_11 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_x, partner_delta_x) + half_xx
         + diagonal * 2 + (INT64_C(1) << 32), 33);
-        /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stands for A_11 - 1 */
+        /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stores A_11 - 1 */
     const int64_t half_yy = dcm_rk3_2_w32_mul(partner_sigma_y, sigma_y);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
     const int32_t A_22 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_y, partner_delta_y) + half_yy
         + diagonal * 2 + (INT64_C(1) << 32), 33);
-        /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stands for A_22 - 1 */
+        /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stores A_22 - 1 */
     const int64_t half_zz = dcm_rk3_2_w32_mul(partner_sigma_z, sigma_z);
         /* Q-3.66, -0.0209 .. 0.0209, error 1.1e-11 */
     const int32_t A_33 = dcm_rk3_2_w32_fit(dcm_rk3_2_w32_mul(delta_z, partner_delta_z) + half_zz
         + diagonal * 2 + (INT64_C(1) << 32), 33);
-        /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stands for A_33 - 1 */
+        /* Q-1.32, -0.209 .. 0.0834, error 2.6e-10; stores A_33 - 1 */
     const int64_t symmetric_xy = dcm_rk3_2_w32_mul(partner_sigma_y, sigma_x)
         + dcm_rk3_2_w32_mul(delta_x, partner_delta_y) * 2
         + dcm_rk3_2_w32_mul(partner_sigma_x, sigma_y);

@@ -10,7 +10,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_rk4_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -134,7 +134,7 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
     /* weight of sigma in skew */
     const int32_t skew_sigma = dcm_rk4_2_w32_fit(-dcm_rk4_2_w32_mul(sigma_dot_sigma,
         INT32_C(1431655765) /* 1/6 in Q33 */) + (INT32_C(1) << 30), 31);
-        /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stands for skew_sigma - 1 */
+        /* Q-4.35, -0.0313 .. 5.83e-11, error 3.2e-11; stores skew_sigma - 1 */
     /* weight of sigma_cross_d1 in skew */
     const int32_t skew_sigma_cross_d1 = dcm_rk4_2_w32_fit(-(int64_t)skew_sigma
         * (INT32_C(1) << 25) - INT64_C(768614336404564651) /* 2/3 in Q60 */
@@ -160,7 +160,7 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         * (INT32_C(1) << 30)
         - dcm_rk4_2_w32_mul(d1_dot_d1, INT32_C(1431655765) /* 1/3 in Q32 */)
         + (INT32_C(1) << 30), 31);
-        /* Q-5.36, -0.0157 .. 0.00879, error 2e-11; stands for partner_sigma - 1/4 */
+        /* Q-5.36, -0.0157 .. 0.00879, error 2e-11; stores partner_sigma - 1/4 */
     const int32_t d1_dot_sigma = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_mul(d1_x, sigma_x)
         + dcm_rk4_2_w32_mul(d1_y, sigma_y) + dcm_rk4_2_w32_mul(d1_z, sigma_z)
         + (INT32_C(1) << 29), 30); /* Q-3.34, -0.0469 .. 0.0938, error 3e-11 */
@@ -190,28 +190,25 @@ int dcm_rk4_2_w32(const int32_t state[9], const int32_t increments[6], int32_t n
         + (INT64_C(1) << 33), 34); /* Q-3.34, -0.0788 .. 0.0788, error 5.6e-11 */
     const int32_t diagonal_factor = dcm_rk4_2_w32_fit((int64_t)shared_1 * 2
         + dcm_rk4_2_w32_shr(-(int64_t)sigma_dot_sigma + 1, 1), 0);
-        /* Q-4.35, -0.0254 .. 0.045, error 8.5e-11; stands for diagonal_factor + 1/2 */
+        /* Q-4.35, -0.0254 .. 0.045, error 8.5e-11; stores diagonal_factor + 1/2 */
     /* multiple of the unit matrix */
     const int64_t diagonal = -(int64_t)sigma_dot_sigma * (INT64_C(1) << 32)
         + dcm_rk4_2_w32_shr(dcm_rk4_2_w32_mul(diagonal_factor, sigma_dot_sigma), 2)
         + dcm_rk4_2_w32_shr(-dcm_rk4_2_w32_mul(d1_dot_sigma, shared_1), 2);
-        /* Q-3.66, -0.105 .. 0.0114, error 5.6e-11; stands for diagonal - 1 */
+        /* Q-3.66, -0.105 .. 0.0114, error 5.6e-11; stores diagonal - 1 */
     /* half of u y' + y u' on the diagonal */
     const int64_t half_xx = dcm_rk4_2_w32_mul(partner_x, sigma_x);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
     const int32_t A_11 = dcm_rk4_2_w32_fit(half_xx + dcm_rk4_2_w32_shr(diagonal, 1)
-        + (INT64_C(1) << 32), 33);
-        /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stands for A_11 - 1 */
+        + (INT64_C(1) << 32), 33); /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_11 - 1 */
     const int64_t half_yy = dcm_rk4_2_w32_mul(partner_y, sigma_y);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
     const int32_t A_22 = dcm_rk4_2_w32_fit(half_yy + dcm_rk4_2_w32_shr(diagonal, 1)
-        + (INT64_C(1) << 32), 33);
-        /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stands for A_22 - 1 */
+        + (INT64_C(1) << 32), 33); /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_22 - 1 */
     const int64_t half_zz = dcm_rk4_2_w32_mul(partner_z, sigma_z);
         /* Q-3.66, -0.0197 .. 0.0197, error 1.4e-11 */
     const int32_t A_33 = dcm_rk4_2_w32_fit(half_zz + dcm_rk4_2_w32_shr(diagonal, 1)
-        + (INT64_C(1) << 32), 33);
-        /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stands for A_33 - 1 */
+        + (INT64_C(1) << 32), 33); /* Q-1.32, -0.144 .. 0.0508, error 2e-10; stores A_33 - 1 */
     const int64_t symmetric_xy = dcm_rk4_2_w32_mul(partner_y, sigma_x)
         + dcm_rk4_2_w32_mul(partner_x, sigma_y); /* Q-3.66, -0.0394 .. 0.0394, error 2.8e-11 */
     const int32_t A_12 = dcm_rk4_2_w32_fit(dcm_rk4_2_w32_shr(symmetric_xy, 2) - skew_z

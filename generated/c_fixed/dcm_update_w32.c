@@ -9,7 +9,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int dcm_update_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -152,7 +152,7 @@ int dcm_update_w32(const int32_t state[9], const int32_t rotation_vector[3], int
     const int64_t shared_7 = dcm_update_w32_mul(shared_18, shared_2);
         /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09 */
     const int64_t shared_8 = dcm_update_w32_mul(shared_18, shared_3);
-        /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09; stands for shared_8 + 1 */
+        /* Q2.61, -1.11e-09 .. 0.501, error 1.2e-09; stores shared_8 + 1 */
     /* the step applied to the identity */
     const int32_t A_11 = dcm_update_w32_fit((INT32_C(1) << 30) + dcm_update_w32_shr(-shared_7
         - shared_8 + (INT32_C(1) << 30), 31), 0); /* Q1.30, -2.8e-09 .. 1.01, error 2.7e-09 */

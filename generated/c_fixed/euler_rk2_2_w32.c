@@ -9,7 +9,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_rk2_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -123,7 +123,7 @@ int euler_rk2_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     /* its scalar part */
     const int32_t p_s = euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(sigma_dot_sigma, 3)
         * (INT32_C(1) << 27) - d1_dot_d2 + (INT32_C(1) << 29), 30);
-        /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stands for p_s - 1 */
+        /* Q-2.33, -0.0586 .. 0.0938, error 8.1e-11; stores p_s - 1 */
     /* Euler parameters, body to reference, scalar last, after the step */
     const int32_t next_s = e_s + euler_rk2_2_w32_fit(euler_rk2_2_w32_mul(e_s, p_s)
         - euler_rk2_2_w32_mul(e_x, p_x) - euler_rk2_2_w32_mul(e_y, p_y)

@@ -10,7 +10,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_rk3_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -133,7 +133,7 @@ int euler_rk3_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
         INT32_C(1431655765) /* 1/12 in Q34 */) * 2
         + euler_rk3_2_w32_shr(-euler_rk3_2_w32_mul(sigma_dot_sigma,
         INT32_C(1431655765) /* 1/48 in Q36 */), 1) + (INT64_C(1) << 31), 32);
-        /* Q-5.36, -0.0157 .. 2.92e-11, error 1.8e-11; stands for p_sigma - 1/2 */
+        /* Q-5.36, -0.0157 .. 2.92e-11, error 1.8e-11; stores p_sigma - 1/2 */
     const int32_t sigma_dot_delta = euler_rk3_2_w32_fit(euler_rk3_2_w32_mul(delta_x, sigma_x)
         + euler_rk3_2_w32_mul(delta_y, sigma_y) + euler_rk3_2_w32_mul(delta_z, sigma_z)
         + (INT32_C(1) << 28), 29); /* Q-4.35, -0.0469 .. 0.0469, error 1.5e-11 */
@@ -158,7 +158,7 @@ int euler_rk3_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t p_s = euler_rk3_2_w32_fit(-euler_rk3_2_w32_mul(delta_dot_delta,
         INT32_C(1431655765) /* 1/6 in Q33 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30) + (INT64_C(1) << 32), 33);
-        /* Q-2.33, -0.0313 .. 1.17e-10, error 8.3e-11; stands for p_s - 1 */
+        /* Q-2.33, -0.0313 .. 1.17e-10, error 8.3e-11; stores p_s - 1 */
     /* Euler parameters, body to reference, scalar last, after the step */
     const int32_t next_s = e_s + euler_rk3_2_w32_fit(euler_rk3_2_w32_mul(e_s, p_s)
         - euler_rk3_2_w32_mul(e_x, p_x) - euler_rk3_2_w32_mul(e_y, p_y)

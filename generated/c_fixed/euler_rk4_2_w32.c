@@ -10,7 +10,7 @@
 #error "integers of 32 and 64 bits are needed"
 #endif
 
-/* Whether a number is larger in magnitude than a limit. */
+/* Nonzero if the magnitude of x exceeds the limit. */
 static inline int euler_rk4_2_w32_out(int32_t x, int32_t limit)
 {
 #if defined(__GNUC__) && (defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__))
@@ -124,7 +124,7 @@ int euler_rk4_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     /* weight of sigma in p */
     const int32_t p_sigma = euler_rk4_2_w32_fit(-euler_rk4_2_w32_mul(sigma_dot_sigma,
         INT32_C(1431655765) /* 1/48 in Q36 */) + (INT32_C(1) << 30), 31);
-        /* Q-7.38, -0.00391 .. 7.28e-12, error 4e-12; stands for p_sigma - 1/2 */
+        /* Q-7.38, -0.00391 .. 7.28e-12, error 4e-12; stores p_sigma - 1/2 */
     /* weight of sigma_cross_d1 in p */
     const int32_t p_sigma_cross_d1 = euler_rk4_2_w32_fit(-(int64_t)p_sigma * (INT32_C(1) << 22)
         - INT64_C(384307168202282325) /* 1/3 in Q60 */ + (INT32_C(1) << 27), 28);
@@ -148,11 +148,11 @@ int euler_rk4_2_w32(const int32_t state[4], const int32_t increments[6], int32_t
     const int32_t p_s_factor = euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(d1_dot_d2,
         INT32_C(1431655765) /* 1/24 in Q35 */)
         - (int64_t)sigma_dot_sigma * (INT32_C(1) << 30) + (INT64_C(1) << 34), 35);
-        /* Q-4.35, -0.00196 .. 0.00123, error 1.7e-11; stands for p_s_factor + 1/8 */
+        /* Q-4.35, -0.00196 .. 0.00123, error 1.7e-11; stores p_s_factor + 1/8 */
     /* its scalar part */
     const int32_t p_s = euler_rk4_2_w32_fit(-(int64_t)sigma_dot_sigma * (INT64_C(1) << 32)
         + euler_rk4_2_w32_mul(p_s_factor, sigma_dot_sigma) + (INT64_C(1) << 34), 35);
-        /* Q-2.33, -0.0239 .. 0.000229, error 6.9e-11; stands for p_s - 1 */
+        /* Q-2.33, -0.0239 .. 0.000229, error 6.9e-11; stores p_s - 1 */
     /* Euler parameters, body to reference, scalar last, after the step */
     const int32_t next_s = e_s + euler_rk4_2_w32_fit(euler_rk4_2_w32_mul(e_s, p_s)
         - euler_rk4_2_w32_mul(e_x, p_x) - euler_rk4_2_w32_mul(e_y, p_y)

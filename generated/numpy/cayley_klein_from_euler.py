@@ -20,7 +20,7 @@ def cayley_klein_from_euler(state, out=None):
     ----------
     state : array, (..., 4)
         Euler parameters, body to reference, scalar last, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: e_x, e_y, e_z, e_s.
     out : array, optional
         Where the result is stored; it may be an input.

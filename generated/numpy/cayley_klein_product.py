@@ -20,11 +20,11 @@ def cayley_klein_product(state, transition, out=None):
     ----------
     state : array, (..., 4)
         Cayley-Klein parameters, body to reference, scalar first, unit 1; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: a_s, a_x, a_y, a_z.
     transition : array, (..., 4)
         the step applied to the identity, unit 1; any finite number; at most 1 in magnitude in
-        proper use.
+        normal use.
         Elements: p_s, p_x, p_y, p_z.
     out : array, optional
         Where the result is stored; it may be an input.

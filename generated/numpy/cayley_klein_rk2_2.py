@@ -21,11 +21,11 @@ def cayley_klein_rk2_2(state, increments, out=None):
     ----------
     state : array, (..., 4)
         Cayley-Klein parameters, body to reference, scalar first, unit 1; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: a_s, a_x, a_y, a_z.
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number; at most 1 in magnitude in proper use.
+        unit rad; any finite number; at most 1 in magnitude in normal use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.
@@ -87,7 +87,7 @@ def cayley_klein_rk2_2_transition(increments, out=None):
     ----------
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number; at most 1 in magnitude in proper use.
+        unit rad; any finite number; at most 1 in magnitude in normal use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -20,19 +20,19 @@ def coning_fast(angle_sum, coning, previous_increment, increment):
     ----------
     angle_sum : array, (..., 3)
         sum of the angle increments since the slow cycle began, unit rad; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: beta_x, beta_y, beta_z.
     coning : array, (..., 3)
         coning correction since the slow cycle began, unit rad; any finite number; at most 1/8 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: coning_x, coning_y, coning_z.
     previous_increment : array, (..., 3)
         angle increment of the fast cycle before; zero at the start, unit rad; any finite number; at
-        most 1/8 in magnitude in proper use.
+        most 1/8 in magnitude in normal use.
         Elements: past_x, past_y, past_z.
     increment : array, (..., 3)
         angle increment of the fast cycle, body axes: exact integral of the body rate, unit rad; any
-        finite number; at most 1/8 in magnitude in proper use.
+        finite number; at most 1/8 in magnitude in normal use.
         Elements: d_x, d_y, d_z.
 
     Returns

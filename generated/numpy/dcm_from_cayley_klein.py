@@ -20,7 +20,7 @@ def dcm_from_cayley_klein(state, out=None):
     ----------
     state : array, (..., 4)
         Cayley-Klein parameters, body to reference, scalar first, unit 1; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: a_s, a_x, a_y, a_z.
     out : array, optional
         Where the result is stored; it may be an input.

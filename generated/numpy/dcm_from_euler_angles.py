@@ -20,7 +20,7 @@ def dcm_from_euler_angles(angles, out=None):
     ----------
     angles : array, (..., 3)
         Euler angles: roll, pitch, heading, unit rad; any finite number; at most 355/113 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: roll, pitch, heading.
     out : array, optional
         Where the result is stored; it may be an input.

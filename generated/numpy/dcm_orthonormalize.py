@@ -21,7 +21,7 @@ def dcm_orthonormalize(computed, out=None):
     ----------
     computed : array, (..., 3, 3)
         direction cosine matrix, body to reference, as computed, unit 1; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: C_11, ..., C_33.
     out : array, optional
         Where the result is stored; it may be an input.

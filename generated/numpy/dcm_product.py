@@ -20,11 +20,11 @@ def dcm_product(state, transition, out=None):
     ----------
     state : array, (..., 3, 3)
         direction cosine matrix, body to reference, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: C_11, ..., C_33.
     transition : array, (..., 3, 3)
         the step applied to the identity, unit 1; any finite number; at most 1 in magnitude in
-        proper use.
+        normal use.
         Elements: A_11, ..., A_33.
     out : array, optional
         Where the result is stored; it may be an input.

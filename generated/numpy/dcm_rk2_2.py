@@ -20,11 +20,11 @@ def dcm_rk2_2(state, increments, out=None):
     ----------
     state : array, (..., 3, 3)
         direction cosine matrix, body to reference, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: C_11, ..., C_33.
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number; at most 1 in magnitude in proper use.
+        unit rad; any finite number; at most 1 in magnitude in normal use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.
@@ -121,7 +121,7 @@ def dcm_rk2_2_transition(increments, out=None):
     ----------
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number; at most 1 in magnitude in proper use.
+        unit rad; any finite number; at most 1 in magnitude in normal use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.

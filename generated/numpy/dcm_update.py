@@ -26,11 +26,11 @@ def dcm_update(state, rotation_vector, out=None):
     ----------
     state : array, (..., 3, 3)
         direction cosine matrix, body to reference, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: C_11, ..., C_33.
     rotation_vector : array, (..., 3)
         rotation vector of the cycle, body axes, unit rad; any finite number; at most 1 in magnitude
-        in proper use.
+        in normal use.
         Elements: phi_x, phi_y, phi_z.
     out : array, optional
         Where the result is stored; it may be an input.
@@ -119,7 +119,7 @@ def dcm_update_transition(rotation_vector, out=None):
     ----------
     rotation_vector : array, (..., 3)
         rotation vector of the cycle, body axes, unit rad; any finite number; at most 1 in magnitude
-        in proper use.
+        in normal use.
         Elements: phi_x, phi_y, phi_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -20,19 +20,19 @@ def dcm_velocity_2(state, velocity_sum, sculling, angle_sum, out=None):
     ----------
     state : array, (..., 3, 3)
         direction cosine matrix, body to reference, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: C_11, ..., C_33.
     velocity_sum : array, (..., 3)
         sum of the velocity increments since the slow cycle began, unit m/s; any finite number; at
-        most 8 in magnitude in proper use.
+        most 8 in magnitude in normal use.
         Elements: u_x, u_y, u_z.
     sculling : array, (..., 3)
         sculling integral since the slow cycle began, unit m/s; any finite number; at most 4 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: eta_x, eta_y, eta_z.
     angle_sum : array, (..., 3)
         sum of the angle increments since the slow cycle began, unit rad; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: beta_x, beta_y, beta_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -20,11 +20,11 @@ def error_matrix(computed, truth):
     ----------
     computed : array, (..., 3, 3)
         direction cosine matrix, body to reference, computed, unit 1; any finite number; at most 1
-        in magnitude in proper use.
+        in magnitude in normal use.
         Elements: C_11, ..., C_33.
     truth : array, (..., 3, 3)
         direction cosine matrix, body to reference, true, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: T_11, ..., T_33.
 
     Returns

@@ -27,10 +27,10 @@ def euler_angles_from_dcm(state, previous, out=None):
     ----------
     state : array, (..., 3, 3)
         direction cosine matrix, body to reference, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: C_11, ..., C_33.
     previous : array, (..., 3)
-        the angles before, unit rad; any finite number; at most 355/113 in magnitude in proper use.
+        the angles before, unit rad; any finite number; at most 355/113 in magnitude in normal use.
         Elements: last_roll, last_pitch, last_heading.
     out : array, optional
         Where the result is stored; it may be an input.

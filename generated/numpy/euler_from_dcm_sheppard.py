@@ -21,11 +21,11 @@ def euler_from_dcm_sheppard(state, previous, out=None):
     ----------
     state : array, (..., 3, 3)
         direction cosine matrix, body to reference, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: C_11, ..., C_33.
     previous : array, (..., 4)
         Euler parameters, body to reference, scalar last, of the call before, unit 1; any finite
-        number; at most 1 in magnitude in proper use.
+        number; at most 1 in magnitude in normal use.
         Elements: last_x, last_y, last_z, last_s.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -6,7 +6,7 @@ SPDX-License-Identifier: 0BSD
 
 Source: MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229, chapter 3 C: x /
     sqrt(x . x)
-The state must not be zero, which has no direction: in floating point the result is then no number.
+The state must not be zero, which has no direction: in floating point the result is then NaN.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ def euler_normalize(state, out=None):
     ----------
     state : array, (..., 4)
         Euler parameters, body to reference, scalar last, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: e_x, e_y, e_z, e_s.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -20,11 +20,11 @@ def euler_product(state, transition, out=None):
     ----------
     state : array, (..., 4)
         Euler parameters, body to reference, scalar last, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: e_x, e_y, e_z, e_s.
     transition : array, (..., 4)
         the step applied to the identity, unit 1; any finite number; at most 1 in magnitude in
-        proper use.
+        normal use.
         Elements: p_x, p_y, p_z, p_s.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -21,11 +21,11 @@ def euler_rk3_2(state, increments, out=None):
     ----------
     state : array, (..., 4)
         Euler parameters, body to reference, scalar last, unit 1; any finite number; at most 1 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: e_x, e_y, e_z, e_s.
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number; at most 1 in magnitude in proper use.
+        unit rad; any finite number; at most 1 in magnitude in normal use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.
@@ -96,7 +96,7 @@ def euler_rk3_2_transition(increments, out=None):
     ----------
     increments : array, (..., 2, 3)
         angle increments of the step, body axes, oldest first: exact integrals of the body rate,
-        unit rad; any finite number; at most 1 in magnitude in proper use.
+        unit rad; any finite number; at most 1 in magnitude in normal use.
         Elements: d1_x, ..., d2_z.
     out : array, optional
         Where the result is stored; it may be an input.

@@ -20,23 +20,23 @@ def sculling_fast_2(angle_sum, velocity_sum, sculling, increment, velocity_incre
     ----------
     angle_sum : array, (..., 3)
         sum of the angle increments since the slow cycle began, unit rad; any finite number; at most
-        1 in magnitude in proper use.
+        1 in magnitude in normal use.
         Elements: beta_x, beta_y, beta_z.
     velocity_sum : array, (..., 3)
         sum of the velocity increments since the slow cycle began, unit m/s; any finite number; at
-        most 8 in magnitude in proper use.
+        most 8 in magnitude in normal use.
         Elements: u_x, u_y, u_z.
     sculling : array, (..., 3)
         sculling integral since the slow cycle began, unit m/s; any finite number; at most 4 in
-        magnitude in proper use.
+        magnitude in normal use.
         Elements: eta_x, eta_y, eta_z.
     increment : array, (..., 3)
         angle increment of the fast cycle, body axes: exact integral of the body rate, unit rad; any
-        finite number; at most 1/8 in magnitude in proper use.
+        finite number; at most 1/8 in magnitude in normal use.
         Elements: d_x, d_y, d_z.
     velocity_increment : array, (..., 3)
         velocity increment of the fast cycle, body axes: exact integral of the specific force, unit
-        m/s; any finite number; at most 1 in magnitude in proper use.
+        m/s; any finite number; at most 1 in magnitude in normal use.
         Elements: dv_x, dv_y, dv_z.
 
     Returns

@@ -11,7 +11,6 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -420,7 +419,7 @@ def test_a_loop_of_a_user_is_the_recursion_26_again():
     assert same(plain.expression("error"), CONING * (sp.sin(A_L) / A_L - 1))
 
 
-@each(
+@pytest.mark.parametrize(
     ("kernel", "said"),
     [
         (own_loop(kept=False), "forgets what begins anew"),
@@ -435,7 +434,7 @@ def test_what_cannot_be_assessed_is_refused(kernel, said):
         vibration.drift(kernel)
 
 
-@each("thing", [None, 3, "euler", ("euler", "rk4", 2, 0)])
+@pytest.mark.parametrize("thing", [None, 3, "euler", ("euler", "rk4", 2, 0)])
 def test_what_is_no_choice_and_no_kernel(thing):
     for assess, what in (
         (vibration.of, "choice"),
@@ -487,7 +486,7 @@ def test_rates_and_factors_agree():
                 assert (factor * amplitudes).real == pytest.approx(one, rel=1e-10)
 
 
-@each(
+@pytest.mark.parametrize(
     ("numbers", "said"),
     [
         ({"frequency_hz": 0}, "frequency-hz is 0; a number above 0"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -62,7 +61,7 @@ def test_a_curve_that_cannot_be_solved_stays_an_equation():
     assert len(family.equations) == 1
 
 
-@each(
+@pytest.mark.parametrize(
     ("values", "reason", "solvable"),
     [
         ((X + Y, X + Y - 1), "equation 2 is -1 with the values that the others leave, and has to be 0", 1),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen import derive
 from strapgen.analysis.vibration.expansion import Expander
@@ -55,7 +54,7 @@ def truncated(expression):
 R = sp.sqrt(X**2 + 2 * Y**2)
 
 
-@each(
+@pytest.mark.parametrize(
     "expression",
     [
         (1 + X - 3 * Y) * (2 - X * Y + Y),
@@ -73,7 +72,7 @@ def test_expansions_are_those_of_sympy(expression):
     assert sp.expand(expanded(expression) - truncated(expression)) == 0
 
 
-@each(
+@pytest.mark.parametrize(
     ("expression", "wanted"),
     [
         (sp.sinc(R / 2), 1 - (X**2 + 2 * Y**2) / 24),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.kernel import evaluation
 from strapgen.kernel.power_series import Powers, function
@@ -76,7 +75,7 @@ def test_even_functions_of_a_root_are_series():
     assert sp.expand(made - cut) == 0
 
 
-@each(
+@pytest.mark.parametrize(
     ("expression", "says"),
     [
         (1 / a, "begins with 0"),

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.analysis.vibration.quadrature import integrate
 from strapgen.ir.exceptions import InputError
 
 
-@each(
+@pytest.mark.parametrize(
     ("function", "edges", "value"),
     [
         (lambda x: x**7, [0, 2], 32.0),

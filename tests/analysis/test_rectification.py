@@ -9,7 +9,6 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen import vibration
@@ -36,7 +35,7 @@ def octaves(axis=(1.0, 0.0, 0.0), sizes=(0.02, 0.03), step=Fraction(1, 200)):
     return tones, [-1j * size * turn for size, turn in zip(sizes, turns, strict=True)]
 
 
-@each(("state", "method"), CUBES)
+@pytest.mark.parametrize(("state", "method"), CUBES)
 def test_turns_about_one_axis_rectify_the_cube_of_the_increment(state, method):
     step = Fraction(1, 200)
     tones, (one, two) = octaves()
@@ -56,7 +55,7 @@ def cone(size, gain=1.0):
     return [Tone(HERTZ, (-1j * size, -size, 0), gain)]
 
 
-@each(
+@pytest.mark.parametrize(
     ("method", "seen"),
     [
         ("coning-compressed", lambda d: d),
@@ -103,7 +102,7 @@ def mean_of_cone(choice, size):
     return (angle - turned) / float(STEP) - w * (math.sqrt(1 + size**2) - 1)
 
 
-@each(
+@pytest.mark.parametrize(
     ("state", "method", "samples"),
     [
         ("euler", "coning-compressed", (3,)),
@@ -173,7 +172,9 @@ def test_the_phases_that_a_tone_has_of_itself_are_those_at_which_it_begins():
     assert turned.at([0.0, 0.0]) == pytest.approx(plain.at([0.5, 1.5]), rel=1e-9, abs=1e-18)
 
 
-@each(("state", "method", "increments"), [("euler", "coning-compressed", 3), ("dcm", "rk4", 2)])
+@pytest.mark.parametrize(
+    ("state", "method", "increments"), [("euler", "coning-compressed", 3), ("dcm", "rk4", 2)]
+)
 def test_the_second_order_is_that_of_the_closed_form(state, method, increments):
     choice = choose_step(state, method, increments)
     expected = vibration.of(choice).rates(10, "0.02", theta_x="0.01", theta_y="0.02", phase="0.7").error
@@ -192,7 +193,7 @@ def test_a_gyro_shows_the_algorithm_other_angles_than_the_true_ones():
     assert rectified(choice, "0.02", tones).at([0.0], 2)[2] == pytest.approx(expected, rel=1e-9)
 
 
-@each(
+@pytest.mark.parametrize(
     ("hertz", "orders"),
     [
         (("5.4", "10.8"), [2, 3, 4]),
@@ -269,7 +270,7 @@ def test_the_worst_of_a_sum_adds_terms_of_equal_phase_and_the_lengths_of_others(
     assert Rectification((ellipse,)).at([0, math.pi / 2]) == pytest.approx([0, 1, 0])
 
 
-@each(
+@pytest.mark.parametrize(
     ("choice", "tones", "said"),
     [
         (choose("euler"), [], "tones is empty"),

@@ -6,8 +6,8 @@ import itertools
 from fractions import Fraction
 
 import numpy as np
+import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.analysis.vibration.resonances import DEGREE, Oscillations, resonances
 from strapgen.kernel.power_series import Powers
@@ -24,7 +24,7 @@ def searched(shares):
     ]
 
 
-@each(
+@pytest.mark.parametrize(
     "shares",
     [
         ["0.1"],
@@ -55,7 +55,7 @@ def test_products_that_divide_a_resonance_are_kept_and_no_others():
     assert (0, 0, 1) in ring.places[3] and (0, 1, 2) in ring.places[3]
 
 
-@each("seed", range(3))
+@pytest.mark.parametrize("seed", range(3))
 def test_products_of_polynomials_are_those_of_symbols(seed):
     rng = np.random.default_rng(seed)
     ring = Oscillations([Fraction(1, 9), Fraction(2, 9)])

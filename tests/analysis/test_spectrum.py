@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen import catalogue
@@ -323,7 +322,7 @@ def test_files_that_cannot_be_read(path, tmp_path):
         read_spectrum(tmp_path / path)
 
 
-@each(
+@pytest.mark.parametrize(
     ("transfers", "edges", "said"),
     [
         ({"angle_z": abs}, (1.0, 2.0), "transfer function 'angle_z' is not known"),
@@ -340,7 +339,7 @@ def test_spectra_that_are_refused(transfers, edges, said):
         Spectrum(np.ones_like, transfers, edges)
 
 
-@each(
+@pytest.mark.parametrize(
     ("changed", "said"),
     [
         ({"density": 1}, "density is 1; a function of frequency is needed"),

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -50,7 +49,7 @@ def test_what_is_a_difference_is_summed_without_poles(wave):
     assert difference.summed().poles == 0
 
 
-@each(
+@pytest.mark.parametrize(
     ("matrix", "zeros", "ones"),
     [
         ([[1, 0], [0, 1]], 0, 2),

@@ -6,7 +6,6 @@ import sys
 import pytest
 import sympy as sp
 from derived import kernel as derived
-from gathering import each
 
 from strapgen import catalogue
 from strapgen.catalogue import ALGORITHMS, KERNELS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
@@ -14,7 +13,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import RESOLUTION
 
 STANDARD = catalogue.standard()
-EVERY = each("choice", STANDARD, ids=lambda choice: choice.kernel)
+EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
 
 
 def test_the_default_is_fourth_order_on_two_increments():
@@ -24,7 +23,7 @@ def test_the_default_is_fourth_order_on_two_increments():
     assert choose("dcm-from-euler").kernel == "dcm-from-euler"
 
 
-@each(
+@pytest.mark.parametrize(
     ("arguments", "named"),
     [
         (("quaternion",), ["algorithm 'quaternion'", "euler", "strapgen list kernels shows all"]),
@@ -108,7 +107,7 @@ def test_signals_are_explained(choice):
             assert ("scalar last" in signal.meaning) == signal.elements[3].endswith("_s")
 
 
-@each("choice", STANDARD[:12], ids=lambda choice: choice.kernel)
+@pytest.mark.parametrize("choice", STANDARD[:12], ids=lambda choice: choice.kernel)
 def test_companions_are_in_the_catalogue_and_fit(choice):
     kernel = derived(choice)
     state = kernel.inputs[0]

@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +16,9 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 
 
-@each("value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"])
+@pytest.mark.parametrize(
+    "value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"]
+)
 def test_a_number_is_exact_in_every_spelling(value):
     assert read({"cycle": value}) == (("cycle", (Fraction(1, 50),)),)
 
@@ -28,7 +29,7 @@ def test_rows_follow_each_other_and_names_are_sorted():
     assert read({"a": [7], "b": np.arange(4.0).reshape(2, 2)}) == rows
 
 
-@each(
+@pytest.mark.parametrize(
     ("constants", "error", "words"),
     [
         ({"cycle": "fast"}, InputError, "constant cycle is 'fast'; a finite number is needed"),

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import kernel, program
-from gathering import each
 from precisions import single
 
 import strapgen
@@ -165,7 +164,7 @@ def test_fixed_point_needs_no_range_of_a_constant():
         strapgen.quantize(program(choice), Settings(ranges={"g": Fraction(7), "width": Fraction(1)}))
 
 
-@each(
+@pytest.mark.parametrize(
     ("name", "constants", "words"),
     [
         (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from derived import kernel
-from gathering import each
 
 from strapgen.catalogue import KERNELS, VECTORS, Choice, choose
 from strapgen.ir.signals import Signal
@@ -83,7 +82,7 @@ def test_every_vector_states_its_frame_and_a_state_keeps_it():
     assert set(WITHOUT) <= present
 
 
-@each(
+@pytest.mark.parametrize(
     ("name", "over"),
     [
         ("imu-compensate", {"increment", "velocity_increment"}),

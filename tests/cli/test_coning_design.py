@@ -6,7 +6,6 @@ import json
 import shlex
 
 import pytest
-from gathering import each
 
 from strapgen.catalogue.methods.shaped_coning import read
 from strapgen.cli import main
@@ -82,7 +81,7 @@ def test_a_design_goes_wherever_a_method_goes(run, tmp_path):
     assert "largest drift over the band to 1.3 rad a sample" in text
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "words"),
     [
         ("band", "a band is needed, as --band in rad a sample, or as --band-hz with --sample-hz"),
@@ -113,7 +112,7 @@ def test_options_that_do_not_go_together_get_one_line(run, options, words):
     assert words in error and error.count("\n") == 1
 
 
-@each(
+@pytest.mark.parametrize(
     ("command", "words"),
     [
         ("coning --samples 3 --band 1", "--band goes with --objective band, worst or random"),

@@ -11,7 +11,6 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 from strapgen.results import figures
@@ -60,31 +59,27 @@ DRAWN = {"compare": "time, s", "rate-table": "largest drift of the run, deg"}
 
 
 @pytest.mark.long
-def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path, monkeypatch):
+@pytest.mark.parametrize("command", TABLES)
+def test_a_table_has_the_same_rows_in_every_format(answer, tmp_path, monkeypatch, command):
     def label_of_x(figure, path):
         figures.pyplot().close(figure)
         return figure.axes[0].get_xlabel().encode()
 
     monkeypatch.setattr(figures, "image", label_of_x)
-
-    @each("command", TABLES)
-    def written(command):
-        first, count = TABLES[command]
-        rows = list(csv.DictReader(io.StringIO(answer(f"{command} --format csv"))))
-        assert next(iter(rows[0])) == first
-        assert count in (None, len(rows))
-        marked = answer(f"{command} --format markdown").splitlines()
-        assert len(marked) == len(rows) + 2
-        assert re.fullmatch(r"\|( :?-+:? \|)+", marked[1])
-        width = {line.replace(r"\|", "").count("|") for line in marked}
-        assert len(width) == 1
-        typeset = answer(f"{command} --format latex")
-        assert typeset.count("\\begin{") == typeset.count("\\end{") > 0
-        drawn = DRAWN.get(command.split()[0], "") if find_spec("matplotlib") else ""
-        json.loads(answer(f"{command} --format json{' --plot drawn.svg' if drawn else ''}"))
-        assert not drawn or (tmp_path / "drawn.svg").read_text() == drawn
-
-    written()
+    first, count = TABLES[command]
+    rows = list(csv.DictReader(io.StringIO(answer(f"{command} --format csv"))))
+    assert next(iter(rows[0])) == first
+    assert count in (None, len(rows))
+    marked = answer(f"{command} --format markdown").splitlines()
+    assert len(marked) == len(rows) + 2
+    assert re.fullmatch(r"\|( :?-+:? \|)+", marked[1])
+    width = {line.replace(r"\|", "").count("|") for line in marked}
+    assert len(width) == 1
+    typeset = answer(f"{command} --format latex")
+    assert typeset.count("\\begin{") == typeset.count("\\end{") > 0
+    drawn = DRAWN.get(command.split()[0], "") if find_spec("matplotlib") else ""
+    json.loads(answer(f"{command} --format json{' --plot drawn.svg' if drawn else ''}"))
+    assert not drawn or (tmp_path / "drawn.svg").read_text() == drawn
 
 
 def test_a_dash_is_the_terminal_and_a_file_holds_the_same(answer, tmp_path):

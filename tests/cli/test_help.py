@@ -9,9 +9,9 @@ import pytest
 from typer.main import get_command
 
 from strapgen import registration
-from strapgen.cli import app
-from strapgen.cli import headings as groups
-from strapgen.cli.help import PlainCommand, _summary
+from strapgen.cli import app, main, top_help
+from strapgen.cli.help import PlainCommand, _label
+from strapgen.cli.help_layout import summary
 from strapgen.ir.suggestions import SYNONYMS
 
 
@@ -52,9 +52,23 @@ def test_commands_stand_in_groups_with_a_whole_sentence_each(monkeypatch):
         ]
         for heading in headings[-5:]
     }
-    assert shown == groups()
+    assert shown == {heading: [*names] for heading, names in top_help.commands().items()}
     assert not [line for line in lines[1:] if line.endswith("...")]
     assert "stress" not in " ".join(lines)
+
+
+def test_help_of_the_program_has_its_options(capsys):
+    """It is printed without the library that reads them."""
+    labels = [label for label, _ in top_help.PROGRAM.panels["Options"]]
+    with EVERY[""].make_context("strapgen", [], resilient_parsing=True) as context:
+        options = EVERY[""].get_params(context)
+    assert labels == [_label(option) for option in options]
+    known = {label: text for label, text in top_help.PROGRAM.panels["Options"]}
+    assert all(known[_label(option)] == option.help for option in options if option.help)
+    for words in ([], ["-h"], ["--help"], ["--verbose", "--help"]):
+        with pytest.raises(SystemExit) as stop:
+            main(words)
+        assert (stop.value.code, capsys.readouterr().out) == (0, f"{top_help.text()}\n")
 
 
 def test_summaries_of_the_list_are_first_sentences_of_the_commands():
@@ -64,7 +78,7 @@ def test_summaries_of_the_list_are_first_sentences_of_the_commands():
         for name, command in one.commands.items()
         if command.heading
     }
-    assert listed == {name: _summary(EVERY[name].help) for name in listed}
+    assert listed == {name: summary(EVERY[name].help) for name in listed}
 
 
 def test_an_option_and_its_value_stay_on_one_line_of_an_example(monkeypatch):
@@ -100,9 +114,7 @@ def test_one_option_has_one_metavar_and_one_beginning_of_its_sentence():
 def test_no_option_is_declared_in_the_plural():
     singular = {option.opts[0] for command in EVERY.values() for option in command.params}
     assert not {option for option in singular if f"{option[:-1]}" in singular} - {"--samples"}
-    assert all(
-        isinstance(command, PlainCommand) or hasattr(command, "headings") for command in EVERY.values()
-    )
+    assert all(isinstance(command, PlainCommand) or hasattr(command, "listed") for command in EVERY.values())
 
 
 def test_every_synonym_leads_to_a_name_that_exists():

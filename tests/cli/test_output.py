@@ -6,7 +6,6 @@ import shlex
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 from strapgen.cli.output import Output
@@ -47,26 +46,20 @@ def test_nothing_is_written_where_one_file_cannot_be(tmp_path, monkeypatch, caps
 
 
 @pytest.mark.filterwarnings("error")
-def test_every_command_that_draws_refuses_files_that_it_cannot_write_before_it_runs(
-    tmp_path, monkeypatch, capsys
-):
+@pytest.mark.parametrize("command", WITH_PLOTS)
+def test_a_plot_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch, capsys, command):
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)
-
-    @each("command", WITH_PLOTS)
-    def refused(command):
-        for files, line in (
-            ("--out run.png --plot ./run.png", "--out and --plot are both run.png; two files are needed\n"),
-            ("--plot run.docx", "plot run.docx: file type 'docx' is not known; allowed: "),
-        ):
-            with pytest.raises(SystemExit) as stop:
-                main(shlex.split(f"{command} {files}"))
-            said = capsys.readouterr()
-            assert (stop.value.code, said.out) == (2, "")
-            assert said.err.startswith(f"strapgen: {line}") and said.err.count("\n") == 1
-            assert not list(tmp_path.iterdir())
-
-    refused()
+    for files, line in (
+        ("--out run.png --plot ./run.png", "--out and --plot are both run.png; two files are needed\n"),
+        ("--plot run.docx", "plot run.docx: file type 'docx' is not known; allowed: "),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(f"{command} {files}"))
+        said = capsys.readouterr()
+        assert (stop.value.code, said.out) == (2, "")
+        assert said.err.startswith(f"strapgen: {line}") and said.err.count("\n") == 1
+        assert not list(tmp_path.iterdir())
 
 
 def test_a_command_says_what_it_wrote_and_prints_its_result_alone(tmp_path, monkeypatch, capsys):

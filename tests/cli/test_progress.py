@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+from commands import run
 
 from strapgen.cli import progress
 from strapgen.cli.options import MethodOptions
@@ -71,7 +72,6 @@ def test_a_file_that_takes_its_time_shows_that_it_is_derived(tmp_path, impatient
 
 
 def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_path, capsys):
-    from strapgen.cli import main
     from strapgen.lab.recordings import recording
 
     (tmp_path / "log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(4)))
@@ -87,7 +87,5 @@ def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_p
     monkeypatch.setattr(sys, "stderr", stream)
     for name, text in (("read_increments", "reading log.csv"), ("propagate", "running euler-rk4-2")):
         monkeypatch.setattr(recording, name, slowly(getattr(recording, name), text))
-    with pytest.raises(SystemExit) as stop:
-        main(["simulate", "euler", "--increments-csv", str(tmp_path / "log.csv")])
-    assert stop.value.code == 0
+    run(["simulate", "euler", "--increments-csv", str(tmp_path / "log.csv")])
     assert stream.getvalue().endswith("\r\x1b[2K")

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 
@@ -59,7 +58,7 @@ def without_errors(text: str) -> object:
     return data
 
 
-@each(
+@pytest.mark.parametrize(
     "command",
     [
         f"simulate euler {MOTION} --step 0.02 --format json",
@@ -121,7 +120,7 @@ def test_fixed_point_takes_formats_that_hold_the_errors(run):
     np.testing.assert_allclose(fixed["drift_deg"][-1], plain["drift_deg"][-1], rtol=1e-5)
 
 
-@each(
+@pytest.mark.parametrize(
     ("command", "words"),
     [
         (f"simulate euler {MOTION} --step 0.02 --errors nothing.toml", "nothing.toml cannot be read"),

@@ -4,7 +4,6 @@ import textwrap
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 from strapgen.design.brief import read_brief
@@ -83,7 +82,7 @@ def test_a_brief_is_read_exactly(tmp_path):
     assert (brief.budget.over_s, brief.budget.software_share, brief.processor.word) == (3600, 0.1, 16)
 
 
-@each(("before", "after", "said"), BAD)
+@pytest.mark.parametrize(("before", "after", "said"), BAD)
 def test_a_brief_that_cannot_be_is_refused_in_one_line(tmp_path, before, after, said):
     assert before in GOOD
     path = written(tmp_path, GOOD.replace(before, after))
@@ -116,7 +115,7 @@ def test_the_command_refuses_every_bad_brief_in_one_line_and_writes_nothing(tmp_
     assert not wrong, wrong[0]
 
 
-@each(
+@pytest.mark.parametrize(
     ("words", "said"),
     [
         ("missing.toml", "missing.toml"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen.catalogue import choose
 from strapgen.design.brief import read_brief
@@ -42,7 +41,7 @@ def rounding(monkeypatch):
     return chosen
 
 
-@each(
+@pytest.mark.parametrize(
     ("bounds", "allowed", "carry", "tried"),
     [
         (BOTH, 9.0, "none", ["none"]),

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gathering import each
 from scipy.spatial.transform import Rotation
 
 import strapgen
@@ -285,7 +284,7 @@ def test_filters_for_a_gyro_go_with_its_sampling_rate_alone():
     CommitLate(WINDOW, sample_hz=200)
 
 
-@each("sample", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [0.0, 0.0, np.nan], "xyz"], ids=str)
+@pytest.mark.parametrize("sample", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [0.0, 0.0, np.nan], "xyz"], ids=str)
 def test_samples_and_attitudes_are_finite_numbers_of_their_shape(sample):
     unit = CommitLate(WINDOW)
     for call in (unit.push, unit.reset):
@@ -295,7 +294,7 @@ def test_samples_and_attitudes_are_finite_numbers_of_their_shape(sample):
         unit.push([0.0, 0.0, 0.0], 3)
 
 
-@each(
+@pytest.mark.parametrize(
     ("arguments", "reason"),
     [
         (("window-2-2",), "window is 'window-2-2'"),
@@ -313,12 +312,43 @@ def test_unknown_names_are_refused(arguments, reason):
 # Generated C
 
 
-@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
-@pytest.mark.parametrize("window", ["window-3-3", pytest.param("window-7-7", marks=pytest.mark.long)])
-@pytest.mark.parametrize("name", ["random", "cone", "slew"])
-def test_c_has_the_bits_of_python(algorithm, window, name):
+#: Every window, run and algorithm once.
+QUICK_RUNS = {
+    ("window-3-3", "random", "euler"),
+    ("window-3-3", "cone", "dcm"),
+    ("window-3-3", "slew", "euler"),
+}
+
+
+@pytest.mark.parametrize(
+    ("window", "name", "algorithm", "backends", "settings"),
+    [
+        *(
+            pytest.param(
+                window, name, algorithm, ("numpy", "c"), None, marks=() if quick else pytest.mark.long
+            )
+            for window in ("window-3-3", "window-7-7")
+            for name in ("random", "cone", "slew")
+            for algorithm in ("euler", "dcm")
+            for quick in [(window, name, algorithm) in QUICK_RUNS]
+        ),
+        (WINDOW, "random", "euler", ("fixed-model", "c-fixed32"), {"carry": "full"}),
+        *(
+            pytest.param(
+                WINDOW, "random", algorithm, ("fixed-model", "c-fixed32"), more, marks=pytest.mark.long
+            )
+            for algorithm, more in (
+                ("euler", {"carry": "none"}),
+                ("dcm", {"carry": "full"}),
+                ("euler", {"carry": "full", **COUNTS}),
+            )
+        ),
+    ],
+)
+def test_c_has_the_bits_of_python_and_of_the_model(window, name, algorithm, backends, settings):
     """Operations have one order, so that nothing may differ, with gaps, resets and flushes too."""
-    python, c = (CommitLate(window, algorithm, backend) for backend in ("numpy", "c"))
+    settings = settings and Settings.of(**settings)
+    python, c = (CommitLate(window, algorithm, backend, settings=settings) for backend in backends)
     increments = samples(60, name)
     kinds = {9: LOST, 25: LOST, 26: MERGED, 40: LOST, 56: LOST}
     for number, sample in enumerate(increments):
@@ -426,36 +456,6 @@ def test_the_start_of_a_recording_is_as_accurate_as_published():
 
 
 # Fixed point
-
-
-@pytest.mark.parametrize(
-    ("algorithm", "carry", "counts"),
-    [
-        ("euler", "full", {}),
-        pytest.param("euler", "none", {}, marks=pytest.mark.long),
-        pytest.param("dcm", "full", {}, marks=pytest.mark.long),
-        pytest.param("euler", "full", COUNTS, marks=pytest.mark.long),
-    ],
-)
-def test_c_on_integers_has_the_bits_of_the_model(algorithm, carry, counts):
-    settings = Settings.of(carry=carry, **counts)
-    model, c = (
-        CommitLate(WINDOW, algorithm, name, settings=settings) for name in ("fixed-model", "c-fixed32")
-    )
-    increments = samples(60)
-    kinds = {9: LOST, 25: LOST, 26: MERGED, 40: LOST, 56: LOST}
-    for number, sample in enumerate(increments):
-        if number == 33:
-            start = model.attitude.T if algorithm == "dcm" else model.attitude * [-1, -1, -1, 1]
-            model.reset(start)
-            c.reset(start)
-        if number == 45:
-            assert model.flush() == c.flush() > 0
-        kind = kinds.get(number, GOOD)
-        value = sample + increments[number - 1] if kind == MERGED else sample
-        assert model.push(value, kind) == c.push(value, kind)
-        np.testing.assert_array_equal(model.attitude, c.attitude)
-        np.testing.assert_array_equal(model.now(), c.now())
 
 
 @pytest.mark.long

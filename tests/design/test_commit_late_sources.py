@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import pytest
 from c_programs import COMPILERS, complaints, needed, written
-from gathering import each
 
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
@@ -105,7 +104,7 @@ def test_a_family_for_a_gyro_filters_all_coefficients_and_says_its_rate():
     assert "sums[4][3]" in sources(WINDOW).files["euler_late_3_3.c"]
 
 
-@each(
+@pytest.mark.parametrize(
     ("arguments", "reason"),
     [
         ((WINDOW, "cayley-klein"), "algorithm"),

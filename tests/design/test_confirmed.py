@@ -6,7 +6,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 from strapgen.design.brief import read_brief
@@ -56,7 +55,7 @@ def judged(tmp_path, text, methods=METHODS):
     return path, brief, in_order(one for row in rows for one in row)
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "first", "ran", "parts"),
     [
         (OCTAVES.format(second=10.8, third=21.6), 3.3e-7, 0.072, ("3", "4", "2")),

@@ -87,7 +87,7 @@ def shaped() -> ShapedConing:
 def test_the_built_in_file_is_what_its_command_writes(shaped):
     built_in = SHAPES["coning-shaped-8"]
     assert replace(built_in, name=shaped.name) == shaped
-    path = shaped_coning._BUILT_IN._files["coning-shaped-8"]
+    path = shaped_coning._BUILT_IN.files["coning-shaped-8"]
     command, figures = path.read_text().splitlines()[:2]
     assert (
         written(shaped, command.removeprefix("# Designed by: "), [figures.removeprefix("# ")])

@@ -7,7 +7,6 @@ import math
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.catalogue import METHODS
 from strapgen.catalogue.methods.coning_coefficients import design
@@ -52,7 +51,7 @@ def test_names_stand_for_candidates():
     assert file.choice.increments == 3
 
 
-@each(
+@pytest.mark.parametrize(
     ("name", "words"),
     [
         ("rk5", "method 'rk5' is not known"),
@@ -98,7 +97,7 @@ def on_cone(method: str, half_angle: str, frequency: str, duration: str) -> floa
     return frontier._drift(one.choice, "cone", frontier.Trial(one, "100", duration, cone))
 
 
-@each("half_angle", ["0.01", "0.001"])
+@pytest.mark.parametrize("half_angle", ["0.01", "0.001"])
 def test_a_drift_that_rounding_hides_is_that_of_its_series(half_angle):
     # The closed form is of second order in the half-angle: the fourth adds 2.3e-4 of it at 0.01 deg, and its square.
     symbols = {"alpha": math.radians(float(half_angle)), "omega": 10 * math.pi, "T": 0.01}

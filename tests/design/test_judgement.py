@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.cli import main
@@ -183,7 +182,7 @@ def test_operations_that_the_processor_lacks_bind(tmp_path):
 
 
 @pytest.mark.needs("arm-none-eabi-gcc")
-@each("limit", ["bytes = 100", "instructions_per_s = 1000"])
+@pytest.mark.parametrize("limit", ["bytes = 100", "instructions_per_s = 1000"])
 def test_memory_and_instructions_that_the_processor_lacks_bind(tmp_path, limit):
     require_that_it_binds(limit, tmp_path)
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.windows import WINDOWS, with_exact_rotation
@@ -36,7 +35,7 @@ def test_memory_holds_a_window_with_a_gap(name, capacity, most):
     assert (filters.capacity, filters.most_commits) == (capacity, most)
 
 
-@each("count", range(1, SHORT + 1))
+@pytest.mark.parametrize("count", range(1, SHORT + 1))
 def test_few_samples_have_the_polynomial_through_them(count):
     filters = LateFilters(WINDOW)
     for place in range(count):

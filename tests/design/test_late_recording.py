@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.design.commit_late.commit_late import CommitLate
@@ -60,7 +59,7 @@ def test_it_begins_where_it_is_told():
     np.testing.assert_allclose(result, turned, rtol=0, atol=ROUNDING)
 
 
-@each(
+@pytest.mark.parametrize(
     ("kinds", "reason"),
     [
         ({4: 1}, "sample 4: a sample is lost after 4"),
@@ -78,7 +77,7 @@ def test_gaps_that_no_filter_restores_are_refused(kinds, reason):
         one_by_one(samples(30), kinds)
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "reason"),
     [
         ({"kinds": [0]}, "kinds has shape"),

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.design.brief import read_brief
 from strapgen.design.environment import LineEnvironment
@@ -56,7 +55,7 @@ def predicted_and_run(path, contender, state):
     return math.hypot(*at_its_phases) * causes.DEG_H, found.worst() * causes.DEG_H, run
 
 
-@each("hertz", FREQUENCIES)
+@pytest.mark.parametrize("hertz", FREQUENCIES)
 @pytest.mark.parametrize(
     ("state", "contender"),
     [

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from scipy.special import spherical_jn
 
 from strapgen.catalogue.methods import rate_fit
@@ -62,7 +61,7 @@ def test_errors_and_levels_are_those_of_the_definitions(window, gyro):
         assert responses.level(window, m) == pytest.approx(largest, rel=1e-7, abs=1e-14)
 
 
-@each("increments", [1, 2, 5, 20])
+@pytest.mark.parametrize("increments", [1, 2, 5, 20])
 def test_what_is_to_be_reached_is_the_spherical_bessel_function(increments):
     b = [0.01, 1.0, 2.0, 3.0]
     grid = BandGrid([REAL.mpf(each) for each in b], 1, increments=increments)

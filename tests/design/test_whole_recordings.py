@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.design.commit_late.late_recording import recording_attitudes
@@ -48,7 +47,7 @@ def test_records_are_thinned_and_pulses_counted():
     )
 
 
-@each(
+@pytest.mark.parametrize(
     ("choice", "backend"),
     [
         (strapgen.choose("euler", "window-4-2"), "c"),

@@ -10,7 +10,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.windows import WINDOWS
@@ -120,7 +119,7 @@ def test_a_spectrum_shapes_the_filters(run, tmp_path):
     assert "--spectrum psd.csv" in (tmp_path / "low.toml").read_text().splitlines()[0]
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ("--ahead 2 --band 1", "--previous is needed, a number of samples"),
@@ -232,7 +231,7 @@ def test_a_file_is_shown_and_plotted(run, tmp_path):
     assert warned == "wrote picture.svg\n" and "polynomial" in (tmp_path / "picture.svg").read_text()
 
 
-@each(
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         ("window", "Missing command. Allowed: design, show"),

@@ -8,7 +8,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.catalogue.methods.window import GyroResponse
@@ -85,7 +84,7 @@ def test_filters_for_a_gyro_are_refused_at_another_rate(run, tmp_path):
     assert "euler_late_slow_gyro.h" in said
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ("window-3-3 --target c-fixed --word 16", "words of 32 bits"),

@@ -8,7 +8,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from derived import program
-from gathering import each
 from small_programs import node
 from small_programs import program as small
 
@@ -22,7 +21,7 @@ def test_a_ball_holds_a_third():
     assert balls.ball(Fraction(1, 3)).contains(flint.fmpq(1, 3))
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "arguments"),
     [
         *(

@@ -7,7 +7,6 @@ import shlex
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 from strapgen.evidence import collection, gappa
@@ -55,7 +54,7 @@ def test_a_tool_that_is_missing_is_named_and_fails_where_all_must_be_there(capsy
     assert "install frama-c-base" in said and "install gappa" in said
 
 
-@each(
+@pytest.mark.parametrize(
     ("command", "line"),
     [
         ("", "a kernel is needed, or --all"),

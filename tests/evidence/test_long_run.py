@@ -9,7 +9,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 from strapgen.catalogue import choose
 from strapgen.evidence import long_run
@@ -105,7 +104,7 @@ def test_balls_that_are_too_wide_prove_nothing():
     assert detail.endswith("balls of a radius below 1e+00")
 
 
-@each(
+@pytest.mark.parametrize(
     ("kernel", "settings"),
     [("dcm", None), ("euler-product", None), ("euler", Settings(word=16)), ("euler", Settings(carry="full"))],
 )

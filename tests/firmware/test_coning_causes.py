@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.firmware.check_code import coning_causes as causes
@@ -43,14 +42,14 @@ def one_by_one(samples: int, factor: float, distance: int = 1) -> Products:
 
 
 @pytest.mark.long
-@each("chosen", DESIGNS)
+@pytest.mark.parametrize("chosen", DESIGNS)
 def test_a_published_correction_has_no_fault(chosen):
     assert causes.cause(tables(*chosen)) is None
     standard = causes.standard_design(tables(*chosen))
     assert (standard.samples, standard.previous) == chosen[:2]
 
 
-@each(
+@pytest.mark.parametrize(
     ("factor", "cause"),
     [(0, causes.ABSENT), (-1, causes.WRONG_SIGN), (2, causes.FACTOR_TWO), (0.5, causes.FACTOR_TWO)],
 )
@@ -113,7 +112,7 @@ def test_faults_that_make_up_a_known_size_are_no_known_fault():
     assert said == "coefficients of no single fault that is known, 2 of what coning needs"
 
 
-@each("samples", [1, 2, 4])
+@pytest.mark.parametrize("samples", [1, 2, 4])
 def test_samples_that_are_turned_one_by_one_are_known(samples):
     assert causes.cause(one_by_one(samples, 1)) is None
     assert causes.wanted(one_by_one(samples, -1)) == pytest.approx(one_by_one(samples, 1).at_once)
@@ -125,7 +124,7 @@ def test_samples_that_are_turned_one_by_one_are_known(samples):
     assert causes.cause(one_by_one(samples, 1, distance=2)) == causes.LATE
 
 
-@each("samples", [2, 3, 4])
+@pytest.mark.parametrize("samples", [2, 3, 4])
 def test_samples_in_reverse_order_are_known(samples):
     # The recursion by hand: sample k of a call is its sample N - 1 - k, and the one before the first the last call's 0.
     known = dict.fromkeys(pairs(samples), 0.0)
@@ -137,8 +136,10 @@ def test_samples_in_reverse_order_are_known(samples):
     assert causes.cause(Products(samples, table, table)) == causes.REVERSED
 
 
-@each("form", FORMS)
-@each(("samples", "used", "kept"), [(1, 2, 2), (1, 3, 3), (1, 2, 3), (1, 1, 3), (2, 2, 2), (2, 3, 3)])
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    ("samples", "used", "kept"), [(1, 2, 2), (1, 3, 3), (1, 2, 3), (1, 1, 3), (2, 2, 2), (2, 3, 3)]
+)
 def test_earlier_samples_in_reverse_order_are_known(samples, used, kept, form):
     """With those of 4 before: what stands at -1 belongs to the oldest one that is kept, and the reverse."""
     right = tables(samples, used, form)
@@ -174,7 +175,7 @@ def test_the_error_of_a_probe_changes_no_name(error):
         assert causes.cause(Products(1, off, off)) == cause
 
 
-@each(("downwards", "elements"), [(False, "elements 0, 1, 2"), (True, "elements 1, 2, 3")])
+@pytest.mark.parametrize(("downwards", "elements"), [(False, "elements 0, 1, 2"), (True, "elements 1, 2, 3")])
 def test_an_update_in_place_is_explained_in_either_order(downwards, elements):
     # The product of quaternions, scalar first, element by element into the state that is read.
     convention = Convention("first")

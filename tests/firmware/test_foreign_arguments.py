@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from gathering import each
 
 from strapgen.firmware.check_code.foreign_arguments import is_foreign, read_arguments
 from strapgen.ir.exceptions import InputError
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "names", "count", "elements"),
     [
         ("state[4], increments[2][3] -> next[4]", "state increments next", 2, 4),
@@ -31,7 +30,7 @@ def test_arguments_are_read_in_the_order_of_c(text, names, count, elements):
     assert (arguments.count, arguments.elements) == (count, elements)
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("state[4], increments[3]", "has no single arrow; 'state.*next.4.' is an example"),

@@ -8,7 +8,6 @@ import shlex
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 
@@ -97,7 +96,7 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
     assert check(command)[0] == 0
 
 
-@each(
+@pytest.mark.parametrize(
     ("words", "says"),
     [
         (f"{PLACE}/correct.c", "correct.c needs --function; --function NAME --arguments "),

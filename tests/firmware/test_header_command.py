@@ -240,17 +240,17 @@ def test_two_speeds_say_what_generate_says_of_each_loop(tmp_path, capsys):
     assert status == 0 and lines[0].startswith("dcm-two-speed-2 for c-fixed: ") and " multiply" in lines[0]
     (fast,) = (k for k, line in enumerate(lines) if line.startswith("two-speed-fast-2 for c-fixed: "))
     assert "increment: counts of the gyro in 16 bits; 1 count = " in lines[fast + 1]
-    assert sum(line.startswith("  next_coning: Q") and "error at most" in line for line in lines) == 1
+    assert sum(line.startswith("  next_coning: Q") and "error <=" in line for line in lines) == 1
     # The same options for the loop by itself, in the formats that the loops share.
     status, out, _ = says(f"two-speed dcm {gyro} --out {tmp_path} --format json".split(), capsys)
     functions = json.loads(out)["functions"]
     assert len(functions) == 3 and functions[0]["kernel"] == "two-speed-fast-2"
     command = command_of((tmp_path / "two_speed_fast_2_w32.h").read_text()) or ""
     _, out, _ = says([*shlex.split(command)[1:], "--out", str(tmp_path / "alone")], capsys)
-    contract = [line for line in out.splitlines() if "error at most" in line or "counts of" in line]
+    contract = [line for line in out.splitlines() if "error <=" in line or "counts of" in line]
     assert contract and {*contract} <= {*lines}
     text = (tmp_path / "dcm_two_speed_2_w32.h").read_text()
-    worst = re.search(r"next_coning: Q\S+, error at most (\S+),", "\n".join(lines))
+    worst = re.search(r"next_coning: Q\S+, error <= (\S+) ", "\n".join(lines))
     assert worst is not None and f"next_coning {worst[1]}" in text.replace("\n *     ", " ")
 
 

@@ -6,7 +6,6 @@ import json
 import shlex
 
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 
@@ -53,7 +52,7 @@ def test_the_command_of_a_loop_writes_the_vectors_of_its_project(tmp_path, capsy
     assert written == {name: (tmp_path / "whole" / name).read_text() for name in written}
 
 
-@each(
+@pytest.mark.parametrize(
     ("command", "message"),
     [
         ("vectors euler --target numpy", "target 'numpy'"),

@@ -6,16 +6,15 @@ import math
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from small_integers import GRID, Known, at_corners, context, quantity, worst
 
-from strapgen.fixedpoint.comparisons import (
+from strapgen.fixedpoint.integer_operations import (
     lower_computed,
     lower_maximum,
     lower_nearest_integer,
     lower_selection,
 )
-from strapgen.fixedpoint.quantities import Computed, Maximum, NearestInteger, Selection
+from strapgen.fixedpoint.quantities import ExactOperation
 from strapgen.ir.exceptions import InputError
 
 FINE = Known(4, -7, 7, Fraction(1, 100))
@@ -31,7 +30,7 @@ def lowered(lower, known, definition, low, high, **settings):
     return walk.values["y"], walk
 
 
-@each(
+@pytest.mark.parametrize(
     ("known", "arguments", "exact"),
     [
         ({"a": FINE, "b": COARSE}, ("a", "b"), max),
@@ -41,7 +40,9 @@ def lowered(lower, known, definition, low, high, **settings):
     ],
 )
 def test_a_maximum_is_off_by_the_largest_error_of_its_arguments(known, arguments, exact):
-    value, walk = lowered(lower_maximum, known, Maximum(arguments), *at_corners(known, exact))
+    value, walk = lowered(
+        lower_maximum, known, ExactOperation("maximum", arguments), *at_corners(known, exact)
+    )
     measured = worst(walk, "y", known, exact)
     assert measured.error <= value.error <= measured.error + GRID
     assert value.low <= measured.low
@@ -56,7 +57,7 @@ def chosen(c, first, second):
 @pytest.mark.parametrize("names", [("a", "b"), ("b", "a")])
 def test_a_selection_by_exact_numbers_is_off_by_the_error_of_the_worse_case(names):
     known = {"c": EXACT, "a": FINE, "b": COARSE}
-    value, walk = lowered(lower_selection, known, Selection((("c", ZERO, names[0]),), names[1]), -1, 1)
+    value, walk = lowered(lower_selection, known, ExactOperation("select", ("c", ZERO, *names)), -1, 1)
     measured = worst(walk, "y", known, lambda c, a, b: chosen(c, *({"a": a, "b": b}[name] for name in names)))
     assert measured.error <= value.error <= measured.error + GRID
     assert value.error == COARSE.error or value.error - COARSE.error < GRID
@@ -67,7 +68,7 @@ def test_a_selection_by_an_inexact_number_is_off_by_all_of_its_range_too(case):
     known = {"c": Known(3, -2, 2, Fraction(1, 50))}
     known |= {"a": Known(3, -4, 4, Fraction(1, 9)), "b": Known(2, -2, 2, Fraction(1, 9))}
     most = Fraction(1, 2) - Fraction(1, 9)
-    value, walk = lowered(lower_selection, known, Selection((case,), "b"), -most, most)
+    value, walk = lowered(lower_selection, known, ExactOperation("select", (*case, "b")), -most, most)
     sign = 1 if case[0] == "c" else -1
     measured = worst(walk, "y", known, lambda c, a, b: a if sign * c >= 0 else b)
     # Where c is computed as 0, the exact one may be at one end of b, and the computed one at the other end of a.
@@ -76,7 +77,7 @@ def test_a_selection_by_an_inexact_number_is_off_by_all_of_its_range_too(case):
 
 def test_outcomes_without_room_at_one_fraction_lose_a_unit_of_it():
     known = {"c": EXACT, "a": Known(18, -20, 20), "b": Known(0, 90, 100)}
-    value, walk = lowered(lower_selection, known, Selection((("c", ZERO, "a"),), "b"), -100, 100)
+    value, walk = lowered(lower_selection, known, ExactOperation("select", ("c", ZERO, "a", "b")), -100, 100)
     measured = worst(walk, "y", known, chosen)
     unit = Fraction(2) ** -value.fraction
     assert value.fraction < 18
@@ -87,16 +88,16 @@ def test_outcomes_without_room_at_one_fraction_lose_a_unit_of_it():
 def test_numbers_that_have_no_room_beside_each_other_cannot_be_compared():
     known = {"a": Known(18, -40, 40), "b": Known(0, -100, 100)}
     with pytest.raises(InputError, match="too short to compare"):
-        lowered(lower_maximum, known, Maximum(("a", "b")), -100, 100)
+        lowered(lower_maximum, known, ExactOperation("maximum", ("a", "b")), -100, 100)
 
 
-@each(
+@pytest.mark.parametrize(
     ("low", "high"),
     [(-2, 2), (-2, Fraction(1, 5)), (Fraction(-1, 5), 2), (Fraction(-3, 8), Fraction(3, 8)), (0, 0)],
 )
 def test_a_computed_value_is_kept_in_the_range_of_the_exact_one(low, high):
     known = {"a": FINE}
-    value, walk = lowered(lower_computed, known, Computed("a"), low, high)
+    value, walk = lowered(lower_computed, known, ExactOperation("computed", ("a",)), low, high)
     measured = worst(walk, "y", {"a": Known(4, -7, 7)}, lambda a: min(max(a, low), high))
     # It is a number that what comes after takes as exact; brought into the range it moves by less than a unit.
     assert value.error == 0
@@ -108,7 +109,9 @@ def test_a_computed_value_is_kept_in_the_range_of_the_exact_one(low, high):
 
 def test_a_range_without_a_word_is_too_short():
     with pytest.raises(InputError, match="too short for a"):
-        lowered(lower_computed, {"a": FINE}, Computed("a"), Fraction(1, 60), Fraction(1, 50))
+        lowered(
+            lower_computed, {"a": FINE}, ExactOperation("computed", ("a",)), Fraction(1, 60), Fraction(1, 50)
+        )
 
 
 @pytest.mark.parametrize("rounding", ["nearest", "truncation"])
@@ -120,10 +123,14 @@ def test_the_nearest_integer_is_that_whatever_the_rounding_of_words(factor, roun
         return Fraction(math.floor(a * factor + Fraction(1, 2)))
 
     ends = at_corners(known, exact)
-    value, walk = lowered(lower_nearest_integer, known, NearestInteger("a", factor), *ends, rounding=rounding)
+    value, walk = lowered(
+        lower_nearest_integer, known, ExactOperation("nearest", ("a", factor)), *ends, rounding=rounding
+    )
     measured = worst(walk, "y", known, exact)
     assert measured.error == value.error == 0
     assert (value.low, value.high) == (measured.low, measured.high)
     assert measured.peak <= value.peak == 100 * abs(factor.numerator) + (8 * factor.denominator)
     with pytest.raises(InputError, match="too short"):
-        lowered(lower_nearest_integer, {"a": Known(-3, -3, 3)}, NearestInteger("a", factor), -20, 20)
+        lowered(
+            lower_nearest_integer, {"a": Known(-3, -3, 3)}, ExactOperation("nearest", ("a", factor)), -20, 20
+        )

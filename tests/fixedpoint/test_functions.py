@@ -15,7 +15,6 @@ import mpmath
 import numpy as np
 import pytest
 from derived import programs
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -24,9 +23,9 @@ from strapgen.fixedpoint import can_lower, function_series, quantize
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.run import compiler
 from strapgen.run.c import CEvaluator
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.fixed import ModelEvaluator
@@ -80,8 +79,7 @@ def program_of(kind: str, bounds: tuple[Fraction, ...], body: Any = None) -> Pro
     signals = tuple(Signal.scalar(n, bound=b, meaning="argument") for n, b in zip(names, bounds, strict=True))
     arguments = tuple((body or (lambda node: node))(Reference(name)) for name in names)
     return Program(
-        *("tested", "tested", "a function", "none", "tested"),
-        notes=(),
+        KernelInfo("tested", "a function", "none", arguments="tested"),
         inputs=signals,
         body=(Assignment("value", Operation(kind, arguments)),),
         outputs=(Result(Signal.scalar("result", meaning="value"), (Reference("value"),)),),
@@ -165,7 +163,7 @@ def test_sine_series_leaves_out_no_more_than_it_says(first, bits, reach):
         assert distance <= _precise(left_out) + PRECISE.mpf(2) ** -390
 
 
-@each("bits", [9, 17, 33, 65])
+@pytest.mark.parametrize("bits", [9, 17, 33, 65])
 def test_arctangent_series_leaves_out_no_more_than_it_says(bits):
     coefficients, left_out = function_series.arctangent_series(Fraction(1, 2**bits))
     assert left_out <= Fraction(1, 2**bits)
@@ -188,22 +186,11 @@ def _precise(value: Fraction) -> Any:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "words",
-    [(16, 64), pytest.param((24, 32), marks=pytest.mark.long)],
-    ids=lambda words: "-".join(map(str, words)),
-)
-def test_error_stays_below_its_bound(words):
-    @each("rounding", ["nearest", "truncation"])
-    @each("word", words)
-    @each("case", CASES)
-    def keep(case, word, rounding):
-        error_is_below_its_bound(case, word, rounding)
-
-    keep()
-
-
-def error_is_below_its_bound(case, word, rounding):
+@pytest.mark.every_combination
+@pytest.mark.parametrize("rounding", ["nearest", "truncation"])
+@pytest.mark.parametrize("word", [16, 24, 32, 64])
+@pytest.mark.parametrize("case", CASES)
+def test_error_stays_below_its_bound(case, word, rounding):
     kind, _, places = CASES[case]
     lowered, evaluator = fixed(case, word, rounding), model(case, word, rounding)
     inputs = corners_and_others(evaluator, 120)
@@ -219,28 +206,23 @@ def error_is_below_its_bound(case, word, rounding):
 
 
 @pytest.mark.parametrize(
-    ("rounding", "cases"),
+    ("case", "word", "rounding"),
     [
-        ("nearest", list(zip(CASES, cycle(C_WORDS), strict=False))),
+        *((*case, "nearest") for case in zip(CASES, cycle(C_WORDS), strict=False)),
         *(
-            pytest.param(rounding, list(product(CASES, C_WORDS)), marks=pytest.mark.long)
-            for rounding in ("nearest", "truncation")
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in product(CASES, C_WORDS, ("nearest", "truncation"))
         ),
     ],
-    ids=["nearest-one-word-each", "nearest", "truncation"],
 )
-def test_c_computes_what_the_model_does(rounding, cases):
-    several = {case: emit(fixed(*case, rounding), "c-fixed") for case in cases}
-    compiler.compile_together(several.values())
-
-    @each(("case", "word"), cases)
-    def agree(case, word):
-        evaluator, generated = model(case, word, rounding), CEvaluator(several[case, word])
-        inputs = corners_and_others(evaluator, 3000)
-        (expected,), (computed,) = outputs(evaluator, inputs), outputs(generated, inputs)
-        assert (expected == computed).all()
-
-    agree()
+def test_c_computes_what_the_model_does(case, word, rounding):
+    evaluator, generated = (
+        model(case, word, rounding),
+        CEvaluator(emit(fixed(case, word, rounding), "c-fixed")),
+    )
+    inputs = corners_and_others(evaluator, 3000)
+    (expected,), (computed,) = outputs(evaluator, inputs), outputs(generated, inputs)
+    assert (expected == computed).all()
 
 
 @pytest.mark.long
@@ -258,7 +240,7 @@ def test_any_argument_stays_below_the_bound(case, data):
     assert worst_error(lowered, inputs, integers, kind) <= lowered.interface.outputs[0].errors[0]
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "bounds"),
     [
         ("sin", (Fraction(3),)),

@@ -7,7 +7,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from small_programs import node, program
 
 from strapgen.fixedpoint import functions
@@ -44,7 +43,7 @@ def test_the_root_of_a_number_lies_between_its_ends():
     assert root.inexact < Fraction(1, 1 << 150)
 
 
-@each(
+@pytest.mark.parametrize(
     ("value", "low", "high"),
     [
         (node("maximum", "a", "b"), -1, 2),

@@ -8,7 +8,6 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from derived import FIXED_POINT, program
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +19,7 @@ from strapgen.fixedpoint.quantization_context import _is_polynomial
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.fixed import ModelEvaluator
@@ -33,12 +33,7 @@ def hand_made(body: dict[str, object], *outputs: str, bound: object = 1) -> Prog
     y = Signal("y", (len(outputs),), tuple(f"y_{k}" for k in range(len(outputs))))
     assignments = tuple(Assignment(name, value) for name, value in body.items())
     return Program(
-        "made",
-        "made",
-        "Made by hand",
-        "",
-        "made",
-        (),
+        KernelInfo("made", "Made by hand", "", arguments="made"),
         (x,),
         assignments,
         (Result(y, tuple(map(Reference, outputs))),),
@@ -217,7 +212,7 @@ def test_a_user_fixes_formats():
     assert formats["p_y"] != "Q0.31"
 
 
-@each(
+@pytest.mark.parametrize(
     ("formats", "said"),
     [
         ({"increments": "Q-9.40"}, "format Q-9.40 of increments does not hold its range of \\+-0.125"),

@@ -14,14 +14,14 @@ from strapgen.fixedpoint.quantities import Quantities
 from strapgen.fixedpoint.quantization import _MOST_GUARD_BITS, _errors, _is_worse, _output
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.integer_program import IntegerInput, IntegerSum, Term, Value
+from strapgen.ir.integer_program import IntegerSum, Term, Value
 from strapgen.ir.signals import Signal
 
 ZERO = Fraction(0)
 
 
 def value(name, low, high, *uses, error=Fraction(1, 100), **more) -> Value:
-    definition = IntegerSum(tuple(Term((use,), 1) for use in uses)) if uses else IntegerInput()
+    definition = IntegerSum(tuple(Term((use,), 1) for use in uses)) if uses else None
     return Value(name, definition, 4, False, low, high, ZERO, error, 99, **more)
 
 

@@ -6,11 +6,10 @@ import math
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from small_integers import GRID, Known, Worst, at_corners, context, quantity, worst
 
-from strapgen.fixedpoint.quantities import Quotient, SquareRoot
-from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
+from strapgen.fixedpoint.integer_operations import lower_quotient, lower_root
+from strapgen.fixedpoint.quantities import ExactOperation
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import Value
 
@@ -25,7 +24,7 @@ def quotient(known, definition, exact, **options) -> tuple[Value, Worst]:
     return walk.values["y"], worst(walk, "y", known, exact)
 
 
-@each(
+@pytest.mark.parametrize(
     ("known", "numerator", "exact", "fraction"),
     [
         # 15/16 in eighths is 7 and a half: the largest quotient is at the smallest divisor, and is rounded up by half a
@@ -42,7 +41,9 @@ def quotient(known, definition, exact, **options) -> tuple[Value, Worst]:
     ],
 )
 def test_the_bound_of_a_quotient_is_attained(known, numerator, exact, fraction):
-    value, measured = quotient(known, Quotient(numerator, "b"), exact, forced={"y": fraction})
+    value, measured = quotient(
+        known, ExactOperation("divide", (numerator, "b")), exact, forced={"y": fraction}
+    )
     assert measured.error <= value.error <= measured.error + GRID
     assert value.low <= measured.low <= value.low + 2
     assert value.high - 2 <= measured.high <= value.high
@@ -52,7 +53,11 @@ def test_the_bound_of_a_quotient_is_attained(known, numerator, exact, fraction):
 def test_a_truncated_quotient_lacks_up_to_a_unit():
     known = {"a": Known(4, -15, 15), "b": Known(4, 16, 24)}
     value, measured = quotient(
-        known, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 3}, rounding="truncation"
+        known,
+        ExactOperation("divide", ("a", "b")),
+        lambda a, b: a / b,
+        forced={"y": 3},
+        rounding="truncation",
     )
     assert value.error == Fraction(1, 8)
     assert measured.error == value.error * Fraction(20, 21)  # of 13 by 21, 20 are left
@@ -60,25 +65,25 @@ def test_a_truncated_quotient_lacks_up_to_a_unit():
 
 def test_a_quotient_is_as_fine_as_the_numerator_has_room():
     known = {"a": Known(4, 100, 120), "b": Known(4, 64, 80)}
-    fine, _ = quotient(known, Quotient("a", "b"), lambda a, b: a / b)
+    fine, _ = quotient(known, ExactOperation("divide", ("a", "b")), lambda a, b: a / b)
     # 120/64 takes 6 places of an 8-bit word; half the divisor is added to a numerator of 15 bits before the division.
     assert fine.fraction == 6
     assert fine.peak + 80 // 2 < 1 << 15
     wide = {"a": Known(4, 11_900, 12_000, wide=True), "b": Known(4, 100, 110)}
-    coarse, measured = quotient(wide, Quotient("a", "b"), lambda a, b: a / b)
+    coarse, measured = quotient(wide, ExactOperation("divide", ("a", "b")), lambda a, b: a / b)
     assert (coarse.fraction, coarse.peak) == (0, 12_000)
     assert measured.error <= coarse.error == Fraction(1, 2)
     with pytest.raises(InputError, match="too short for y"):
-        quotient(wide, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 2})
+        quotient(wide, ExactOperation("divide", ("a", "b")), lambda a, b: a / b, forced={"y": 2})
 
 
 def test_half_of_a_wide_divisor_has_room_beside_the_numerator():
     # One place more would make 20,000 of the numerator, to which half of 15,010 is added: both have 15 bits together.
     known = {"a": Known(4, 9_990, 10_000, wide=True), "b": Known(4, 15_000, 15_010, wide=True)}
-    value, measured = quotient(known, Quotient("a", "b"), lambda a, b: a / b)
+    value, measured = quotient(known, ExactOperation("divide", ("a", "b")), lambda a, b: a / b)
     assert (value.fraction, value.peak, measured.peak) == (0, 10_000, 10_000)
     with pytest.raises(InputError, match="too short for y"):
-        quotient(known, Quotient("a", "b"), lambda a, b: a / b, forced={"y": 1})
+        quotient(known, ExactOperation("divide", ("a", "b")), lambda a, b: a / b, forced={"y": 1})
 
 
 def root_of(value: Fraction) -> Fraction:
@@ -88,7 +93,7 @@ def root_of(value: Fraction) -> Fraction:
 
 def root(argument: Known, **settings) -> tuple[Value, Worst]:
     known = {"a": argument}
-    item = quantity("y", SquareRoot("a"), *at_corners(known, root_of))
+    item = quantity("y", ExactOperation("sqrt", ("a",)), *at_corners(known, root_of))
     walk = context(known, item, **settings)
     lower_root(walk, item, item.definition)
     return walk.values["y"], worst(walk, "y", known, root_of)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from derived import program, quantized
 from fixed_inputs import corners_and_random
-from gathering import each
 
 import strapgen
 from strapgen import generate
@@ -48,7 +47,7 @@ def exact_outputs(choice: Choice, fixed, words) -> list[Fraction]:
     return program(choice).run(numbers)["next"]
 
 
-@each(("choice", "stated"), CASES, ids=lambda case: getattr(case, "kernel", ""))
+@pytest.mark.parametrize(("choice", "stated"), CASES, ids=lambda case: getattr(case, "kernel", ""))
 def test_c_is_the_model_and_inside_its_bound_on_counts(choice, stated, rng):
     fixed = quantized(choice, Settings.of(increments=choice.increments_per_step, **stated))
     model, in_c = ModelEvaluator(generate(fixed, "fixed-model")), CEvaluator(generate(fixed, "c-fixed"))
@@ -90,7 +89,7 @@ def test_another_scale_breaks_the_bound(rng):
 
 
 @pytest.mark.long
-@each(
+@pytest.mark.parametrize(
     ("choice", "more"),
     [(EULER, 2), (DCM, 3), (HEUN, 3), (Choice("euler", "rk4", 4), 0), (Choice("dcm", "rk2", 1), 3)],
 )

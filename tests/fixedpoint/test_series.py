@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from gathering import each
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -66,7 +66,9 @@ def test_what_fits_is_exact_and_cancels():
     assert arithmetic.size(arithmetic.less(one, other)) < Fraction(1, 10**50)  # the rounding of coefficients
 
 
-@each(("count", "most", "degree"), [(3, 1000, 16), (6, 1000, 6), (9, 1000, 4), (24, 1000, 2)])
+@pytest.mark.parametrize(
+    ("count", "most", "degree"), [(3, 1000, 16), (6, 1000, 6), (9, 1000, 4), (24, 1000, 2)]
+)
 def test_the_degree_is_the_largest_whose_terms_are_few(count, most, degree):
     assert Truncated([Fraction(1)] * count, most).degree == degree
 

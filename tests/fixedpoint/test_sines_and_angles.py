@@ -11,22 +11,13 @@ from fractions import Fraction
 
 import mpmath
 import pytest
-from gathering import each
 from small_integers import quantity
 
 from strapgen.fixedpoint import functions
 from strapgen.fixedpoint.chain import Chain
 from strapgen.fixedpoint.function_series import PI_ERROR, arctangent_series, pi
-from strapgen.fixedpoint.quantities import (
-    Computed,
-    InputElement,
-    Maximum,
-    NearestInteger,
-    Quotient,
-    Selection,
-    SquareRoot,
-    Sum,
-)
+from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Sum
+from strapgen.ir.integer_program import cases_of
 
 PRECISE = mpmath.mp.clone()
 PRECISE.prec = 400
@@ -73,18 +64,18 @@ def values(links: Chain, *arguments: Fraction) -> dict[str, Fraction]:
                     (c * math.prod((known[n] for n in names), start=Fraction(1)) for names, c in terms),
                     Fraction(0),
                 )
-            case Quotient(numerator, denominator):
+            case ExactOperation("divide", (numerator, denominator)):
                 known[link.name] = of(numerator) / of(denominator)
-            case SquareRoot(argument):
+            case ExactOperation("sqrt", (argument,)):
                 known[link.name] = fraction(PRECISE.sqrt(real(known[argument])))
-            case Maximum(several):
+            case ExactOperation("maximum", several):
                 known[link.name] = max(map(of, several))
-            case Selection(cases, otherwise):
-                chosen = (value for left, right, value in cases if of(left) >= of(right))
+            case ExactOperation("select", (*_, otherwise) as operands):
+                chosen = (value for left, right, value in cases_of(operands) if of(left) >= of(right))
                 known[link.name] = of(next(chosen, otherwise))
-            case Computed(argument):
+            case ExactOperation("computed", (argument,)):
                 known[link.name] = known[argument]
-            case NearestInteger(argument, factor):
+            case ExactOperation("nearest", (argument, factor)):
                 known[link.name] = Fraction(math.floor(known[argument] * factor + Fraction(1, 2)))
     return known
 
@@ -163,7 +154,7 @@ def test_the_rest_of_a_turn_reaches_the_end_of_its_range():
     """
     last = Fraction(13, 2) * Fraction(128, 81)
     links = chain("cos", (-last, last), word=8)
-    assert link(links, "quarters").definition.factor == Fraction(81, 128)
+    assert link(links, "quarters").definition.arguments[1] == Fraction(81, 128)
     just_below = last - Fraction(1, 1 << 60)
     largest = max(abs(values(links, angle)["f_rest"]) for angle in (just_below, -last))
     assert largest <= link(links, "rest").range.highest <= largest + Fraction(1, 1 << 50)
@@ -199,10 +190,10 @@ def slopes(links: Chain) -> dict[str, Fraction | None]:
     return dict(links.links[-1].follows.slopes)
 
 
-ROOT = {0: SquareRoot("q")}
+ROOT = {0: ExactOperation("sqrt", ("q",))}
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "ranges", "options", "expected"),
     [
         # The largest derivatives: of sine and cosine 1, of sin(x)/x 0.43618 at 2.0816, by its square -1/6 at 0, and of
@@ -239,7 +230,7 @@ def test_an_error_of_the_argument_goes_on_by_the_largest_slope(kind, ranges, opt
     assert links.links[-1].follows.most >= inside.highest - inside.lowest
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "ranges", "ends"),
     [
         ("sin", [(-1, 1)], (-1, 1)),
@@ -276,7 +267,7 @@ def test_the_smaller_and_the_larger_argument_have_their_ranges():
     assert [one for one in larger.definition.arguments if isinstance(one, Fraction)] == [Fraction(1, 1 << 16)]
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "ranges"),
     [
         ("sin", [(-60, 60)]),
@@ -311,7 +302,7 @@ def test_links_stay_in_their_ranges_and_lead_to_the_function(kind, ranges):
         assert abs(known[links.links[-1].name] - exact) <= inexact
 
 
-@each(("digits", "terms"), [(1, 3), (5, 3), (6, 4), (12, 8)])
+@pytest.mark.parametrize(("digits", "terms"), [(1, 3), (5, 3), (6, 4), (12, 8)])
 def test_an_arctangent_has_as_many_terms_as_its_tolerance_needs(digits, terms):
     coefficients, left_out = arctangent_series(Fraction(1, 10**digits))
     assert len(coefficients) == terms

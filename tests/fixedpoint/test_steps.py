@@ -8,7 +8,6 @@ import mpmath
 import numpy as np
 import pytest
 from derived import precisely, program, quantized
-from gathering import each
 
 import strapgen
 from strapgen.catalogue import Choice
@@ -89,7 +88,7 @@ def test_a_run_of_exponentials_is_inside_its_bound(algorithm, method, name, carr
         assert off <= bound < (3e-6 if name == "c-fixed32" else 0.2)
 
 
-@each("largest", [Fraction(1, 100), Fraction(1, 2), 2, 4])
+@pytest.mark.parametrize("largest", [Fraction(1, 100), Fraction(1, 2), 2, 4])
 def test_an_exponential_for_increments_of_any_size(largest):
     # Beyond 5/4 rad the angle is reduced, and the root is taken.
     fixed = quantized(Choice("euler", "magnus4", 2), Settings().fitted(float(largest)))

@@ -10,7 +10,6 @@ from itertools import product
 from types import SimpleNamespace
 
 import pytest
-from gathering import each
 from small_integers import GRID, Known, at_corners, computed, context, quantity, with_feedback, worst
 
 from strapgen.fixedpoint.quantities import ErrorPropagation, Sum
@@ -281,7 +280,7 @@ def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_fact
     assert walk.values["z"].error < unchecked.values["z"].error
 
 
-@each(
+@pytest.mark.parametrize(
     ("terms", "size"),
     [
         (((("a", "a"), ONE), ((), ONE)), math.sqrt(3)),  # 1 is there already

@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,7 +23,7 @@ def test_choice():
         checks.choice("form", "rk5", ["rk1", "rk4"])
 
 
-@each(
+@pytest.mark.parametrize(
     ("value", "exact"),
     [
         ("0.1", Fraction(1, 10)),
@@ -53,7 +52,7 @@ def test_number_of_a_float_is_its_shortest_decimal(value):
     assert exact == checks.number("step", repr(value)) == Fraction(repr(value))
 
 
-@each(
+@pytest.mark.parametrize(
     "value",
     [
         *(
@@ -96,20 +95,20 @@ def test_whole_reads_digits_alone():
             checks.whole("word", text)
 
 
-@each("value", ["0", -0.0, "-1e-9", Fraction(-1, 3), "1e-400"])
+@pytest.mark.parametrize("value", ["0", -0.0, "-1e-9", Fraction(-1, 3), "1e-400"])
 def test_number_above_zero(value):
     with pytest.raises(InputError, match=r"^step is .*; a number above 0 is needed$"):
         checks.number("step", value, positive=True)
 
 
-@each("value", [1, 8, np.int32(3), np.uint8(2)])
+@pytest.mark.parametrize("value", [1, 8, np.int32(3), np.uint8(2)])
 def test_count(value):
     counted = checks.count("increments", value, largest=8)
     assert counted == value
     assert type(counted) is int
 
 
-@each("value", [0, -1, 9, 1.0, "2", None, True, np.float64(2), np.True_])
+@pytest.mark.parametrize("value", [0, -1, 9, 1.0, "2", None, True, np.float64(2), np.True_])
 def test_no_count(value):
     with pytest.raises(InputError, match=r"^increments is .*; a whole number from 1 to 8 is needed$"):
         checks.count("increments", value, largest=8)
@@ -150,19 +149,19 @@ def test_real_array_keeps_what_it_can():
     assert checks.real_array("increments", np.empty((0, 3)), (3,)).shape == (0, 3)
 
 
-@each("value", [[True] * 3, ["a"] * 3, [1j] * 3, [None] * 3, None, "abc"])
+@pytest.mark.parametrize("value", [[True] * 3, ["a"] * 3, [1j] * 3, [None] * 3, None, "abc"])
 def test_array_of_another_type(value):
     with pytest.raises(InputTypeError, match=r"^rate has dtype .*; numbers are needed"):
         checks.real_array("rate", value, (3,))
 
 
-@each("shape", [(), (2,), (4,), (3, 1), (3, 0)])
+@pytest.mark.parametrize("shape", [(), (2,), (4,), (3, 1), (3, 0)])
 def test_array_of_another_shape(shape):
     with pytest.raises(InputError, match=r"^rate has shape \(.*\); \(\.\.\., 3\) is needed$"):
         checks.real_array("rate", np.zeros(shape), (3,))
 
 
-@each("shape", [(9,), (3,), (3, 4), (4, 3, 2), ()])
+@pytest.mark.parametrize("shape", [(9,), (3,), (3, 4), (4, 3, 2), ()])
 def test_matrix_of_another_shape(shape):
     with pytest.raises(InputError, match=r"\(\.\.\., 3, 3\) is needed$"):
         checks.real_array("state", np.zeros(shape), (3, 3))

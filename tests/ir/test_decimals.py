@@ -14,7 +14,7 @@ from strapgen.ir import decimals
 from strapgen.ir.fixed_settings import Settings
 from strapgen.targets import contract
 
-ERROR = re.compile(r"error at most (\S+), (\S+) of the last place")
+ERROR = re.compile(r"error <= (\S+) \((\S+) ulp\)")
 RANGE = re.compile(r"range (-?\d+) to (-?\d+) \((\S+) to (\S+)\)")
 
 

@@ -6,7 +6,6 @@ import json
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,7 +29,7 @@ def test_the_finest_format_holds_its_magnitude_and_none_finer_does(largest, word
     assert largest * Fraction(2) ** (fraction + 1) > top
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "said"),
     [("Q1.31", "33 bits"), ("q1.30", "Qm.n is needed"), ("1.30", "Qm.n"), ("", "Qm.n"), ("Q١.30", "Qm.n")],
 )
@@ -39,7 +38,7 @@ def test_formats_that_cannot_be_used(text, said):
         Format.parse(text, 32)
 
 
-@each(
+@pytest.mark.parametrize(
     ("values", "said"),
     [
         ({"word": 7}, "word is 7; a whole number of bits from 8 to 64"),

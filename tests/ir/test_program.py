@@ -5,8 +5,8 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import (
     COUNTED_AS,
     OPERATIONS,
@@ -29,12 +29,7 @@ def program(*body: Assignment, result: tuple = ("r",), **rest) -> Program:
     nodes = tuple(Reference(name) if isinstance(name, str) else name for name in result)
     signal = Signal("result", (len(nodes),), tuple(f"result_{k}" for k in range(len(nodes))))
     return Program(
-        name="made_up",
-        kernel="made-up",
-        title="Made up",
-        source="this test",
-        arguments="made-up",
-        notes=(),
+        KernelInfo("made-up", "Made up", "this test", arguments="made-up"),
         inputs=(Signal.scalar("x"), Signal.scalar("y")),
         body=body,
         outputs=(Result(signal, nodes),),
@@ -96,7 +91,7 @@ def test_run_is_exact_on_fractions():
     assert made.run({"x": x, "y": y}) == {"result": [(x + y) / 3 / y, x, Fraction(2, 5)]}
 
 
-@each(
+@pytest.mark.parametrize(
     ("kind", "arguments", "expected"),
     [
         ("add", (5, 3), 8),

@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import mpmath
 import pytest
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
@@ -17,7 +16,7 @@ from strapgen.ir.sensor import Sensor
 HUNDREDTH = Fraction(1, 100)
 
 
-@each(
+@pytest.mark.parametrize(
     ("lsb", "degrees"),
     [
         ("0.0175dps", "0.000175"),
@@ -40,7 +39,7 @@ def test_an_angle_a_count_is_exact():
     assert Sensor.of("1/4rad/s", HUNDREDTH).count == Fraction(1, 400)
 
 
-@each(
+@pytest.mark.parametrize(
     "count",
     [Fraction(3, 10**6), Fraction(1, 1 << 20), Fraction(1, (1 << 20) - 1), Fraction(1, (1 << 20) + 1)],
 )
@@ -71,7 +70,7 @@ def test_the_time_of_a_count_follows_from_the_step_too():
     assert by_step.count == Settings.of(sample_hz=100, increments=2, lsb="0.0175dps").sensor.count
 
 
-@each(
+@pytest.mark.parametrize(
     "stated",
     [
         {"lsb": "17.5mdps", "sample_hz": 100, "state": "q31"},
@@ -85,7 +84,7 @@ def test_settings_are_read_as_they_are_written(stated):
     assert again == settings and again.stated == settings.stated
 
 
-@each(
+@pytest.mark.parametrize(
     ("stated", "said"),
     [
         ({"lsb": "0.0175dps"}, "--sample-hz is missing"),

@@ -5,7 +5,6 @@ from dataclasses import FrozenInstanceError
 from fractions import Fraction
 
 import pytest
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import FRAMES, Signal, after
@@ -35,7 +34,7 @@ def test_shape_and_elements_must_agree(shape, elements):
         Signal("rate", shape, elements)
 
 
-@each(
+@pytest.mark.parametrize(
     "signal",
     [
         Signal.vector("rate", "w", unit="rad/s", meaning="body rate", bound=Fraction(1, 3)),
@@ -51,7 +50,7 @@ def test_plain_data_holds_all_of_a_signal(signal):
     assert Signal(**rebuilt) == signal
 
 
-@each(
+@pytest.mark.parametrize(
     ("fields", "words"),
     [
         (

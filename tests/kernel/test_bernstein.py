@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.kernel import bernstein
 from strapgen.kernel.bernstein import eigenvalue_bounds
@@ -20,7 +19,7 @@ def near(bounds: tuple[Fraction, Fraction], low: float, high: float) -> bool:
     return 1.04 * low - 1e-9 <= bounds[0] <= low and high <= bounds[1] <= 1.04 * high + 1e-9
 
 
-@each(
+@pytest.mark.parametrize(
     ("polynomial", "low", "high"),
     [
         ({(1, 1): ONE}, 0, 1),

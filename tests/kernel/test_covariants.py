@@ -7,7 +7,6 @@ from functools import cache
 
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -119,7 +118,7 @@ def test_the_fourth_order_step_of_direction_cosines():
     )
 
 
-@each(
+@pytest.mark.parametrize(
     ("algorithm", "method", "increments"),
     [
         ("euler", "rk4", 3),
@@ -197,7 +196,7 @@ def test_what_does_not_turn_with_its_vectors_is_refused():
         one.matrix([zero, x, zero, x, *[zero] * 5])
 
 
-@each(
+@pytest.mark.parametrize(
     ("degree", "triple", "count"),
     [
         ((0,), False, 1),

@@ -4,7 +4,6 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, symbols
@@ -73,7 +72,7 @@ def test_polynomials():
     assert two_stages().polynomials() == {"r": [r], "more": [r - y, ring(7)]}
 
 
-@each(
+@pytest.mark.parametrize(
     "expression",
     [
         lambda x: 1 / x,

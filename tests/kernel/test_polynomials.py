@@ -3,7 +3,7 @@
 import math
 from fractions import Fraction
 
-from gathering import each
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -109,7 +109,7 @@ def test_the_ratio_of_proportional_polynomials(p, factor):
     assert ratio(scale(p, factor), p) == factor
 
 
-@each(
+@pytest.mark.parametrize(
     ("p", "q"),
     [
         ({("x",): 1, (): 2}, {("x",): 1, (): 3}),

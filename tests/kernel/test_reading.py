@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel.reading import expression
@@ -13,7 +12,7 @@ A, B = sp.symbols("a b", real=True)
 NAMES = {"a": A, "b": B}
 
 
-@each(
+@pytest.mark.parametrize(
     "value",
     [
         sp.Rational(-57, 80),
@@ -30,7 +29,7 @@ def test_decimals_are_exact():
     assert expression("value", "0.1 + 2e-1*a", NAMES) == sp.Rational(1, 10) + A / 5
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "reason"),
     [
         ("c + 1", "c is not known; known are a, b, pi"),

@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.ir.exceptions import InputError, InputTypeError
@@ -132,7 +131,7 @@ def test_a_choice_is_compared_like_its_name(increments):
         assert one.as_dict() | {"ns_per_step": 0} == other.as_dict() | {"ns_per_step": 0}
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "error", "said"),
     [
         ({"increments": None}, InputTypeError, "increments is None"),

@@ -10,7 +10,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen import catalogue, motion
 from strapgen.catalogue import INTEGRATORS, choose
@@ -138,7 +137,7 @@ def test_in_many_digits_the_error_is_that_of_double(coning):
         assert b.error_rad == pytest.approx(a.error_rad, rel=64 * 2.0**-52 / 1e-6)
 
 
-@each(
+@pytest.mark.parametrize(
     ("steps", "duration", "says"),
     [
         (["1/8"], 1, "a slope takes two steps"),

@@ -6,7 +6,7 @@ import json
 import shutil
 
 import pytest
-from gathering import each
+from commands import run
 
 from strapgen import pipeline
 from strapgen.cli import main
@@ -64,9 +64,7 @@ def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
 def test_the_command_prints_what_was_agreed(capsys):
     needed("cortex-m3")
     command = "cost euler-normalize euler-product --cross arm-none-eabi-gcc --cpu cortex-m3 --format json"
-    with pytest.raises(SystemExit) as stop:
-        main(command.split())
-    assert stop.value.code == 0
+    run(command.split())
     rows = json.loads(capsys.readouterr().out)
     keys = {"cpu", "instructions", "executed", "multiplications", "compiler"}
     keys |= {f"{what}_bytes" for what in ("code", "constant", "stack")}
@@ -77,7 +75,7 @@ def test_the_command_prints_what_was_agreed(capsys):
         assert row["executed"] is None or row["executed"] > 20
 
 
-@each(
+@pytest.mark.parametrize(
     ("words", "said"),
     [
         ("", "a kernel is needed, or --all"),

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import STANDARD_GRAVITY
@@ -107,7 +106,7 @@ TABLE = {
 }
 
 
-@each("name", CLASSES)
+@pytest.mark.parametrize("name", CLASSES)
 def test_the_classes_are_those_of_the_table(name):
     bias, noise, scale, alignment, force_bias, force_scale, force_alignment = TABLE[name]
     errors = read(name)
@@ -185,7 +184,7 @@ BAD = [
 ]
 
 
-@each("text, words", BAD)
+@pytest.mark.parametrize("text, words", BAD)
 def test_what_is_wrong_is_told_in_one_line(text, words, tmp_path):
     with pytest.raises(InputError, match=words) as refused:
         read(file_of(text, tmp_path))

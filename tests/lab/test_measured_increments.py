@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from tolerances import roundoff
 
 import strapgen
@@ -89,7 +88,7 @@ def test_errors_act_alike_on_every_back_end(make, algorithm):
     np.testing.assert_allclose(run.drift - true.drift, expected.drift, atol=allowed)
 
 
-@each("cause", CAUSES)
+@pytest.mark.parametrize("cause", CAUSES)
 def test_every_cause_is_seen_and_leaves_the_others_alone(cause, row):
     assert cause in [*EVERY.causes]
     alone = EVERY.only(cause)
@@ -98,7 +97,7 @@ def test_every_cause_is_seen_and_leaves_the_others_alone(cause, row):
     assert np.array_equal(gyros(alone.without(cause), row, force=0.1), row)
 
 
-@each("cause", ["noise", "random walk", "output noise", "lost samples"])
+@pytest.mark.parametrize("cause", ["noise", "random walk", "output noise", "lost samples"])
 def test_switching_a_cause_off_takes_no_number_from_the_others(cause, row):
     others = [other for other in ("noise", "random walk", "output noise") if other != cause]
     both = gyros(EVERY.only(*others, cause), row)
@@ -112,7 +111,7 @@ def test_switching_a_cause_off_takes_no_number_from_the_others(cause, row):
     np.testing.assert_allclose(both - gyros(EVERY.only(*others), row), change, atol=1e-16)
 
 
-@each("cause", [None, *CAUSES])
+@pytest.mark.parametrize("cause", [None, *CAUSES])
 def test_a_run_in_parts_measures_what_a_whole_one_does(cause, row):
     errors = EVERY if cause is None else EVERY.only(cause)
     whole = MeasurementUnit(errors, float(STEP))(row, 0.1 + row)
@@ -325,7 +324,7 @@ def test_a_unit_of_unbalanced_gyros_senses_acceleration_through_the_same_torquer
     assert np.abs(velocity[-1] - up[-1]).max() > 1e-5
 
 
-@each(
+@pytest.mark.parametrize(
     ("lost_as", "expected"),
     [("zero", [1, 0, 0, 4, 5, 0]), ("repeat", [1, 1, 1, 4, 5, 5]), ("late", [1, 0, 0, 9, 5, 0])],
 )

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from scipy.integrate import quad
 from tolerances import roundoff
 
@@ -75,7 +74,7 @@ def test_a_fine_run_meets_the_truth(name, backend_name):
     assert np.abs(run.error).max() <= 1e-12 + 2 * roundoff(backend, 800)
 
 
-@each("name", MOTIONS)
+@pytest.mark.parametrize("name", MOTIONS)
 def test_truth_is_a_rotation_that_starts_at_the_identity(name):
     attitude = strapgen.motion(name, **MOTIONS[name]).attitude(np.linspace(0, 180, 50))
     np.testing.assert_array_equal(attitude[0], np.eye(3))
@@ -129,7 +128,7 @@ def test_many_digits_need_a_closed_form():
         strapgen.converge(strapgen.choose("euler"), motion, ["1/2", "1/4"], 1)
 
 
-@each(
+@pytest.mark.parametrize(
     ("name", "settings", "words"),
     [
         ("spin", {}, "motion 'spin' is not known; allowed: constant, sinusoidal, coning, polynomial"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.ir.exceptions import InputError
@@ -43,7 +42,7 @@ def test_a_run_in_parts_has_the_bits_of_the_whole(make, every, record, rng, shor
     assert [first for first, _ in calls] == np.cumsum([0, *(count for _, count in calls)])[:-1].tolist()
 
 
-@each("segment", [0, 1, 3, 8, 9, 17, 60])
+@pytest.mark.parametrize("segment", [0, 1, 3, 8, 9, 17, 60])
 def test_parts_end_where_a_state_is_restored(segment, short_parts):
     restored, place = [], 0
     for first, count, every in run_parts(STEPS, segment):

@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.analysis.vibration.curves import Curve
@@ -343,7 +342,7 @@ def test_a_run_is_drawn_into_a_file_in_a_new_folder(run, tmp_path):
     assert [p.name for p in path.parent.iterdir()] == ["run.png"]
 
 
-@each("name", ["run.docx", "run", "png"])
+@pytest.mark.parametrize("name", ["run.docx", "run", "png"])
 def test_unknown_ending(name):
     with pytest.raises(InputError, match=r"^plot .*: file type '(docx)?' is not known; allowed: .*png.*svg"):
         drawing.require_kind(name)

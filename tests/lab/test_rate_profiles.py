@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from scipy.integrate import quad
 
 import strapgen
@@ -132,7 +131,7 @@ def test_the_truth_is_not_what_the_gyro_passes_on():
     )
 
 
-@each(
+@pytest.mark.parametrize(
     ("name", "settings", "words"),
     [
         ("random", {}, "motion random needs parameters; allowed: rate_deg_s, rate_rad_s"),

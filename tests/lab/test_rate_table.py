@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
@@ -66,7 +65,7 @@ def test_two_speeds():
     assert "oscillating; pitch up to" in text
 
 
-@each(
+@pytest.mark.parametrize(
     ("arguments", "says"),
     [
         ({"duration": 0}, "duration is 0"),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
@@ -191,8 +190,10 @@ def changed(line: int, column: int, cell: str) -> list[list[str]]:
     return rows
 
 
-@each("cell", ["nan", "NaN", "inf", "-Infinity", "1e999", "", "twelve", "1.2.3", "0x1f", "1_0", "٣"])
-@each(("line", "column"), [(2, 1), (4, 1), (5, 3), (7, 4)])
+@pytest.mark.parametrize(
+    "cell", ["nan", "NaN", "inf", "-Infinity", "1e999", "", "twelve", "1.2.3", "0x1f", "1_0", "٣"]
+)
+@pytest.mark.parametrize(("line", "column"), [(2, 1), (4, 1), (5, 3), (7, 4)])
 def test_cell_that_is_no_finite_number(cell, line, column, write, read):
     path = write(changed(line, column, cell))
     refused(read, path, f"line {line}: column {column} is {cell!r}; a finite number is needed")
@@ -356,7 +357,7 @@ def test_resampling_keeps_the_whole_angle():
     np.testing.assert_allclose(uneven.increments.sum(axis=0), whole, rtol=0, atol=1e-13)
 
 
-@each(
+@pytest.mark.parametrize(
     ("hertz", "said"),
     [
         ("0", "resample_hz is 0; a number above 0 is needed"),
@@ -417,7 +418,7 @@ def test_recording_shorter_than_a_step(even):
         propagate(strapgen.backend("euler", "rk4", 4, "numpy"), short)
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"record": "0.3"}, "record 0.3 s is not a whole multiple of the step 0.25 s"),

@@ -76,23 +76,13 @@ def test_a_result_is_the_same_when_it_is_read_again(tmp_path):
     assert first["one"] == {"tuple": [1, 2], "number": 0.1, "none": None}
 
 
-@pytest.mark.parametrize("cut", [1, 5, 20, 30, 50, 10_000])
-def test_a_file_that_ends_anywhere_goes_on_from_its_last_complete_line(cut, tmp_path):
+@pytest.mark.parametrize("end", [-1, -5, -20, -30, -50, -10_000, 1, 10, 30])
+def test_a_file_that_ends_anywhere_goes_on_from_its_last_complete_line(end, tmp_path):
     path = tmp_path / "results.jsonl"
     whole = dict(resume(square, CASES, path, IDENTITY, 1))
     content = path.read_bytes()
-    path.write_bytes(content[: max(0, len(content) - cut)])
+    path.write_bytes(content[:end])
     assert dict(resume(square, CASES, path, IDENTITY, 1)) == whole
-    assert path.read_bytes() == content
-
-
-@pytest.mark.parametrize("length", [1, 10, 30])
-def test_a_file_that_was_hardly_begun_is_begun_again(length, tmp_path):
-    path = tmp_path / "results.jsonl"
-    list(resume(square, CASES, path, IDENTITY, 1))
-    content = path.read_bytes()
-    path.write_bytes(content[:length])
-    list(resume(square, CASES, path, IDENTITY, 1))
     assert path.read_bytes() == content
 
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from gathering import each
 from tolerances import certified
 
 import strapgen
@@ -45,7 +44,7 @@ def test_decimals_are_exact(make):
     np.testing.assert_allclose(run.time, [0, 0.1, 0.2, 0.3], rtol=1e-15)
 
 
-@each(
+@pytest.mark.parametrize(
     ("times", "words"),
     [
         ({"step": "0.7", "duration": 1}, "duration 1 s is not a whole multiple of the step 0.7 s"),

@@ -10,7 +10,6 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.cli import main
@@ -193,7 +192,7 @@ def test_intervals_cover_what_they_say():
     assert inside == pytest.approx(0.95, abs=0.014)  # four standard deviations of a share of 4000
 
 
-@each(("steps", "records"), [(1, 1), (7, 7), (53, 1), (3000, 50), (144, 48)])
+@pytest.mark.parametrize(("steps", "records"), [(1, 1), (7, 7), (53, 1), (3000, 50), (144, 48)])
 def test_records_divide_the_steps(steps, records):
     assert records_of(steps) == records
 
@@ -257,7 +256,7 @@ def test_back_ends_agree_on_a_monte_carlo(run):
     np.testing.assert_allclose(fixed, plain, atol=math.degrees(2.0**-28))
 
 
-@each(
+@pytest.mark.parametrize(
     ("command", "words"),
     [
         (f"nothing.toml {MOTION}", "nothing.toml cannot be read"),

@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.catalogue import choose
@@ -63,7 +62,7 @@ def truth():
 
 
 @pytest.mark.long
-@each(
+@pytest.mark.parametrize(
     ("method", "velocity", "position"),
     # Computed once by others from Gauss-Legendre nodes of the exponential, with the same motion and filters.
     [("window-3-3", 6.4e-4, 2.1e-2), ("window-7-7", 2.1e-7, 4.8e-6)],

@@ -8,7 +8,6 @@ import math
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions import users_motions
@@ -117,7 +116,7 @@ def test_image(outcomes):
         word_length_image(WordLengthResult(outcomes), "study.xyz")
 
 
-@each(
+@pytest.mark.parametrize(
     ("values", "said"),
     [
         ({"words": ()}, "the study has 0 cases"),

@@ -4,7 +4,6 @@ import math
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -122,7 +121,7 @@ def test_nested_products_take_no_more_multiplications_than_expanded_ones(p):
     )
 
 
-@each(
+@pytest.mark.parametrize(
     ("p", "operations"),
     [
         ({}, 0),

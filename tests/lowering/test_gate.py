@@ -4,7 +4,6 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.ir.program import Constant, Operation, Program, Reference, walk
 from strapgen.ir.signals import Signal
@@ -41,7 +40,7 @@ def constant(*value):
     return Constant(Fraction(*value))
 
 
-@each(
+@pytest.mark.parametrize(
     "expression",
     [
         X - Y,
@@ -102,7 +101,7 @@ def test_a_quotient_divides_once():
     assert tree(X / (Y * Z)) == operation("divide", x, operation("multiply", y, z))
 
 
-@each(("exponent", "multiplications"), [(2, 1), (3, 2), (4, 2), (7, 4), (8, 3), (16, 4)])
+@pytest.mark.parametrize(("exponent", "multiplications"), [(2, 1), (3, 2), (4, 2), (7, 4), (8, 3), (16, 4)])
 def test_powers_are_multiplied_by_squaring(exponent, multiplications):
     program = lowered(X**exponent)
     assert program.operations["multiply"] == multiplications
@@ -135,7 +134,7 @@ def test_a_common_subexpression_is_computed_once():
     assert sum(isinstance(n, Operation) and n.kind == "sin" for a in program.body for n in walk(a.value)) == 1
 
 
-@each(
+@pytest.mark.parametrize(
     ("expression", "named"),
     [
         (sp.tan(X), "tan"),

@@ -10,7 +10,6 @@ import mpmath
 import pytest
 import sympy as sp
 from derived import FUNCTIONS, kernel, precisely, program, tells_more
-from gathering import each
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
@@ -25,7 +24,7 @@ EVERY = pytest.mark.parametrize(
     "choice",
     [pytest.param(c, marks=() if tells_more(c) else pytest.mark.long, id=c.kernel) for c in STANDARD],
 )
-TOGETHER = each("choice", STANDARD, ids=lambda choice: choice.kernel)
+TOGETHER = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
 
 
 def input_names(made: Kernel | Program) -> list[str]:
@@ -249,7 +248,7 @@ def test_results_are_names_or_constants(choice):
     assert all(isinstance(node, Reference | Constant) for node in nodes)
 
 
-@each("choice", STANDARD, ids=lambda choice: choice.kernel)
+@pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
 def test_equal_operations_are_computed_once(choice):
     # Conditions apart: they are no values that a program could hold.
     operations = Counter(

@@ -4,7 +4,6 @@ from itertools import islice
 
 import pytest
 from derived import program
-from gathering import each
 
 from strapgen.catalogue import Choice
 from strapgen.lowering.names import FACTOR, SHARED, is_temporary, shared_names
@@ -15,7 +14,7 @@ def test_names_of_common_parts_stand_for_nothing(name):
     assert is_temporary(name)
 
 
-@each("name", ["sigma_x", "factor", "next_s", "partner_shared_x"])
+@pytest.mark.parametrize("name", ["sigma_x", "factor", "next_s", "partner_shared_x"])
 def test_names_of_quantities_stand_for_something(name):
     assert not is_temporary(name)
 

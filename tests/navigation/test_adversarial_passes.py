@@ -4,7 +4,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
@@ -65,8 +64,8 @@ def test_no_samples_take_a_pass_above_its_bound_and_some_nearly_reach_it(system,
     assert nearest >= (NEAR_CUT if (rounding, carry) == ("truncation", "full") else NEAR)
 
 
-@each("places", range(-9, 10))
-@each(("there", "here"), [(32, 16), (16, 32), (32, 32), (16, 16), (64, 32)])
+@pytest.mark.parametrize("places", range(-9, 10))
+@pytest.mark.parametrize(("there", "here"), [(32, 16), (16, 32), (32, 32), (16, 16), (64, 32)])
 def test_a_value_between_words_is_rounded_half_up_and_held_at_both_ends(there, here, places):
     """Beside exact rationals: floor(x 2^places + 1/2), between the lowest and the largest integer of the word."""
     top, most = (1 << (there - 1)) - 1, (1 << (here - 1)) - 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import built_in
@@ -31,7 +30,7 @@ def test_every_file_is_a_system_and_every_form_in_two_speeds_has_one():
         described("two-speed-eulre")
 
 
-@each(("algorithm", "sculling"), FORMS)
+@pytest.mark.parametrize(("algorithm", "sculling"), FORMS)
 def test_copies_and_sums_are_read_off_the_formulas(algorithm, sculling):
     programs = description(algorithm, sculling).programs
     assert copies(programs["fast"]) == {"previous_increment": "increment"}

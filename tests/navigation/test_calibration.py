@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.calibration.calibration import (
@@ -120,7 +119,7 @@ def test_combinations_that_leave_no_trace_are_exact(tmp_path):
         one.estimate(file.errors["rate"])
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("", "positions are missing"),

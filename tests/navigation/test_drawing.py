@@ -10,7 +10,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from navigation.described_files import ATTITUDE, description
@@ -82,7 +81,7 @@ def _too_near(lines: list[tuple[Link, float, float, float, float]]) -> set[tuple
 
 
 @pytest.mark.long
-@each("path", FILES, ids=[path.stem for path in FILES])
+@pytest.mark.parametrize("path", FILES, ids=[path.stem for path in FILES])
 def test_a_drawing_of_an_example_has_no_faults_and_fits_a_page(path):
     system = read_system(path)
     placed = plan(system.system)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.instruments import gyro_model
@@ -77,7 +76,7 @@ def entry(letter, text):
     return sp.S.Zero if text == "0" else sign * factor * symbol(f"{letter}_{label}")
 
 
-@each("letter", FIGURE_20)
+@pytest.mark.parametrize("letter", FIGURE_20)
 def test_the_matrix_is_that_of_figure_20(letter):
     rows = [[entry(letter, text) for text in row.split()] for row in FIGURE_20[letter].split(";")]
     assert source_structure().matrices[letter] == sp.Matrix(rows)

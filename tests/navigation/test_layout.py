@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.catalogue import choose, derive
 from strapgen.ir.exceptions import InputError
@@ -26,7 +25,7 @@ def test_numbers_are_exact_and_a_spin_axis_stands_for_a_torquer_axis():
     assert read(EXAMPLES / "diagonal.toml").gyros[1].x == (sp.sqrt(2) / 2, -sp.sqrt(2) / 2, 0)
 
 
-@each(
+@pytest.mark.parametrize(
     ("text", "unbalance"),
     [
         ('"B"', Unbalance(Fraction(1), "B")),
@@ -64,7 +63,7 @@ REFUSED = [
 ]
 
 
-@each(("old", "new", "words"), REFUSED)
+@pytest.mark.parametrize(("old", "new", "words"), REFUSED)
 def test_what_is_no_layout_is_refused_in_one_line(old, new, words, tmp_path):
     file = tmp_path / "layout.toml"
     assert old in GOOD
@@ -75,7 +74,7 @@ def test_what_is_no_layout_is_refused_in_one_line(old, new, words, tmp_path):
     assert message.startswith(str(file)) and words in message and "\n" not in message
 
 
-@each(
+@pytest.mark.parametrize(
     ("old", "new", "motion"),
     [
         ('"B3"', '"B2"', "the rate (B2, 0, 0) together with the acceleration (1, 0, 0)"),

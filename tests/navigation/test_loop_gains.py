@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.loops import loop_gains
@@ -39,7 +38,7 @@ def steady(name, order=None):
     }
 
 
-@each(("name", "order"), LOOPS)
+@pytest.mark.parametrize(("name", "order"), LOOPS)
 def test_all_poles_lie_at_the_time_constant(name, order):
     loop = closed_loop(name, order)
     matrix = loop.continuous.subs(dict(zip(loop.gains, symbolic_gains(name, order), strict=True)))
@@ -77,7 +76,7 @@ def test_gains_are_those_of_the_source():
     assert gains("level", Fraction(15), 2)[2] == 0
 
 
-@each(("name", "order"), LOOPS)
+@pytest.mark.parametrize(("name", "order"), LOOPS)
 def test_a_cycle_leaves_the_steady_state_as_it_is(name, order):
     loop = closed_loop(name, order)
     held = loop.continuous.LUsolve(loop.disturbance)
@@ -104,7 +103,7 @@ def test_between_the_calls_the_tilt_splits_the_poles_of_levelling():
         assert abs(poles[0]) < 1
 
 
-@each(
+@pytest.mark.parametrize(
     ("name", "order", "limit"),
     [("level", 3, "2/3"), ("erection", 2, "1"), ("heading", 2, "2"), ("vertical", 3, "2")],
 )

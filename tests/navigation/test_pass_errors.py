@@ -3,24 +3,214 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mpmath
+import numpy as np
 import pytest
 from navigation.described_files import ATTITUDE, TWO_SPEEDS, description
 from navigation.test_system_bounds import TABLES
-from system_errors import PassErrors, Passes, search, two_speeds
 
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.signals import Signal
 from strapgen.navigation.systems.compiled_system import CompiledSystem
-from strapgen.navigation.systems.fitting import fitted
+from strapgen.navigation.systems.fitting import Fitted, fitted
 from strapgen.navigation.systems.system_backends import SystemMemory, system_runner
+from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.system_file import parsed
 from strapgen.navigation.systems.system_runner import SystemRunner
 from strapgen.navigation.systems.wiring import Description, read_system, wired
+from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.two_speed_c import LOOPS
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, sources
 from strapgen.run import compiler
+from strapgen.run.evaluators import Array
+from strapgen.run.exact import DIGITS, number
+
+
+@dataclass(frozen=True)
+class Passes:
+    """Memories and samples, one pass a row: integers by the names of cells, inputs and error feedback."""
+
+    cells: Mapping[str, Array]
+    feedback: Mapping[str, Array]
+    samples: Mapping[str, Array]
+
+    def rows(self, chosen: Array) -> Passes:
+        """Return some passes."""
+        parts = ({name: rows[chosen] for name, rows in part.items()} for part in self._parts())
+        return Passes(*parts)
+
+    def with_rows(self, chosen: Array, other: Passes) -> Passes:
+        """Return passes of which some are replaced."""
+        parts = []
+        for part, new in zip(self._parts(), other._parts(), strict=True):
+            parts.append({name: rows.copy() for name, rows in part.items()})
+            for name, rows in parts[-1].items():
+                rows[chosen] = new[name][chosen]
+        return Passes(*parts)
+
+    def _parts(self) -> tuple[Mapping[str, Array], ...]:
+        return self.cells, self.feedback, self.samples
+
+    def __len__(self) -> int:
+        return len(next(iter(self.cells.values())))
+
+
+class PassErrors:
+    """Runs passes of a system on integers and in 40 digits, and compares them with the bound of each cell.
+
+    A pass is that of all rates, or of so many of the fastest that are due, with the bounds of all; or of one rate alone
+    that has a single stage, with the bounds in the header of its function.
+    """
+
+    def __init__(self, runner: SystemRunner, due: int | None = None, alone: int | None = None) -> None:
+        self.runner, self.system = runner, runner.system
+        self.rates = runner.system.rates[:due]
+        self.exact = system_runner(runner.fit.description, "exact")
+        self.bounds: SystemBounds = bounds(runner.fit)
+        self.arguments: Mapping[str, Argument] = runner.fit.arguments
+        if alone is not None:
+            self.rates = (runner.system.rates[alone],)
+            (stage,) = self.rates[0].stages
+            known = runner.fit.arguments_of(stage)
+            self.bounds = SystemBounds({cell: known[output].errors for output, cell in stage.results})
+
+    def begin(self, random: np.random.Generator, count: int) -> Passes:
+        """Return random passes, some of whose integers are at the ends of their ranges; most attitudes are proper."""
+        cells = {c.name: self._drawn(random, c.signal, c.name, count) for c in self.system.cells}
+        samples = {s.name: self._drawn(random, s, s.name, count) for s in self.system.inputs}
+        feedback = self.runner.fresh(count)
+        for name, words in feedback.items():
+            word = self.runner.fit.sources[name].fixed.settings.word
+            drawn = [[int(random.integers(0, 1 << 62)) >> (62 - min(word, 62)) for _ in row] for row in words]
+            feedback[name] = np.array(drawn, words.dtype).reshape(words.shape)
+        return Passes(cells, feedback, samples)
+
+    def _drawn(self, random: np.random.Generator, signal: Signal, name: str, count: int) -> Array:
+        argument = self.arguments[name]
+        shape = (count, signal.size)
+        # From the ends of the range, from all of it, or from near zero.
+        part = random.choice([-1.0, 1.0], shape) * random.random(shape) ** random.choice(
+            [0.01, 1, 3], (count, 1)
+        )
+        values = part * argument.high * 2.0 ** -random.choice([0, 0, 4, 12], (count, 1))
+        if signal.constraint:
+            if signal.constraint == "rotation":
+                rows = np.linalg.qr(random.normal(size=(count, 3, 3)))[0].reshape(shape)
+            else:
+                rows = random.normal(size=shape)
+                rows /= np.linalg.norm(rows, axis=1)[:, None]
+            proper = random.random((count, 1)) < 0.8
+            values = np.where(proper, rows / float(argument.unit), part * argument.high)
+        whole = [[min(max(round(x), argument.low), argument.high) for x in row] for row in values.tolist()]
+        return np.array(whole, _kind(argument)).reshape(shape)
+
+    def moved(self, random: np.random.Generator, passes: Passes) -> Passes:
+        """Return passes with some integers moved a little, or turned to the other sign."""
+        result = passes.with_rows(np.arange(0), passes)
+        for part in (result.cells, result.samples):
+            for name, rows in part.items():
+                argument = self.arguments[name]
+                hit = random.random(rows.shape) < 0.25
+                step = np.rint(
+                    random.normal(size=rows.shape) * 4.0 ** random.integers(0, 8, (len(rows), 1))
+                ).astype(np.int64)
+                new = np.where(hit, rows + step, rows)
+                if not self._is_attitude(name):
+                    new = np.where(random.random(rows.shape) < 0.03, -new, new)
+                part[name][...] = np.clip(new, argument.low, argument.high)
+        for rows in result.feedback.values():
+            if rows.size and random.integers(2):
+                rows[...] = random.permutation(rows, axis=0)
+        return result
+
+    def _is_attitude(self, name: str) -> bool:
+        return bool(self.arguments[name].signal.constraint)
+
+    def errors(self, passes: Passes) -> dict[str, Array]:
+        """Return the error of every element of a cell after each pass, in units of its bound; -1 for a refused pass."""
+        after = SystemMemory(dict(passes.cells), dict(passes.feedback))
+        try:
+            self.runner.call(after, passes.samples, self.rates)
+        except InputError:
+            return self._halves(passes)
+        with mpmath.workdps(DIGITS):
+            truth = SystemMemory(
+                {name: self._digits(name, rows) for name, rows in passes.cells.items()},
+                self.exact.fresh(len(passes)),
+            )
+            measured = {name: self._digits(name, rows) for name, rows in passes.samples.items()}
+            self.exact.call(truth, measured, self.rates)
+            shares = {}
+            for name, limits in self.bounds.errors.items():
+                off = abs(self._digits(name, after.cells[name]) - truth.cells[name])
+                off = off[:, [k for k, limit in enumerate(limits) if limit or off[:, k].any()]]
+                scale = [number(limit) if limit else mpmath.mpf(0) for limit in limits if limit]
+                shares[name] = np.array(
+                    [[float(x / s) for x, s in zip(row, scale, strict=True)] for row in off]
+                ).reshape(len(passes), len(scale))
+        return shares
+
+    def _halves(self, passes: Passes) -> dict[str, Array]:
+        if len(passes) == 1:
+            return {
+                name: np.full((1, sum(map(bool, limits))), -1.0)
+                for name, limits in self.bounds.errors.items()
+            }
+        middle = len(passes) // 2
+        parts = [self.errors(passes.rows(part)) for part in np.split(np.arange(len(passes)), [middle])]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def _digits(self, name: str, rows: Array) -> Array:
+        unit = number(self.arguments[name].unit)
+        result = np.empty(rows.shape, object)
+        result[...] = [[int(x) * unit for x in row] for row in rows.tolist()]
+        return result
+
+
+def _kind(argument: Argument) -> type:
+    return object if argument.format.word > 32 else np.int64
+
+
+def two_speeds(algorithm: str, sculling: int, settings: Settings) -> Fitted:
+    """Return the loops of an algorithm in two speeds as the stages of a system; no wire is rescaled."""
+    description = two_speed_sources.description(algorithm, sculling)
+    stages = description.system.stages
+    loops = two_speed_sources.loops(algorithm, sculling, "fixed-model", settings)
+    names = (stage.name for stage in stages)
+    fit = Fitted(description, "fixed-model", settings, dict(zip(names, loops, strict=True)))
+    arguments: dict[str, Argument] = {}
+    for stage in stages:
+        known = fit.arguments_of(stage)
+        for name, cell in (*((wire.input, wire.source) for wire in stage.wires), *stage.results):
+            assert arguments.setdefault(cell, known[name]).format == known[name].format
+    return replace(fit, arguments=arguments)
+
+
+def search(
+    passes: PassErrors, cell: str, count: int, generations: int, seed: int
+) -> tuple[float, Passes, dict[str, float]]:
+    """Return the largest part of a cell's bound that climbs reach, with its pass, and the largest of every cell."""
+    random = np.random.default_rng(seed)
+    best = passes.begin(random, count)
+    errors = passes.errors(best)
+    worst = {name: float(rows.max(initial=0)) for name, rows in errors.items()}
+    share = errors[cell].max(axis=1)
+    for _ in range(generations):
+        tried = passes.moved(random, best)
+        errors = passes.errors(tried)
+        worst = {name: max(worst[name], float(rows.max(initial=0))) for name, rows in errors.items()}
+        new = errors[cell].max(axis=1)
+        better = new >= share
+        best, share = best.with_rows(better, tried), np.maximum(share, new)
+    place = int(share.argmax())
+    return float(share[place]), best.rows(np.array([place])), worst
+
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROUNDINGS = ("nearest", "truncation")

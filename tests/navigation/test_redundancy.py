@@ -9,7 +9,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 
 import strapgen
 from strapgen.ir.exceptions import InputError
@@ -159,7 +158,7 @@ def by_ranks(one: SensorGeometry) -> int:
     return one.count
 
 
-@each("one", [HEXAD, USERS, PENTAD, TETRAD])
+@pytest.mark.parametrize("one", [HEXAD, USERS, PENTAD, TETRAD])
 def test_failures_that_are_isolated_agree_with_ranks(one):
     expected = {6: 2, 5: 1, 4: 0}[one.count]
     assert one.fail_operate == by_ranks(one) == expected

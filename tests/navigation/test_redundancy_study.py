@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.cli import main
 from strapgen.navigation.redundancy.redundancy_study import SensorErrors
@@ -90,7 +89,7 @@ def test_a_geometry_becomes_code_and_tables(tmp_path, monkeypatch, capsys):
     assert "no failure is isolated, whichever sensors fail; one more is detected" in said
 
 
-@each(
+@pytest.mark.parametrize(
     ("command", "reason"),
     [
         ("redundancy flat.toml", "flat.toml: all axes lie in one plane"),

@@ -10,7 +10,6 @@ from xml.etree import ElementTree
 import pytest
 from c_programs import needed
 from cli.test_generated_by import generated_by
-from gathering import each
 from navigation.described_files import ATTITUDE, TWO_SPEEDS
 
 from strapgen.cli import main
@@ -64,7 +63,7 @@ def test_json_has_the_keys_that_the_page_promises(two, capsys):
 
 
 @pytest.mark.long
-@each("target", ["c", "c-fixed", "numpy", "fixed-model"])
+@pytest.mark.parametrize("target", ["c", "c-fixed", "numpy", "fixed-model"])
 def test_every_file_says_which_command_makes_it(target, two, capsys):
     word = " --word 16 --carry state --drift-allowance 0.05" if "fixed" in target else ""
     folder = Path("first") / target
@@ -119,7 +118,7 @@ def test_instructions_are_counted_on_a_processor_and_stand_in_the_header(two, ca
     assert "On cortex-m3: " in header
 
 
-@each("example, picture", [("attitude", "system"), ("strapdown", "strapdown")])
+@pytest.mark.parametrize("example, picture", [("attitude", "system"), ("strapdown", "strapdown")])
 def test_a_picture_of_the_page_is_that_of_its_example(example, picture, tmp_path, capsys):
     root = Path(__file__).parents[2]
     run(f"{root}/examples/{example}.toml --target numpy --draw {tmp_path}/{picture}.svg", capsys)
@@ -127,7 +126,7 @@ def test_a_picture_of_the_page_is_that_of_its_example(example, picture, tmp_path
 
 
 @pytest.mark.long
-@each("name", ["two", "att"])
+@pytest.mark.parametrize("name", ["two", "att"])
 def test_a_drawing_shows_every_stage_input_and_wire(name, two, capsys):
     run(f"{name}.toml --draw {name}.svg", capsys)
     tree = ElementTree.parse(f"{name}.svg").getroot()

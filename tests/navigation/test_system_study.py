@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from commands import run
 
 from strapgen.analysis.vibration.spectrum import read_spectrum
-from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_study
 from strapgen.navigation.systems.system_agreement import agreement
@@ -109,9 +109,7 @@ def test_the_model_and_the_c_have_the_same_bits_along_the_chain(shaken):
 @pytest.mark.long
 def test_the_command_prints_differences(capsys):
     def printed(*options):
-        with pytest.raises(SystemExit) as stop:
-            main(["study", "system", EXAMPLE, "--sample-hz", "100", "--duration", "2", *options])
-        assert not stop.value.code
+        run(["study", "system", EXAMPLE, "--sample-hz", "100", "--duration", "2", *options])
         return capsys.readouterr().out
 
     assert "attitude in double" in printed("--backend", "c-fixed16")
@@ -130,9 +128,7 @@ def test_the_command_prints_differences(capsys):
     ],
 )
 def test_what_does_not_go_is_said_in_one_line(options, message, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["study", "system", EXAMPLE, *options])
-    assert stop.value.code == 2
+    run(["study", "system", EXAMPLE, *options], 2)
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1

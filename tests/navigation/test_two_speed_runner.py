@@ -10,7 +10,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gathering import each
 from precisions import precision, single
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
@@ -257,7 +256,7 @@ def test_what_leaves_its_range_is_refused():
             runner.run(np.full((2, 3), 0.2), np.zeros((2, 3)), fast_cycles=2)
 
 
-@each(
+@pytest.mark.parametrize(
     ("given", "said"),
     [
         ({"increments": np.zeros((5, 3))}, "multiple of 4"),
@@ -282,7 +281,7 @@ def test_no_samples_make_no_cycles():
         assert run.attitudes.shape == (0, 3, 3) and run.velocity_changes.shape == (0, 3)
 
 
-@each(
+@pytest.mark.parametrize(
     ("call", "said"),
     [
         (lambda: TwoSpeed("quaternion"), "algorithm 'quaternion'"),

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.design.brief import read_brief
 from strapgen.ir.fixed_settings import Settings
@@ -43,7 +42,7 @@ def angle(state: str, unit: float = 0.0, high: int = 0, **errors: tuple[float, .
     return loops._angle_of_a_cycle()
 
 
-@each("state", ["euler", "dcm"])
+@pytest.mark.parametrize("state", ["euler", "dcm"])
 def test_errors_of_the_rotation_vector_turn_by_their_length(state):
     assert angle(state, rotation_vector=(2e-6, 3e-6, 6e-6)) == pytest.approx(7e-6, rel=1e-12)
     assert angle(state, next_coning=(3e-6, 4e-6, 0.0)) == pytest.approx(CYCLES * 5e-6, rel=1e-12)

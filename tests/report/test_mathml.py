@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 
-from gathering import each
+import pytest
 
 from strapgen import pipeline
 from strapgen.catalogue import choose, standard
@@ -26,39 +26,36 @@ def elements(latex):
     ]
 
 
-def test_every_formula_of_the_catalogue_keeps_its_signs():
-    @each("choice", list(standard()))
-    def whole(choice):
-        kernel = pipeline.derive(choice)
-        latex = as_latex(kernel)
-        found = elements(latex)
-        tags = [element.tag for element in found]
-        assert tags.count("mfrac") == len(re.findall(r"\\t?frac\b", latex))
-        assert tags.count("msqrt") == latex.count(r"\sqrt")
-        assert tags.count("msup") + 2 * tags.count("msubsup") + tags.count("msub") == len(
-            re.findall(r"(?<!\\)[\^_]", latex)
-        )
-        texts = [(element.text or "").strip() for element in found if element.tag == "mo"]
-        assert texts.count("+") == latex.count("+")
-        assert texts.count("−") == latex.count("-")
-        assert texts.count("×") == latex.count(r"\times")
-        plain = {
-            element.text
-            for element in found
-            if element.tag == "mi" and not element.get("class") and len(element.text) > 1
-        }
-        labels = {
-            part
-            for signal in (*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs)))
-            for name in signal.elements
-            for part in name.split("_")
-        }
-        assert plain <= FUNCTIONS | labels
-
-    whole()
+@pytest.mark.parametrize("choice", list(standard()))
+def test_every_formula_of_the_catalogue_keeps_its_signs(choice):
+    kernel = pipeline.derive(choice)
+    latex = as_latex(kernel)
+    found = elements(latex)
+    tags = [element.tag for element in found]
+    assert tags.count("mfrac") == len(re.findall(r"\\t?frac\b", latex))
+    assert tags.count("msqrt") == latex.count(r"\sqrt")
+    assert tags.count("msup") + 2 * tags.count("msubsup") + tags.count("msub") == len(
+        re.findall(r"(?<!\\)[\^_]", latex)
+    )
+    texts = [(element.text or "").strip() for element in found if element.tag == "mo"]
+    assert texts.count("+") == latex.count("+")
+    assert texts.count("−") == latex.count("-")
+    assert texts.count("×") == latex.count(r"\times")
+    plain = {
+        element.text
+        for element in found
+        if element.tag == "mi" and not element.get("class") and len(element.text) > 1
+    }
+    labels = {
+        part
+        for signal in (*kernel.inputs, *(stage.signal for stage in (*kernel.stages, *kernel.outputs)))
+        for name in signal.elements
+        for part in name.split("_")
+    }
+    assert plain <= FUNCTIONS | labels
 
 
-@each(
+@pytest.mark.parametrize(
     ("latex", "expected"),
     [
         (

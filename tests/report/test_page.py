@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from browser_checks import WIDTHS, opened
-from gathering import each
+from commands import run
 
 from strapgen.catalogue import choose, standard
 from strapgen.cli import main
@@ -73,9 +73,7 @@ def printed(command, capsys, folder):
     """Return what a command prints as JSON."""
     words = shlex.split(command)[1:]
     extra = ["--out", str(folder)] if words[0] == "generate" else ["--jobs", "1"] * (words[0] == "frontier")
-    with pytest.raises(SystemExit) as stop:
-        main([*words, *extra])
-    assert stop.value.code == 0
+    run([*words, *extra])
     return json.loads(capsys.readouterr().out)
 
 
@@ -93,14 +91,10 @@ def test_all_numbers_are_those_of_the_commands_that_stand_beside_them(page, data
     )
     text = page.read_text()
 
-    @each("name, result", results)
-    def same(name, result):
-        assert comparable(name, result["data"]) == comparable(
-            name, printed(result["command"], capsys, tmp_path)
-        )
+    for name, result in results:
+        answer = comparable(name, printed(result["command"], capsys, tmp_path))
+        assert comparable(name, result["data"]) == answer
         assert result["command"].split(" --format")[0] in text.split('id="data"')[0].replace("&#39;", "'")
-
-    same()
 
 
 def test_the_program_of_the_documentation_reads_the_data(page, monkeypatch, capsys, data):
@@ -120,6 +114,7 @@ def test_the_page_states_the_command_that_writes_it(page):
     assert {*line.split(" --")[1:]} == {*COMMAND.split(" --")[1:]}
 
 
+@pytest.mark.long
 def test_a_report_works_in_every_window(browser, page):
     opened_all = "document.querySelectorAll('details').forEach(one => { one.open = true; })"
     for width, dark in ((WIDTHS[0], False), (WIDTHS[1], True)):
@@ -128,6 +123,7 @@ def test_a_report_works_in_every_window(browser, page):
             assert not window.view().faults()
 
 
+@pytest.mark.long
 def test_charts_tables_and_tabs_answer(browser, page):
     with opened(browser, page, WIDTHS[1]) as window:
         shown = window.page

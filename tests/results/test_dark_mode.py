@@ -7,7 +7,6 @@ import re
 from itertools import combinations
 
 import pytest
-from gathering import each
 
 from strapgen.results import dark_mode, figures
 from strapgen.results.dark_mode import DARK_PAPER, PAPER, contrast, linear, on_dark, to_oklab
@@ -52,7 +51,7 @@ def nearest(colours: list[str], eyes: str) -> float:
     return min(math.dist(seen(one, eyes), seen(other, eyes)) for one, other in combinations(colours, 2))
 
 
-@each("eyes", VISION)
+@pytest.mark.parametrize("eyes", VISION)
 def test_the_colours_of_lines_are_told_apart_by_all_eyes(eyes):
     assert nearest(figures.several_colours(8), eyes) > TOLD_APART
 

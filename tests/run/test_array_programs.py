@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen.run import blocked_scan
@@ -21,7 +20,7 @@ KERNELS = {
 PLACES = (3, 50)
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_a_program_has_the_bits_of_its_function(kernel, rng):
     evaluator = strapgen.evaluator(kernel, "numpy")
     shapes = [signal.shape for signal in evaluator.function.inputs]

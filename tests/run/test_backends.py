@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 from derived import generated
-from gathering import each
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tolerances import one_call, roundoff
@@ -134,7 +133,7 @@ def test_increments_per_step_from_1_to_8(make, backend_name, algorithm, rng):
         assert np.abs(backend.propagate(turn) - wanted).max() <= roundoff(backend, 10)
 
 
-@each("shape", [(0, 7, 2, 3), (3, 0, 2, 3), (2, 0, 4, 2, 3), (0, 2, 3)])
+@pytest.mark.parametrize("shape", [(0, 7, 2, 3), (3, 0, 2, 3), (2, 0, 4, 2, 3), (0, 2, 3)])
 def test_no_runs_and_no_steps(make, algorithm, shape):
     backend = make(algorithm)
     history = backend.propagate(np.zeros(shape))
@@ -183,7 +182,7 @@ def test_step_broadcasts_leading_axes(make, algorithm, rng):
     np.testing.assert_array_equal(together[3, 2], backend.step(state, d[3, 2]))
 
 
-@each(
+@pytest.mark.parametrize(
     ("increments", "error", "words"),
     [
         (np.zeros((4, 3, 3)), InputError, ["increments", "(4, 3, 3)", "(..., 2, 3)"]),
@@ -200,7 +199,7 @@ def test_increments_that_cannot_be_used(make, increments, error, words):
     assert all(word in str(caught.value) for word in words)
 
 
-@each(
+@pytest.mark.parametrize(
     "options",
     [
         {"record_every": 0},
@@ -400,7 +399,7 @@ def test_methods_without_tableau_agree_in_floating_point(method, algorithm, prev
         assert np.abs(histories[name] - np.array(states)).max() <= roundoff(backend, 200)
 
 
-@each("method", ["magnus2", "magnus4", "magnus6", "munthe-kaas4"])
+@pytest.mark.parametrize("method", ["magnus2", "magnus4", "magnus6", "munthe-kaas4"])
 def test_exponentials_stay_rotations_however_long_the_run(method, rng):
     backend = strapgen.backend("euler", method, 2, "c")
     states = backend.propagate(random_increments(rng, 2000, 2, size=0.5))

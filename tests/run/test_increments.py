@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -50,7 +49,7 @@ def test_nothing_is_quantized_without_steps():
     assert pulses(np.zeros((0, 2, 3)), 1).shape == (0, 2, 3)
 
 
-@each(
+@pytest.mark.parametrize(
     ("size", "said"),
     [(0, "pulse is 0"), (-1, "pulse is -1"), ("x", "pulse is 'x'"), (1e-300, "more pulses than")],
 )
@@ -92,7 +91,7 @@ def test_windows_are_the_row_step_after_step(counts, random):
     np.testing.assert_array_equal(cut[:, previous:].reshape(-1, 3), row[previous:])
 
 
-@each(("count", "previous"), [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2)])
+@pytest.mark.parametrize(("count", "previous"), [(1, 1), (1, 3), (2, 1), (2, 3), (4, 2)])
 def test_windows_overlap_consistently(count, previous, rng):
     cut = windows(rng.normal(size=(previous + 6 * count, 3)), count, previous)
     for before, after in pairwise(cut):

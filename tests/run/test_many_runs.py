@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -96,7 +95,7 @@ def test_threads_are_accepted_by_every_back_end(make, rng):
     np.testing.assert_array_equal(backend.propagate(increments, jobs=2), backend.propagate(increments))
 
 
-@each("jobs", [0, -1, 1.5, "two", None, True])
+@pytest.mark.parametrize("jobs", [0, -1, 1.5, "two", None, True])
 def test_a_wrong_number_of_threads_is_refused_in_one_line(jobs):
     with pytest.raises((InputError, TypeError), match=r"^jobs is .*") as caught:
         strapgen.backend("euler", backend="c").propagate(np.zeros((2, 3, 2, 3)), jobs=jobs)
@@ -117,7 +116,7 @@ def test_parts_are_of_like_size():
     assert max(sizes) - min(sizes) <= 2 * 16
 
 
-@each("batch", [(3,), (50, 2), (1,), (0,), ()])
+@pytest.mark.parametrize("batch", [(3,), (50, 2), (1,), (0,), ()])
 def test_numpy_evaluates_blocks_as_it_does_samples(monkeypatch, rng, batch):
     backend = strapgen.backend("dcm", backend="numpy")
     state = backend.step(backend.identity, rng.normal(scale=0.3, size=(*batch, 2, 3)))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from languages import cases
 
 import strapgen
 from strapgen import catalogue
@@ -32,7 +33,7 @@ def increments(rng) -> np.ndarray:
     return rng.normal(scale=0.02, size=(24, 2, 3))
 
 
-@pytest.mark.parametrize("name", BACKENDS)
+@pytest.mark.parametrize("name", cases(BACKENDS))
 @pytest.mark.parametrize(
     ("algorithm", "orthonormalization"),
     [("euler", None), ("dcm", "dcm-orthonormalize-first-order"), (FILE, None), (FILE, "mend")],
@@ -55,7 +56,7 @@ def test_a_copy_runs_bit_for_bit_like_what_it_was_copied_from(
     np.testing.assert_array_equal(copied(copy).propagate(increments), backend.propagate(increments))
 
 
-@pytest.mark.parametrize("name", BACKENDS)
+@pytest.mark.parametrize("name", cases(BACKENDS))
 def test_a_copy_of_an_evaluator_gives_the_same(name):
     evaluator = strapgen.evaluator("euler-normalize", name)
     state = np.array([0.1, 0.5, 0.5, 0.7])
@@ -63,7 +64,7 @@ def test_a_copy_of_an_evaluator_gives_the_same(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", BACKENDS)
+@pytest.mark.parametrize("name", cases(BACKENDS))
 def test_a_copy_of_an_algorithm_in_two_speeds_runs_bit_for_bit_the_same(name, rng):
     runner = TwoSpeed("euler", 2, name)
     copy = copied(runner)

@@ -15,10 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import session_library
 from cffi import FFI
 from derived import programs, tells_more
-from gathering import each
 from hypothesis import example, given
 from hypothesis import strategies as st
 from pycparser import c_ast, c_parser
@@ -107,26 +105,23 @@ def test_strict_compilation_can_fail(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def objects(folder: Path) -> Path:
+def objects(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the objects of the standard catalogue, one of each type, compiled by gcc as a user would.
 
     What gcc says of loops stands beside them, in `OPTIMIZED`.
     """
     needed("gcc")
+    place = tmp_path_factory.mktemp("objects")
     parts = {f"{target}.c": [f for k in KERNELS for f in generated(k, target).files] for target in TARGETS}
+    for part, names in parts.items():
+        code = (folder / name for name in names if name.endswith(".c"))
+        (place / part).write_text("".join(f'#include "{path}"\n' for path in code))
     command = ["gcc", *C_FLAGS, *STRICT, "-fPIC", "-fopt-info-vec-optimized", "-c", *parts]
-
-    def fill(place: Path) -> None:
-        for part, names in parts.items():
-            code = (folder / name for name in names if name.endswith(".c"))
-            (place / part).write_text("".join(f'#include "{path}"\n' for path in code))
-        done = subprocess.run(command, cwd=place, capture_output=True, text=True)
-        rest = [line for line in done.stderr.splitlines() if ": optimized: " not in line]
-        assert (done.returncode, rest) == (0, [])
-        (place / OPTIMIZED).write_text(done.stderr)
-
-    version = str(Path(needed("gcc")).resolve().stat())
-    return session_library.folder("test-objects", [*command, version], fill)
+    done = subprocess.run(command, cwd=place, capture_output=True, text=True)
+    rest = [line for line in done.stderr.splitlines() if ": optimized: " not in line]
+    assert (done.returncode, rest) == (0, [])
+    (place / OPTIMIZED).write_text(done.stderr)
+    return place
 
 
 @pytest.mark.long
@@ -159,8 +154,8 @@ def test_objects_have_no_state_of_their_own(objects):
     assert library <= {*("sqrt", "sin", "cos", "atan2", "fmax", "memcpy", "memmove", "sincos", "__cpu_model")}
 
 
-@each("target", TARGETS)
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_text_has_no_heap_and_no_static_data(kernel, target):
     for text in generated(kernel, target).files.values():
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
@@ -344,7 +339,7 @@ def test_propagation_is_the_step_repeated_bit_for_bit(propagate):
         assert record.tobytes() == state.tobytes()
 
 
-@each("steps", [1, 2, 3, 4, 5, 7, 8, 9, 19])
+@pytest.mark.parametrize("steps", [1, 2, 3, 4, 5, 7, 8, 9, 19])
 def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
     _, whole = propagate(propagate.increments[0], 1, 7, function=propagate.normalize)
     status, part = propagate(propagate.increments[0], 1, 7, steps=steps, function=propagate.normalize)
@@ -352,8 +347,8 @@ def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
     assert part[0].tobytes() == whole[0, : steps + 1].tobytes()
 
 
-@each("target", TARGETS)
-@each("step", [*STEPS, RODRIGUES])
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("step", [*STEPS, RODRIGUES])
 def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(step, target):
     of_catalogue = step != RODRIGUES
     sources = generated(step, target) if of_catalogue else pipeline.compile(choose(step, "rk1", 1), target)
@@ -464,8 +459,8 @@ def test_propagation_orthonormalizes_before_it_records(propagate, every):
             assert history[0, number // 2].tobytes() == state.tobytes()
 
 
-@each("runs", [1, 2, 7, 8, 9, 15, 16, 17, 33])
-@each("record_every", [1, 3, 20])
+@pytest.mark.parametrize("runs", [1, 2, 7, 8, 9, 15, 16, 17, 33])
+@pytest.mark.parametrize("record_every", [1, 3, 20])
 def test_many_runs_equal_single_runs_bit_for_bit(propagate, runs, record_every):
     arguments = {"record_every": record_every, "orthonormalize_every": 4, "function": propagate.normalize}
     increments = np.concatenate([propagate.increments * k for k in range(1, 12)])[:runs]
@@ -494,7 +489,7 @@ def test_steps_after_the_last_record_are_run_and_not_recorded(propagate):
     assert history.shape[1] == 1
 
 
-@each(
+@pytest.mark.parametrize(
     "fault",
     [
         {"initial": None},
@@ -561,8 +556,8 @@ def function_body(source: str) -> str:
     return body
 
 
-@each("target", TARGETS)
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_operation_counts(kernel, target):
     program, sources = programs()[kernel], generated(kernel, target)
     tree = c_parser.CParser().parse(function_body(text_of(sources, ".c")))
@@ -674,8 +669,8 @@ def test_compiler_reads_literals_as_meant(tmp_path):
 # Headers
 
 
-@each("target", TARGETS)
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_header_is_a_contract(kernel, target):
     program, sources = programs()[kernel], generated(kernel, target)
     header = re.sub(r"\n \*\s+", " ", text_of(sources, ".h"))
@@ -710,14 +705,14 @@ def test_names_of_both_types_differ(target):
     assert sources.function.name == f"euler_rk4_2{suffix}"
 
 
-@each("target", TARGETS)
-@each(("kernel", "unused"), [("constant-increments", ["middle"]), ("euler-product", [])])
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("kernel", "unused"), [("constant-increments", ["middle"]), ("euler-product", [])])
 def test_inputs_that_a_kernel_does_not_read_are_named_for_the_compiler(kernel, unused, target):
     assert re.findall(r"\(void\)(\w+);", text_of(generated(kernel, target), ".c")) == unused
 
 
-@each("target", TARGETS)
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_text_is_clean(kernel, target):
     for text in generated(kernel, target).files.values():
         assert text.endswith("\n") and not text.endswith("\n\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from gathering import each
+import pytest
 
 from strapgen import pipeline
 from strapgen.catalogue import choose
@@ -13,20 +13,20 @@ from strapgen.ir.integer_program import IntegerSum, Value
 from strapgen.targets.contract import argument_text, value_text
 
 
-@each(
+@pytest.mark.parametrize(
     ("settings", "limits", "error"),
     [
         # A product is rounded by half a place.
         (
             Settings(word=16),
             "format Q1.14, unit 2^-14; range -17408 to 17408 (-1.0625 to 1.0625)",
-            "error at most 3.05176e-05, 0.5000 of the last place",
+            "error <= 3.05176e-05 (0.5000 ulp)",
         ),
         # What saturates stores 1 itself as a place less.
         (
             Settings(word=16, state="q15"),
             "format Q0.15, unit 2^-15; range -32768 to 32767 (-1 to 0.99997)",
-            "saturates at both ends; error at most 3.05176e-05, 1.0000 of the last place, where the exact value is "
+            "saturates at both ends; error <= 3.05176e-05 (1.0000 ulp), where the exact value is "
             "from -1 to 1; beyond, at most the larger of this and its distance from the range",
         ),
     ],

@@ -1,23 +1,19 @@
-"""The C++ of kernels: bits of the C, constant expressions, strict compilers, and what is told without a compiler."""
+"""The C++ of kernels: constant expressions and strict compilers."""
 
 from __future__ import annotations
 
 import re
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from languages import DOUBLE, check_bits_of_c, check_lines
+from languages import check_lines
 
 import strapgen
 from strapgen import catalogue, pipeline
-from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
-from strapgen.run.backends import of_sources
 from strapgen.run.compiler import COMPILERS
-from strapgen.targets.contract_lines import Contract
 from strapgen.targets.cpp.fixed import _word
 from strapgen.targets.cpp.text import constants
 from strapgen.targets.definitions import Macro
@@ -32,8 +28,6 @@ STRICT = (
     "-Wold-style-cast",
     "-Werror",
 )
-#: A step that no other test compiles: what is loaded already needs no compiler.
-SIMULATE = "simulate euler --method rk1 --increments 7 --motion sinusoidal --set a_deg_s=1 b_deg_s=1 --step 1"
 
 
 @pytest.fixture
@@ -50,16 +44,6 @@ def checked(cxx: str, folder: Path, text: str, *flags: str) -> subprocess.Comple
     (folder / "main.cpp").write_text(text)
     command = [cxx, *STRICT, "-ffp-contract=off", *flags, "-fsyntax-only", "main.cpp"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-
-
-def test_some_kernels_have_the_bits_of_c(cxx, rng):
-    check_bits_of_c([catalogue.choose(*words) for words in DOUBLE], "cpp", "c", rng)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("other", "c"), [("cpp", "c"), ("cpp-float", "c-float")])
-def test_every_kernel_has_the_bits_of_c(cxx, other, c, rng):
-    check_bits_of_c(catalogue.standard(), other, c, rng)
 
 
 @pytest.mark.parametrize("right", [True, False])
@@ -129,35 +113,8 @@ def test_all_headers_stand_in_one_program_of_strict_compilers(cxx, tmp_path):
     assert said.returncode == 0, said.stderr
 
 
-def test_the_contract_of_a_header_is_that_of_the_c_but_for_the_command():
-    choice = catalogue.choose("euler")
-    header = pipeline.compile(choice, "cpp").files["euler_rk4_2.hpp"]
-    other = pipeline.compile(choice, "c").files["euler_rk4_2.h"]
-    assert Contract.read(header).items == Contract.read(other).items
-    assert Contract.read(header).digest != Contract.read(other).digest
-
-
 def test_fused_operations_and_fast_mathematics_are_refused(cxx, tmp_path):
     sources = pipeline.compile(catalogue.choose("euler"), "cpp")
     (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
     said = checked(cxx, tmp_path, '#include "euler_rk4_2.hpp"\n', "-ffast-math")
     assert "operations must round to double" in said.stderr
-
-
-def test_without_a_compiler_one_line_says_which_is_missing(monkeypatch, capsys):
-    monkeypatch.setenv("CXX", "no-such-compiler")
-    with pytest.raises(SystemExit) as caught:
-        main([*SIMULATE.split(), "--duration", "2", "--backend", "cpp"])
-    assert caught.value.code == 2
-    assert capsys.readouterr().err == (
-        "strapgen: no C++ compiler: 'no-such-compiler' is not on the PATH; install g++ (or set CXX), or use the numpy "
-        "back end\n"
-    )
-
-
-def test_what_does_not_compile_is_told_in_one_line(cxx):
-    sources = pipeline.compile(catalogue.choose("euler-normalize"), "cpp")
-    broken = {name: text.replace("std::sqrt(", "std::sqroot(") for name, text in sources.files.items()}
-    with pytest.raises(CompilerError, match=r"failed on euler-normalize: .*sqroot") as caught:
-        of_sources(replace(sources, files=broken))
-    assert "\n" not in str(caught.value)

@@ -95,7 +95,7 @@ def test_names_have_at_most_31_characters():
     assert [name for name in names if len(name) > (63 if name.isupper() else 31)] == []
 
 
-FORMAT = r"Q-?\d+\.-?\d+, \S+ \.\. \S+, (exact|error \S+)(; stands for [^*]+)?"
+FORMAT = r"Q-?\d+\.-?\d+, \S+ \.\. \S+, (exact|error \S+)(; stores [^*]+)?"
 
 
 def test_every_fixed_point_value_has_its_format_range_and_error():

@@ -12,7 +12,7 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
-from strapgen.run import octave_process
+from strapgen.run import octave
 from strapgen.run.compiler import COMPILERS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,7 +56,7 @@ def test_the_program_of_a_language_prints_what_the_page_says(language, workplace
 
 
 def test_the_script_in_matlab_prints_what_the_page_says(workplace):
-    if reason := octave_process.missing():
+    if reason := octave.missing():
         pytest.skip(reason)
     section = PAGE.partition("\n## MATLAB and GNU Octave\n")[2].partition("\n## ")[0]
     generate, normalize, run, _ = commands(section)
@@ -66,7 +66,7 @@ def test_the_script_in_matlab_prints_what_the_page_says(workplace):
         assert stop.value.code in (0, None)
     script = Path("examples/languages/run_step.m")
     assert run == f"octave-cli {script}"
-    said = subprocess.run([*octave_process.command(), script], capture_output=True, text=True, check=True)
+    said = subprocess.run([*octave.command(), script], capture_output=True, text=True, check=True)
     assert f"It prints `{said.stdout.strip()}` too" in section
     texts = [script.read_text(), Path("out/matlab/euler_rk4_2.m").read_text()]
     for excerpt in re.findall(r"^```matlab\n(.*?)^```", section, flags=re.MULTILINE | re.DOTALL):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from gathering import each
 
 from strapgen.targets.lines import fill, fill_arguments, fill_definition, fill_expression
 
@@ -23,7 +22,7 @@ def test_prose_is_wrapped_at_spaces_and_written_with_single_spaces_for_ends_of_l
     assert fill("", "") == fill("  ", "") == ""
 
 
-@each("width", range(40, 60))
+@pytest.mark.parametrize("width", range(40, 60))
 def test_no_line_of_a_macro_is_longer_than_the_width(width):
     values = ", ".join(f"{10**k}" for k in range(12))
     lines = fill_definition("NAME_OF_A_MACRO", f"{{{values}}}", "powers of ten", width).split("\n")

@@ -18,10 +18,9 @@ from strapgen.catalogue import Choice
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
-from strapgen.run import compiler, generated_files, octave_process
+from strapgen.run import compiler, generated_files, octave
 from strapgen.run.backends import of_sources
-from strapgen.targets.matlab.emit import _MatlabPrinter
-from strapgen.targets.matlab.names import MATLAB
+from strapgen.targets.matlab.emit import MATLAB, _MatlabPrinter
 
 #: Functions of MATLAB without a toolbox that Octave has too: all that generated code calls.
 COMMON = {
@@ -42,18 +41,6 @@ COMMON = {
     ),
     *("sqrt", "zeros"),
 }
-SIMULATE = [
-    "simulate",
-    "euler",
-    "--motion",
-    "constant",
-    "--set",
-    "x_deg_s=1",
-    "--step",
-    "1",
-    "--duration",
-    "2",
-]
 #: Steps of a run, in more than one block of the loop.
 STEPS = 1003
 WORDS = {"function", "end", "if", "for"}
@@ -62,7 +49,7 @@ WORDS = {"function", "end", "if", "for"}
 @pytest.fixture
 def has_octave() -> None:
     """Skip a test where Octave is missing."""
-    if reason := octave_process.missing():
+    if reason := octave.missing():
         pytest.skip(reason)
 
 
@@ -102,7 +89,7 @@ def same_run(one: Sources, reference: Sources, rng: np.random.Generator) -> bool
     for row in rows:
         states.append(of_sources(reference).evaluate([states[-1], row], ())[0])
     name, shape = f"{one.function.name}_propagate", (*state.shape, STEPS + 1)
-    (history,) = octave_process.call([one], name, [start, np.moveaxis(rows, 0, -1)], [shape])
+    (history,) = octave.call([one], name, [start, np.moveaxis(rows, 0, -1)], [shape])
     return bits(np.moveaxis(history, -1, 0)) == bits(np.array(states))
 
 
@@ -263,19 +250,8 @@ def test_octave_that_has_ended_is_told_and_started_again(has_octave):
     with pytest.raises(CompilerError, match="Octave has ended before it was done"):
         of_sources(exits)([0.6, 0, 0, 0.8])
     assert kernel([0.6, 0, 0, 0.8])[0] == 0.6
-    (process,) = octave_process._running
+    (process,) = octave._running
     os.kill(process._process.pid, signal.SIGKILL)
     process._process.wait()
     assert kernel([0.6, 0, 0, 0.8])[0] == 0.6
     assert not process._folder.exists()
-
-
-def test_without_octave_one_line_says_so(monkeypatch, capsys):
-    monkeypatch.setenv("OCTAVE", "no-such-octave --some-option")
-    with pytest.raises(SystemExit) as caught:
-        main([*SIMULATE, "--backend", "octave"])
-    assert caught.value.code == 2
-    assert capsys.readouterr().err == (
-        "strapgen: no Octave: 'no-such-octave' is not on the PATH; install octave (or set OCTAVE), or use the numpy "
-        "back end\n"
-    )

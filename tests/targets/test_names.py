@@ -16,7 +16,6 @@ import cffi
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -31,9 +30,9 @@ from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.run import compiler, octave_process
+from strapgen.run import compiler, octave
 from strapgen.targets import c_library, names
-from strapgen.targets.matlab import names as matlab_names
+from strapgen.targets.matlab import emit as matlab
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 #: A file that includes all others.
@@ -42,7 +41,7 @@ STEPS = 19  # more than the loop in C takes together
 FIXED = Settings(carry="full")
 
 PYTHON_WORDS = {"lambda", "def", "None", "True", "yield", "match", "await", "print"}
-KEYWORDS = sorted(names._C_WORDS | PYTHON_WORDS | matlab_names._WORDS)
+KEYWORDS = sorted(names._C_WORDS | PYTHON_WORDS | matlab._WORDS)
 MACROS = ["NULL", "INT32_MAX", "I", "EOF", "NAN", "M_PI", "SIZE_MAX", "INFINITY", "EDOM", "SIGINT"]
 FUNCTIONS = [
     "sqrt",
@@ -142,7 +141,7 @@ def printed_names() -> list[str]:
             REFERENCE, target, FIXED if targets.TARGETS[target].fixed else None
         ).files.values()
         kind = targets.TARGETS[target].language
-        language = {"Python": names.PYTHON, "MATLAB": matlab_names.MATLAB}.get(kind, names.C)
+        language = {"Python": names.PYTHON, "MATLAB": matlab.MATLAB}.get(kind, names.C)
         found = found.union(*language.scopes(texts))
     return sorted(name for name in found if name.isidentifier())
 
@@ -238,8 +237,7 @@ def lowered(kernel: Kernel) -> Lowered:
 
 def renamed(step: Lowered, kernel: str) -> Lowered:
     """Return a step under another name of its kernel, which its code otherwise knows nothing of."""
-    names = {"name": kernel.replace("-", "_"), "kernel": kernel}
-    program = replace(step.program, **names)
+    program = replace(step.program, info=replace(step.program.info, name=kernel), name="")
     return Lowered(program, replace(step.fixed, program=program))
 
 
@@ -266,7 +264,7 @@ def check_matlab(step: Lowered) -> None:
     """Check that the loop in MATLAB computes the run."""
     sources = strapgen.generate(step.program, "matlab")
     name, turns = f"{sources.function.name}_propagate", INCREMENTS[:, None].transpose(1, 2, 0)
-    (history,) = octave_process.call([sources], name, [START, turns], [(3, STEPS + 1)])
+    (history,) = octave.call([sources], name, [START, turns], [(3, STEPS + 1)])
     np.testing.assert_allclose(history.T, EXPECTED, rtol=0, atol=1e-14)
 
 
@@ -342,7 +340,7 @@ def test_every_target_computes_the_same_under_any_names(several, tmp_path_factor
         admission._require_formulas(kernel)
     steps = list(map(lowered, kernels))
     check_c(tmp_path_factory.mktemp("names"), steps, list(map(check_python, steps)))
-    if not octave_process.missing():
+    if not octave.missing():
         for one in steps:
             check_matlab(one)
 
@@ -458,7 +456,7 @@ def test_functions_of_the_headers_that_generated_code_includes_are_no_kernels():
     assert sorted(name for name in functions if names.external(name) == name) == []
 
 
-@each("word", sorted({*keyword.kwlist, "__debug__"}))
+@pytest.mark.parametrize("word", sorted({*keyword.kwlist, "__debug__"}))
 def test_keywords_of_python_are_no_names(word):
     assert not names.PYTHON.allows(word)
 

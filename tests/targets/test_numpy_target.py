@@ -10,7 +10,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 from derived import programs
-from gathering import each
 
 from strapgen.catalogue import standard
 from strapgen.ir.program import Program
@@ -58,7 +57,7 @@ def as_tuple(result) -> tuple[np.ndarray, ...]:
 
 
 @pytest.mark.long
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_leading_axes_are_samples(kernel, rng):
     program = programs()[kernel]
     inputs = samples(program, (2, 5), rng)
@@ -73,7 +72,7 @@ def test_leading_axes_are_samples(kernel, rng):
             np.testing.assert_allclose(one, all_[place], rtol=1e-14, atol=1e-15)
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_result_is_the_program_s(kernel, rng):
     program = programs()[kernel]
     inputs = samples(program, (), rng)
@@ -97,7 +96,7 @@ def test_inputs_broadcast(rng):
     assert result[2, 1].tobytes() == function("euler-rk4-2")(state[2, 0], increments[1]).tobytes()
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_out_may_be_an_input(kernel, rng):
     program = programs()[kernel]
     if len(program.outputs) > 1:
@@ -125,7 +124,7 @@ def test_out_may_be_an_input(kernel, rng):
         np.testing.assert_array_equal(turned, wanted)
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_inputs_are_left_alone(kernel, rng):
     inputs = samples(programs()[kernel], (3,), rng)
     before = {name: value.tobytes() for name, value in inputs.items()}
@@ -141,7 +140,7 @@ def test_whole_numbers_are_not_cut():
     assert function("euler-normalize")(np.array([0, 0, 3, 4], np.float32)).dtype == np.float32
 
 
-@each("kernel", STEPS)
+@pytest.mark.parametrize("kernel", STEPS)
 def test_step_is_the_product_with_its_transition(kernel, rng):
     state, increments = samples(programs()[kernel], (7,), rng).values()
     transition = getattr(module(kernel), f"{generated(kernel).function.name}_transition")
@@ -180,7 +179,7 @@ def counted(node: ast.AST) -> dict[str, int]:
     return counts
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_operation_counts(kernel):
     program = programs()[kernel]
     parts = {program.name: program}
@@ -206,7 +205,7 @@ def test_operation_counts(kernel):
 # Documentation
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_module_documents_itself(kernel):
     program = programs()[kernel]
     said = " ".join((module(kernel).__doc__ or "").split())
@@ -222,7 +221,7 @@ def test_module_documents_itself(kernel):
             assert f"at most {signal.bound} in magnitude" in contract
 
 
-@each("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_text_is_clean(kernel):
     assert text(kernel).endswith("\n") and not text(kernel).endswith("\n\n")
     assert all(line == line.rstrip() for line in text(kernel).splitlines())

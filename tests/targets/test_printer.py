@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 from cffi import FFI
-from gathering import each
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.compiler import C_FLAGS
@@ -36,12 +36,7 @@ def program(*trees: Node) -> Program:
     names = tuple(f"y_{k}" for k in range(len(trees)))
     outputs = Signal("result", (len(trees),), names, meaning="the values")
     return Program(
-        name="trees",
-        kernel="trees",
-        title="Random trees",
-        source="a test",
-        arguments="trees",
-        notes=(),
+        KernelInfo("trees", "Random trees", "a test", arguments="trees"),
         inputs=(Signal("argument", (len(NAMES),), NAMES, meaning="numbers"),),
         body=tuple(Assignment(name, tree) for name, tree in zip(names, trees, strict=True)),
         outputs=(Result(outputs, tuple(map(Reference, names))),),
@@ -64,7 +59,7 @@ def run(tree: Node, number: Any) -> Any:
 
     twin = without_constants(tree)
     inputs = (Signal("argument", (len(NAMES),), NAMES), *map(Signal.scalar, constants))
-    whole = Program("twin", "twin", "", "", "", (), inputs, (Assignment("y", twin),), (_scalar_result("y"),))
+    whole = Program(KernelInfo("twin", "", ""), inputs, (Assignment("y", twin),), (_scalar_result("y"),))
     with np.errstate(all="ignore"):
         return whole.run({name: number(value) for name, value in VALUES.items()} | constants)["result"][0]
 
@@ -120,7 +115,7 @@ def test_python_text_has_the_value_of_the_tree(tree):
     assert got == wanted or (math.isnan(got) and math.isnan(wanted)), text
 
 
-@each(
+@pytest.mark.parametrize(
     ("tree", "text"),
     [
         (op("add", op("add", x, y), z), "x_1 + x_2 + x_3"),

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
+from languages import OTHERS, cases
 from tolerances import roundoff
 
 import strapgen
@@ -27,10 +27,10 @@ REPRODUCED = {
 BASE_DEG = {1: 0.2855, 2: 0.856, 4: 6.251e-2, 5: 1.026}
 ORDERS = (1, 2, 4)
 
-#: Back ends of the quick tests; a table takes arithmetic of 40 digits a quarter of a minute.
+#: A table takes arithmetic of 40 digits a quarter of a minute.
 LONG_RUNS = [
-    pytest.param(name, marks=pytest.mark.long) if entry.slow or name in ("c-float", "c-fixed16") else name
-    for name, entry in BACKENDS.items()
+    *cases(name for name in BACKENDS if name not in (*OTHERS, "exact")),
+    pytest.param("exact", marks=pytest.mark.long),
 ]
 
 # Two figures stand nearer to the round-off of double precision than the rest.
@@ -169,7 +169,7 @@ def test_records_between_orthonormalizations_do_not_come_out(table, base):
     assert not -5e-4 <= drift - float(table.base) < 1e-3
 
 
-@each(
+@pytest.mark.parametrize(
     ("value", "printed", "same"),
     [
         (0.4356, ".44", True),

@@ -6,7 +6,7 @@ loaded when it is derived.
 
 from __future__ import annotations
 
-from strapgen.catalogue.choice import Choice, increments, orthonormalizations, previous
+from strapgen.catalogue.choice import Choice, orthonormalizations
 from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
@@ -45,10 +45,8 @@ __all__ = [
     "companion",
     "derive",
     "enough",
-    "increments",
     "nodes",
     "orthonormalizations",
-    "previous",
     "reserved",
     "rounding",
     "standard",

@@ -164,16 +164,6 @@ class Choice:
         return next(Choice.of_user(kernel) for kernel in self.user_kernel.kernel.own if kernel.name == name)
 
 
-def increments(choice: Choice) -> int:
-    """Return the number of increments in a step, see `Choice.increments_per_step`."""
-    return choice.increments_per_step
-
-
-def previous(choice: Choice) -> int:
-    """Return the number of increments from before the step that it takes."""
-    return choice.previous
-
-
 def orthonormalizations(algorithm: str) -> list[str]:
     """Return the kernels that orthonormalize the state of an algorithm of the catalogue."""
     starts = (f"{algorithm}-orthonormalize", f"{algorithm}-normalize")

@@ -19,28 +19,10 @@ _SHORT_NUMBER, _SHORT_OPTION = 8, 60
 
 
 def read(constants: Mapping[str, Any]) -> Constants:
-    """Return constants as a value, each number exact.
+    """Return constants by the name of the input, in its unit and row by row, as a value with exact numbers.
 
-    Parameters
-    ----------
-    constants : mapping of str to number, or to an array or nested sequence of numbers
-        By the name of the input, in its unit and row by row. A number is an int, a Fraction, a decimal or a fraction
-        as text, or a float, which stands for its shortest decimal form.
+    A number is an int, a Fraction, a decimal or a fraction as text, or a float, which stands for its shortest decimal.
 
-    Returns
-    -------
-    tuple of (str, tuple of Fraction)
-        Sorted by name.
-
-    Raises
-    ------
-    InputTypeError
-        If it is no mapping from names.
-    InputError
-        If a value is no finite number.
-
-    Examples
-    --------
     >>> read({"rate_bias": [0.5, "1/3", 0], "cycle": "0.02"})
     (('cycle', (Fraction(1, 50),)), ('rate_bias', (Fraction(1, 2), Fraction(1, 3), Fraction(0, 1))))
     """

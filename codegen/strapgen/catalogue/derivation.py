@@ -11,8 +11,7 @@ from strapgen.catalogue.choice import AnyMethod, Choice
 from strapgen.catalogue.method_names import INTEGRATORS, METHODS, VECTORS, named_method
 from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
-from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import unknown
+from strapgen.ir import checks
 from strapgen.ir.timing import timed
 
 if TYPE_CHECKING:
@@ -101,7 +100,7 @@ def _method(method: AnyMethod) -> Method:
     """Load a method by its name, from its tableau or from its window."""
     spec = named_method(method)
     if spec is None:
-        raise InputError(unknown("method", method, METHODS))
+        raise checks.unknown_name("method", method, METHODS)
     module, function, arguments = spec.recipe
     with INTEGRATORS.guarded(spec.name, "return a Method"):
         loaded: Method = getattr(import_module(module), function)(*arguments)

@@ -35,16 +35,16 @@ def _fixed(interface: Interface) -> Iterator[str]:
         bound, unit = max(argument.errors), argument.format.unit
         useless = 2 * bound >= max(abs(argument.low), abs(argument.high)) * unit
         yield (
-            f"{argument.signal.name}: {argument.format}, error at most {above(bound, 4)}, "
-            f"{places_above(bound / unit)} of the last place"
+            f"{argument.signal.name}: {argument.format}, error <= {above(bound, 4)} "
+            f"({places_above(bound / unit)} ulp)"
             + (": of the size of the value, which certifies nothing" if useless else "")
         )
 
 
 def _floating(rounding: RoundingBounds) -> Iterator[str]:
     if rounding.reason:
-        yield f"no error bound is known: {rounding.reason}"
+        yield f"no error bound: {rounding.reason}"
         return
     for name, bound in rounding.worst.items():
-        places = f"{places_above(bound / rounding.unit)} of the last place of 1"
-        yield f"{name}: error at most {above(bound, 4)}, {places}" if bound else f"{name}: exact"
+        ulp = f"{places_above(bound / rounding.unit)} ulp of 1"
+        yield f"{name}: error <= {above(bound, 4)} ({ulp})" if bound else f"{name}: exact"

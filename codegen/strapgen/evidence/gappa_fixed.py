@@ -12,15 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.evidence.gappa_scripts import CannotFollowError, Script, exact_lines, number, product, total
-from strapgen.ir.integer_program import (
-    FixedProgram,
-    IntegerQuotient,
-    IntegerRoot,
-    IntegerSum,
-    Scaled,
-    Term,
-    Value,
-)
+from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
 from strapgen.kernel import polynomials
 
 #: Degree up to which a value is expanded in the inputs for its range, and terms that this may take.
@@ -99,9 +91,9 @@ class _FixedScriptWriter:
         match value.definition:
             case IntegerSum() as definition:
                 self._sum(value, definition)
-            case IntegerQuotient(numerator, denominator):
-                self._quotient(value, numerator, denominator)
-            case IntegerRoot(argument):
+            case IntegerOperation("divide", (numerator, denominator)):
+                self._quotient(value, numerator, str(denominator.value))
+            case IntegerOperation("sqrt", (argument,)):
                 self._root(value, argument)
             case _:
                 raise CannotFollowError(f"{name} is chosen by a comparison, which is a branch")

@@ -8,7 +8,7 @@ from fractions import Fraction
 from strapgen.fixedpoint.chain import Chain
 from strapgen.fixedpoint.function_series import PI_ERROR, arctangent_series, pi
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantities import Operand, Quotient, Selection
+from strapgen.fixedpoint.quantities import ExactOperation, Operand
 from strapgen.ir.formats import finest
 
 #: Quotients below 1/2 - 1/16 have the polynomial of the arctangent; those above are measured from the diagonal.
@@ -31,7 +31,9 @@ def arctangent(
     zero = Fraction(0)
     from_diagonal = _from(chain, Fraction(1, 4), angle, 1)
     angle = chain.add(
-        "octant", Selection(((beyond, zero, from_diagonal),), angle), Interval.of(0, pi() / 4 + PI_ERROR)
+        "octant",
+        ExactOperation("select", (beyond, zero, from_diagonal, angle)),
+        Interval.of(0, pi() / 4 + PI_ERROR),
     )
     if chain.range(height).high > chain.range(width).low:
         angle = chain.selection(
@@ -52,7 +54,7 @@ def _octant(chain: Chain, height: str, width: str) -> tuple[str, str]:
     heights, widths = chain.range(height), chain.range(width)
     smaller = chain.add(
         "smaller",
-        Selection(((width, height, height),), width),
+        ExactOperation("select", (width, height, height, width)),
         Interval(min(heights.low, widths.low), min(heights.high, widths.high)),
     )
     # At the origin the last place stands for the larger one: the angle is 0 there.
@@ -65,12 +67,12 @@ def _octant(chain: Chain, height: str, width: str) -> tuple[str, str]:
     zero, share = Fraction(0), sum(_OCTANT, Fraction(0))
     numerator = chain.add(
         "numerator",
-        Selection(((beyond, zero, below),), smaller),
+        ExactOperation("select", (beyond, zero, below, smaller)),
         Interval.of(-(1 - share) * most, share * most),
     )
     denominator = chain.selection("denominator", (beyond, zero, both), otherwise=larger)
     reach = Interval.of(-(1 - share) / (1 + share), share)
-    tangent = chain.add("tangent", Quotient(numerator, denominator), reach)
+    tangent = chain.add("tangent", ExactOperation("divide", (numerator, denominator)), reach)
     coefficients, left_out = arctangent_series(chain.tolerance)
     square = chain.square(tangent)
     series = chain.polynomial("series", coefficients[1:], square)
@@ -100,16 +102,16 @@ def wrap(chain: Chain, argument: str) -> None:
     limit = Fraction(math.floor(pi() * grid), grid)
     within = Interval.symmetric(limit + Fraction(2, grid))
     value = angle
-    cases: list[tuple[Operand, Operand, Operand]] = []
+    cases: list[Operand] = []
     for beyond, left, right, sign in (
         (inside.highest > limit, angle, limit, -1),
         (inside.lowest < -limit, -limit, angle, 1),
     ):
         if beyond:
             other = chain.sum("turned", ((angle,), _ONE), ((), sign * 2 * pi()), inexact=2 * PI_ERROR)
-            cases.append((left, right, other))
+            cases += [left, right, other]
     if cases:
-        value = chain.add("principal", Selection(tuple(cases), angle), within)
+        value = chain.add("principal", ExactOperation("select", (*cases, angle)), within)
     chain.finish(value, (argument, _ONE))
 
 

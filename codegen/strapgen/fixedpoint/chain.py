@@ -8,15 +8,13 @@ from fractions import Fraction
 
 from strapgen.fixedpoint.intervals import Interval, maximum
 from strapgen.fixedpoint.quantities import (
-    Computed,
     Definition,
     ErrorPropagation,
+    ExactOperation,
     InputElement,
-    Maximum,
     Monomial,
     Operand,
     Quantity,
-    Selection,
     Sum,
 )
 
@@ -105,17 +103,18 @@ class Chain:
         enclosure = self.range(otherwise)
         for _, _, value in cases:
             enclosure = enclosure.join(self.range(value))
-        return self.add(label, Selection(cases, otherwise), enclosure)
+        operands = [operand for case in cases for operand in case]
+        return self.add(label, ExactOperation("select", (*operands, otherwise)), enclosure)
 
     def maximum(self, label: str, *arguments: Operand) -> str:
         """Make the largest of several quantities and constants."""
-        return self.add(label, Maximum(arguments), maximum(map(self.range, arguments)))
+        return self.add(label, ExactOperation("maximum", arguments), maximum(map(self.range, arguments)))
 
     def computed(self, argument: str) -> str:
         """Return an argument as the code computes it, so that it has no error of its own."""
         if argument in self.known and isinstance(self.known[argument].definition, InputElement):
             return argument
-        return self.add("taken", Computed(argument), self.range(argument))
+        return self.add("taken", ExactOperation("computed", (argument,)), self.range(argument))
 
     def magnitude(self, label: str, argument: str) -> str:
         """Return the magnitude of a quantity."""
@@ -124,7 +123,7 @@ class Chain:
             return argument
         negative = self.sum("negative", ((argument,), -_ONE))
         enclosure = Interval(0, Interval.of(inside.magnitude).high)
-        return self.add(label, Maximum((argument, negative)), enclosure)
+        return self.add(label, ExactOperation("maximum", (argument, negative)), enclosure)
 
     def square(self, argument: str) -> str:
         """Return the square of a quantity."""

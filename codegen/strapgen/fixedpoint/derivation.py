@@ -16,7 +16,14 @@ from strapgen.fixedpoint.derivation_context import DerivationContext, free_name,
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.operations import derive_operation
 from strapgen.fixedpoint.products import SUM_OPERATIONS, store, terms_of
-from strapgen.fixedpoint.quantities import InputElement, Operand, Quantities, Quantity, Selection, used_by
+from strapgen.fixedpoint.quantities import (
+    ExactOperation,
+    InputElement,
+    Operand,
+    Quantities,
+    Quantity,
+    used_by,
+)
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.fixedpoint.terms import up
 from strapgen.ir.exceptions import InputError
@@ -116,8 +123,10 @@ def _held_whole(context: DerivationContext, result: Result) -> tuple[Operand, ..
 def _is_whole_word(quantity: Quantity) -> bool:
     """Tell whether a quantity can be an element of an output as it is stored."""
     # A selection of values may be longer than a word: it is rounded to one. An input is no output.
-    is_word = not isinstance(quantity.definition, InputElement | Selection)
-    return is_word and not quantity.offset and not quantity.beside
+    match quantity.definition:
+        case InputElement() | ExactOperation("select"):
+            return False
+    return not quantity.offset and not quantity.beside
 
 
 def _drop_unused(known: Quantities) -> None:

@@ -7,12 +7,19 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.fixedpoint.limits import Limit, state_fraction, stated_format
-from strapgen.fixedpoint.quantities import InputElement, Quantities, Quotient, Sum, exponent, is_power_of_two
+from strapgen.fixedpoint.quantities import (
+    ExactOperation,
+    InputElement,
+    Quantities,
+    Sum,
+    exponent,
+    is_power_of_two,
+)
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, finest
-from strapgen.ir.integer_program import IntegerInput, Value
+from strapgen.ir.integer_program import Value
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import Signal
 
@@ -42,7 +49,7 @@ def format_plan(
         fraction, top = limit.places(guard_bits), limit.largest_integer(guard_bits)
         exact = Fraction(0)
         for name in signal.elements:
-            values[name] = Value(name, IntegerInput(), fraction, False, -top, top, exact, exact, top)
+            values[name] = Value(name, None, fraction, False, -top, top, exact, exact, top)
         inputs.append(limit.argument(guard_bits))
     forced = _stated_formats(program, settings, quantities)
     for result in program.results:
@@ -50,9 +57,9 @@ def format_plan(
         fraction = _result_fraction(program, settings, quantities, inputs, result)
         forced |= {name: forced.get(name, fraction) for name in names}
     divisors = {
-        quantity.definition.denominator
+        str(quantity.definition.arguments[1])
         for quantity in quantities.items.values()
-        if isinstance(quantity.definition, Quotient)
+        if isinstance(quantity.definition, ExactOperation) and quantity.definition.kind == "divide"
     }
     words = frozenset(forced) | quantities.factors() | divisors
     return FormatPlan(tuple(inputs), values, forced, words)

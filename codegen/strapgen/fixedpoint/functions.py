@@ -15,7 +15,7 @@ from strapgen.fixedpoint.angles import arctangent, wrap
 from strapgen.fixedpoint.chain import Chain
 from strapgen.fixedpoint.function_series import PI_ERROR, pi, sine_series
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantities import NearestInteger, Quotient, Selection, SquareRoot, Sum
+from strapgen.fixedpoint.quantities import ExactOperation, Sum
 
 #: Arguments of sine and cosine up to here need no reduction.
 _UNREDUCED = Fraction(5, 4)
@@ -56,16 +56,16 @@ def _sinc(chain: Chain, argument: str) -> None:
         chain.finish(_sinc_series(chain, limited, under_root is not None), *slopes)
         return
     bounded = inside.meet(Interval.of(inside.lowest, limit))
-    near = chain.add("near", Selection(((limited, limit, limit),), limited), bounded)
+    near = chain.add("near", ExactOperation("select", (limited, limit, limit, limited)), bounded)
     value = _sinc_series(chain, near, under_root is not None)
     size = limited
     if under_root is not None:
-        root = chain.add("root", SquareRoot(limited), inside.sqrt())
+        root = chain.add("root", ExactOperation("sqrt", (limited,)), inside.sqrt())
         size = chain.computed(root)
         slopes.append((root, _SINC_SLOPE))
     far = chain.maximum("far", size, _NEAR_ZERO)
     reach = Interval.of(Fraction(-1, 2), Fraction(1, 2))
-    quotient = chain.add("quotient", Quotient(_wave(chain, 1, far), far), reach)
+    quotient = chain.add("quotient", ExactOperation("divide", (_wave(chain, 1, far), far)), reach)
     chain.finish(chain.selection("part", (limited, limit, quotient), otherwise=value), *slopes)
 
 
@@ -96,7 +96,7 @@ def _reduced(chain: Chain, angle: str) -> tuple[str, str]:
             f"words of {chain.word} bits are too short for the sine of angles up to {float(inside.magnitude):.6g} rad"
         )
     ends = [math.floor(end * factor + Fraction(1, 2)) for end in (inside.lowest, inside.highest)]
-    count = chain.add("quarters", NearestInteger(angle, factor), Interval.of(*ends))
+    count = chain.add("quarters", ExactOperation("nearest", (angle, factor)), Interval.of(*ends))
     # A quarter turn in two parts: the first is exact in a word, the second is what it lacks.
     coarse = Fraction(math.floor(pi() * grid / 4), grid // 2)
     rest = chain.sum(
@@ -110,7 +110,7 @@ def _reduced(chain: Chain, angle: str) -> tuple[str, str]:
     if ends[0] >= -2 and ends[1] <= 1:
         return count, rest
     full = [math.floor(Fraction(end, 4) + Fraction(1, 2)) for end in ends]
-    whole = chain.add("turns", NearestInteger(count, Fraction(1, 4)), Interval.of(*full))
+    whole = chain.add("turns", ExactOperation("nearest", (count, Fraction(1, 4))), Interval.of(*full))
     part = chain.sum("quarter_turns", ((count,), _ONE), ((whole,), Fraction(-4)), within=Interval.of(-2, 1))
     return part, rest
 
@@ -161,14 +161,14 @@ def _sinc_series(chain: Chain, argument: str, is_square: bool) -> str:
 
 def _under_root(chain: Chain, argument: str) -> str | None:
     """Return the square of an argument that is a root, or an exact multiple of one."""
-    definition = chain.known[argument].definition
-    if isinstance(definition, SquareRoot):
-        return definition.argument
-    if isinstance(definition, Sum) and len(definition.terms) == 1:
-        ((monomial, factor),) = definition.terms
-        inner = chain.known[monomial[0]].definition if len(monomial) == 1 else None
-        if isinstance(inner, SquareRoot) and not chain.known[argument].offset:
-            return chain.sum("under_root", ((inner.argument,), factor * factor))
+    quantity = chain.known[argument]
+    match quantity.definition:
+        case ExactOperation("sqrt", (str(radicand),)):
+            return radicand
+        case Sum((((str(name),), factor),)) if not quantity.offset:
+            match chain.known[name].definition:
+                case ExactOperation("sqrt", (str(radicand),)):
+                    return chain.sum("under_root", ((radicand,), factor * factor))
     return None
 
 

@@ -27,13 +27,10 @@ from strapgen.fixedpoint.intervals import Interval, maximum
 from strapgen.fixedpoint.products import operand_of, stem, store, store_temporary
 from strapgen.fixedpoint.quantities import (
     Definition,
+    ExactOperation,
     InputElement,
-    Maximum,
     Operand,
     Quantity,
-    Quotient,
-    Selection,
-    SquareRoot,
     Sum,
     Terms,
     combined,
@@ -72,7 +69,7 @@ def _divide(context: DerivationContext, name: str, node: Operation, meaning: str
     _check_range(context, denominator)
     enclosure = range_of(context, numerator) * context.items[denominator].range.reciprocal()
     note_samples(context, name, lambda values: sampled(numerator, values) / values[denominator])
-    _keep(context, name, Quotient(numerator, denominator), enclosure, meaning)
+    _keep(context, name, ExactOperation("divide", (numerator, denominator)), enclosure, meaning)
 
 
 def _square_root(context: DerivationContext, name: str, node: Operation, meaning: str) -> None:
@@ -92,7 +89,7 @@ def _square_root(context: DerivationContext, name: str, node: Operation, meaning
             f"{context.program.kernel}: {argument} may be below 0, its range is {inside.text()}; it has no square root"
         )
     note_samples(context, name, lambda values: np.sqrt(np.maximum(values[argument], 0)))
-    _keep(context, name, SquareRoot(argument), inside.sqrt(), meaning)
+    _keep(context, name, ExactOperation("sqrt", (argument,)), inside.sqrt(), meaning)
 
 
 def _radicand(context: DerivationContext, node: Node, name: str) -> Operand:
@@ -144,7 +141,7 @@ def _maximum(context: DerivationContext, name: str, node: Operation, meaning: st
         return np.asarray(np.max(rows, axis=0))
 
     note_samples(context, name, largest)
-    _keep(context, name, Maximum(arguments), enclosure, meaning)
+    _keep(context, name, ExactOperation("maximum", arguments), enclosure, meaning)
 
 
 def _flat(node: Node) -> list[Node]:
@@ -176,7 +173,8 @@ def _select(context: DerivationContext, name: str, node: Operation, meaning: str
         return result
 
     note_samples(context, name, selected)
-    _keep(context, name, Selection(tuple(cases), otherwise), enclosure, meaning)
+    operands = [operand for case in cases for operand in case]
+    _keep(context, name, ExactOperation("select", (*operands, otherwise)), enclosure, meaning)
 
 
 def _function(context: DerivationContext, name: str, node: Operation, meaning: str) -> None:
@@ -213,8 +211,9 @@ def _distance_from_origin(context: DerivationContext, name: str, ordinate: str, 
     terms: Terms = {}
     for argument, definition in zip((ordinate, abscissa), definitions, strict=True):
         square: Terms = {(argument, argument): Fraction(1)}
-        if isinstance(definition, SquareRoot):
-            square = stored_terms(context, definition.argument)
+        match definition:
+            case ExactOperation("sqrt", (str(radicand),)):
+                square = stored_terms(context, radicand)
         terms = combined(terms, square, Fraction(1))
     distance = store_temporary(context, f"{name}_distance", terms)
     _check_range(context, distance)

@@ -33,51 +33,19 @@ class Sum:
 
 
 @dataclass(frozen=True)
-class Quotient:
-    """A quotient of quantities that are stored whole, without offset."""
+class ExactOperation:
+    """An operation on quantities and constants that is no sum; quantities in it are stored whole, without offset.
 
-    numerator: Operand
-    denominator: str
+    Its kinds are "divide", "sqrt", "maximum" and "select" (see `cases_of`); "computed", the value of a quantity as the
+    code computes it, brought into the range of that one, so that as a number it has no error; and "nearest", the
+    integer that the code computes as the nearest to a quantity times a dyadic factor.
+    """
 
-
-@dataclass(frozen=True)
-class SquareRoot:
-    """A square root."""
-
-    argument: str
-
-
-@dataclass(frozen=True)
-class Maximum:
-    """The largest of several quantities."""
-
+    kind: str
     arguments: tuple[Operand, ...]
 
 
-@dataclass(frozen=True)
-class Selection:
-    """The value of the first case whose left side is at least its right side; `otherwise` if there is none."""
-
-    cases: tuple[tuple[Operand, Operand, Operand], ...]
-    otherwise: Operand
-
-
-@dataclass(frozen=True)
-class Computed:
-    """The computed value of another quantity, brought into the range of that one: as a number, it has no error."""
-
-    argument: str
-
-
-@dataclass(frozen=True)
-class NearestInteger:
-    """The integer that the code computes as the nearest to a multiple of a quantity; the factor is dyadic."""
-
-    argument: str
-    factor: Fraction
-
-
-Definition = InputElement | Sum | Quotient | SquareRoot | Maximum | Selection | Computed | NearestInteger
+Definition = InputElement | Sum | ExactOperation
 
 
 @dataclass(frozen=True)
@@ -139,7 +107,7 @@ class Quantities:
                     for monomial, coefficient in terms:
                         if len(monomial) == 2 or not is_power_of_two(coefficient):
                             names.update(monomial)
-                case Computed(argument) | NearestInteger(argument):
+                case ExactOperation("computed" | "nearest", (str(argument), *_)):
                     names.add(argument)
         return names
 
@@ -172,14 +140,8 @@ def used_by(quantity: Quantity) -> list[str]:
     match quantity.definition:
         case Sum(terms):
             used += [name for monomial, _ in terms for name in monomial]
-        case Quotient(numerator, denominator):
-            used += [numerator, denominator]
-        case SquareRoot(argument) | Computed(argument) | NearestInteger(argument):
-            used.append(argument)
-        case Maximum(arguments):
+        case ExactOperation(_, arguments):
             used += arguments
-        case Selection(cases, otherwise):
-            used += [operand for case in cases for operand in case] + [otherwise]
     return [name for name in used if isinstance(name, str)]
 
 

@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.comparisons import (
-    lower_computed,
-    lower_maximum,
-    lower_nearest_integer,
-    lower_selection,
-)
 from strapgen.fixedpoint.format_plan import FormatPlan, format_plan, sums_of_inputs_are_exact
+from strapgen.fixedpoint.integer_operations import LOWER
 from strapgen.fixedpoint.limits import Limit, limits
-from strapgen.fixedpoint.quantities import (
-    Computed,
-    Maximum,
-    NearestInteger,
-    Quantities,
-    Quantity,
-    Quotient,
-    Selection,
-    SquareRoot,
-    Sum,
-)
+from strapgen.fixedpoint.quantities import ExactOperation, Quantities, Quantity, Sum
 from strapgen.fixedpoint.quantization_context import Quantization
-from strapgen.fixedpoint.quotients_and_roots import lower_quotient, lower_root
 from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
 from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
@@ -45,16 +28,6 @@ from strapgen.ir.signals import CYCLE, Signal
 _MOST_GUARD_BITS = 3
 #: Shorter formats are chosen where they cost no more than a hundredth in error.
 _WORSE = Fraction(101, 100)
-
-_LOWER: dict[type, Callable[[Quantization, Quantity, Any], None]] = {
-    Sum: lower_sum,
-    Quotient: lower_quotient,
-    SquareRoot: lower_root,
-    Maximum: lower_maximum,
-    Selection: lower_selection,
-    Computed: lower_computed,
-    NearestInteger: lower_nearest_integer,
-}
 
 
 def lowered(program: Program, settings: Settings) -> FixedProgram:
@@ -121,20 +94,19 @@ def _walked(
     names = _feedback_names(program, settings, quantities)
     context = Quantization(program, settings, quantities, plan, most, names)
     for quantity in quantities.items.values():
-        lower = _LOWER.get(type(quantity.definition))
-        if lower is not None and not _is_unused_constant(context, quantity):
-            lower(context, quantity, quantity.definition)
+        match quantity.definition:
+            case Sum() as total if not _is_unused_constant(context, quantity, total):
+                lower_sum(context, quantity, total)
+            case ExactOperation(kind) as operation:
+                LOWER[kind](context, quantity, operation)
     return context
 
 
-def _is_unused_constant(context: Quantization, quantity: Quantity) -> bool:
+def _is_unused_constant(context: Quantization, quantity: Quantity, total: Sum) -> bool:
     """Tell whether a sum is a constant that no word needs to hold, or is there already."""
-    definition = quantity.definition
-    if not isinstance(definition, Sum):
-        return False
     exact = not quantity.offset and not quantity.inexact
-    constant = exact and all(not monomial for monomial, _ in definition.terms)
-    unused = (not definition.terms or constant) and quantity.name not in context.plan.words
+    constant = exact and all(not monomial for monomial, _ in total.terms)
+    unused = (not total.terms or constant) and quantity.name not in context.plan.words
     return unused or quantity.name in context.values
 
 

@@ -13,7 +13,7 @@ from strapgen.fixedpoint.terms import up
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import ROUNDINGS, Format
-from strapgen.ir.integer_program import IntegerDefinition, Value
+from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Value
 from strapgen.ir.program import Program
 
 #: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
@@ -67,7 +67,7 @@ class Quantization:
 def integer_value(
     context: Quantization,
     quantity: Quantity,
-    definition: IntegerDefinition,
+    definition: IntegerSum | IntegerOperation,
     fraction: int,
     error: Fraction,
     peak: int,

@@ -51,10 +51,10 @@ def counted(program: Program) -> tuple[Signal, ...]:
 def in_counts(program: Program, sensor: Sensor) -> Program:
     """Return a program whose increments are counts times a power of two, where they were angles in rad.
 
-    >>> from strapgen.ir.signals import Signal
+    >>> from strapgen.ir.kernel_info import KernelInfo
     >>> d, y = Signal("increments", (1,), ("d",)), Signal.scalar("y")
     >>> half = Operation("multiply", (Constant(Fraction(1, 2)), Reference("d")))
-    >>> one = Program("f", "f", "f", "", "f", (), (d,), (Assignment("y_1", half),), (Result(y, (Reference("y_1"),)),))
+    >>> one = Program(KernelInfo("f", "f", ""), (d,), (Assignment("y_1", half),), (Result(y, (Reference("y_1"),)),))
     >>> in_counts(one, Sensor(Fraction(3, 4), "", "")).body[0].value.arguments[0]
     Constant(value=Fraction(3, 8))
     """
@@ -72,7 +72,8 @@ def in_counts(program: Program, sensor: Sensor) -> Program:
     program, weights = min(candidates, key=lambda pair: _total_cost(*pair))
     scaling = _Scaling(sensor.scale, weights)
     body = tuple(replace(a, value=scaling.assigned(a)) for a in program.body)
-    return replace(program, body=body, notes=(*program.notes, _note(program, weights, sensor)))
+    notes = (*program.notes, _note(program, weights, sensor))
+    return replace(program, info=replace(program.info, notes=notes), body=body)
 
 
 def _angles(program: Program, counted: list[str]) -> dict[str, str]:

@@ -6,16 +6,19 @@ Nothing here knows C or Python text; targets print it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
 from strapgen.ir.decimals import above, float_above, float_below
 from strapgen.ir.fixed_interface import ErrorFeedback, Interface
 from strapgen.ir.formats import Format
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.program import Program
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -34,11 +37,6 @@ class Term:
     factor: int  # not zero; 1 or -1 with two values
     shift: int = 0
     coefficient: Coefficient | None = None  # that of a factor that is a rounded number
-
-
-@dataclass(frozen=True)
-class IntegerInput:
-    """An element of an input."""
 
 
 @dataclass(frozen=True)
@@ -63,41 +61,24 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class IntegerQuotient:
-    """``numerator / denominator``, rounded; the denominator has one sign."""
+class IntegerOperation:
+    """An operation on integers that is no sum.
 
-    numerator: Scaled
-    denominator: str
+    Its kinds are "divide", numerator and denominator, which has one sign; "sqrt", of one that is not negative;
+    "maximum"; and "select", see `cases_of`. Quotients and roots are rounded. Integers that are compared have one
+    fraction, and so have those that are selected.
+    """
 
-
-@dataclass(frozen=True)
-class IntegerRoot:
-    """The square root of an integer that is not negative, rounded."""
-
-    argument: Scaled
-
-
-@dataclass(frozen=True)
-class IntegerMaximum:
-    """The largest of several integers of one fraction."""
-
+    kind: str
     arguments: tuple[Scaled, ...]
 
 
-@dataclass(frozen=True)
-class IntegerSelection:
-    """The value of the first case whose left side is at least its right side; `otherwise` if there is none.
+def cases_of(arguments: Sequence[T]) -> list[tuple[T, T, T]]:
+    """Return the cases of a selection: left side, right side and value; the last argument holds otherwise.
 
-    The two sides of a case have one fraction, and so have all values.
+    It selects the value of the first case whose left side is at least its right side.
     """
-
-    cases: tuple[tuple[Scaled, Scaled, Scaled], ...]
-    otherwise: Scaled
-
-
-IntegerDefinition = (
-    IntegerInput | IntegerSum | IntegerQuotient | IntegerRoot | IntegerMaximum | IntegerSelection
-)
+    return [(arguments[k], arguments[k + 1], arguments[k + 2]) for k in range(0, len(arguments) - 1, 3)]
 
 
 @dataclass(frozen=True)
@@ -105,7 +86,7 @@ class Value:
     """An integer of a fixed-point program: it stands for ``offset + integer * 2**-fraction``."""
 
     name: str
-    definition: IntegerDefinition
+    definition: IntegerSum | IntegerOperation | None  # None for an element of an input
     fraction: int
     wide: bool  # whether the integer may exceed a word, so that a wide number holds it
     #: The proved range of the integer.
@@ -128,22 +109,11 @@ class Value:
 def used_by(value: Value) -> list[str]:
     """Return the names that a value is computed from."""
     match value.definition:
-        case IntegerSum() as total:
-            return [name for term in (*total.fine, *total.coarse) for name in term.names]
-        case IntegerQuotient(numerator, denominator):
-            return [denominator, *_names([numerator])]
-        case IntegerRoot(argument):
-            return _names([argument])
-        case IntegerMaximum(arguments):
-            return _names(arguments)
-        case IntegerSelection(cases, otherwise):
-            return _names([*(operand for case in cases for operand in case), otherwise])
+        case IntegerSum(fine, coarse=coarse):
+            return [name for term in (*fine, *coarse) for name in term.names]
+        case IntegerOperation(_, arguments):
+            return [operand.value for operand in arguments if isinstance(operand.value, str)]
     return []
-
-
-def _names(operands: Iterable[Scaled]) -> list[str]:
-    """Return the names of the operands that are not constants."""
-    return [operand.value for operand in operands if isinstance(operand.value, str)]
 
 
 def operation_counts(body: Iterable[Value], rounding: str) -> dict[str, int]:
@@ -154,14 +124,12 @@ def operation_counts(body: Iterable[Value], rounding: str) -> dict[str, int]:
             case IntegerSum() as total:
                 for kind, count in _sum_counts(total, rounding).items():
                     counts[kind] += count
-            case IntegerQuotient():
-                counts["divide"] += 1
-            case IntegerRoot():
-                counts["sqrt"] += 1
-            case IntegerMaximum(arguments):
+            case IntegerOperation("maximum", arguments):
                 counts["compare"] += len(arguments) - 1
-            case IntegerSelection(cases):
-                counts["compare"] += len(cases)
+            case IntegerOperation("select", arguments):
+                counts["compare"] += len(cases_of(arguments))
+            case IntegerOperation(kind):
+                counts[kind] += 1
     return counts
 
 
@@ -208,6 +176,11 @@ class FixedProgram:
         )
         bounds = ", ".join(f"{name} {above(bound, 3, 'e')}" for name, bound in self.error_bounds.items())
         return f"{self.name}: {self.program.title}\n{formats}\nerror bounds of a call: {bounds}"
+
+    @property
+    def info(self) -> KernelInfo:
+        """What is said of the kernel."""
+        return self.program.info
 
     @property
     def word(self) -> int:

@@ -15,6 +15,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from strapgen.ir.attitude_step import Companions
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.once import once
 from strapgen.ir.recursion import Recursion
@@ -143,16 +144,8 @@ class Program:
 
     Parameters
     ----------
-    name : str
-        Name in generated code, an identifier.
-    kernel : str
-        Name of the kernel it was lowered from.
-    title, source : str
-        What it computes and where the algorithm comes from.
-    arguments : str
-        Name and options that choose the kernel on the command line.
-    notes : tuple of str
-        Remarks for the reader of generated code.
+    info : KernelInfo
+        What is said of the kernel that it was lowered from.
     inputs : tuple of Signal
         Inputs; their elements are known from the start.
     body : tuple of Assignment
@@ -161,12 +154,10 @@ class Program:
         Outputs, with the node that holds each element.
     transition : Result or None
         For a step that is linear in the state, the part that depends on the increments alone.
-    companions : Companions or None
-        The kernels of an attitude step; None for every other program.
-    recursion : Recursion or None
-        The pairs of an output and the input that it becomes in the next call.
     own : tuple of Program
         Kernels that a user's step brings.
+    name : str
+        Name in generated code; by default the identifier of the kernel.
     function : str
         Name of the function in C if the user chooses it, with {} for the name that the target gives; "" for that name.
 
@@ -176,19 +167,13 @@ class Program:
         If a name is used before it is assigned, or assigned twice.
     """
 
-    name: str
-    kernel: str
-    title: str
-    source: str
-    arguments: str
-    notes: tuple[str, ...]
+    info: KernelInfo
     inputs: tuple[Signal, ...]
     body: tuple[Assignment, ...]
     outputs: tuple[Result, ...]
     transition: Result | None = None
-    companions: Companions | None = None
-    recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
+    name: str = ""
     function: str = ""
 
     __repr__ = short_repr
@@ -199,6 +184,8 @@ class Program:
         return f"{self.name}: {self.title}\n{counts or 'no operations'}; {self.temporaries} temporaries"
 
     def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.info.identifier)
         known = {element for signal in self.inputs for element in signal.elements} | {RESOLUTION}
         for assignment in self.body:
             if assignment.name in known:
@@ -211,6 +198,41 @@ class Program:
             missing = set().union(*map(names_in, result.nodes)) - known
             if len(result.nodes) != result.signal.size or missing:
                 raise ValueError(f"{self.name}: {result.signal.name!r} is not computed: {sorted(missing)}")
+
+    @property
+    def kernel(self) -> str:
+        """Name of the kernel."""
+        return self.info.name
+
+    @property
+    def title(self) -> str:
+        """One line that says what it computes."""
+        return self.info.title
+
+    @property
+    def source(self) -> str:
+        """Where the algorithm comes from."""
+        return self.info.source
+
+    @property
+    def arguments(self) -> str:
+        """Name and options that choose the kernel on the command line."""
+        return self.info.arguments
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks for the reader of generated code."""
+        return self.info.notes
+
+    @property
+    def companions(self) -> Companions | None:
+        """The kernels of an attitude step; None for every other program."""
+        return self.info.companions
+
+    @property
+    def recursion(self) -> Recursion | None:
+        """The pairs of an output and the input that it becomes in the next call."""
+        return self.info.recursion
 
     @property
     def results(self) -> tuple[Result, ...]:
@@ -328,13 +350,11 @@ class Program:
         used = self.used([self.transition])
         return replace(
             self,
-            title=f"{self.title}: its transition",
+            info=replace(self.info, title=f"{self.title}: its transition", companions=None, recursion=None),
             inputs=tuple(s for s in self.inputs if used & set(s.elements)),
             body=tuple(a for a in self.body if a.name in used),
             outputs=(self.transition,),
             transition=None,
-            companions=None,
-            recursion=None,
         )
 
     def split(self) -> tuple[Program, Program]:
@@ -365,16 +385,10 @@ class Program:
         names = tuple(name for name in order if name in needed)
         prepared = Signal("prepared", (len(names),), names, meaning="what depends on the other inputs alone")
         result = Result(prepared, tuple(map(Reference, names)))
+        part = replace(self, info=replace(self.info, companions=None), transition=None)
         return (
-            replace(
-                self,
-                inputs=self.inputs[1:],
-                body=tuple(ahead),
-                outputs=(result,),
-                transition=None,
-                companions=None,
-            ),
-            replace(self, inputs=(first, prepared), body=tuple(behind), transition=None, companions=None),
+            replace(part, inputs=self.inputs[1:], body=tuple(ahead), outputs=(result,)),
+            replace(part, inputs=(first, prepared), body=tuple(behind)),
         )
 
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 from strapgen.ir.attitude_step import Companions
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 
 if TYPE_CHECKING:
+    from strapgen.ir.integer_program import FixedProgram
     from strapgen.ir.program import Program
 
 
@@ -32,8 +34,10 @@ class Sources:
 
     Parameters
     ----------
-    kernel, target : str
-        Names of the kernel and of the target.
+    info : KernelInfo
+        What is said of the kernel.
+    target : str
+        Name of the target.
     files : dict of str to str
         Text by file name.
     function : Function
@@ -42,12 +46,8 @@ class Sources:
         Operations of one call, see `Program.operations`.
     temporaries : int
         Intermediate values of one call.
-    companions : Companions or None
-        The kernels that go with an attitude step; None for every other kernel.
     fixed : Interface or None
         Formats, ranges and error bounds of fixed-point code; None for every other target.
-    recursion : Recursion or None
-        The outputs that are inputs of the next call.
     own : tuple of Program
         Programs of the kernels that a user's step brings.
     runs : tuple of str
@@ -56,15 +56,13 @@ class Sources:
         Error bounds of C in floating point; None for every other target.
     """
 
-    kernel: str
+    info: KernelInfo
     target: str
     files: dict[str, str]
     function: Function
     operations: dict[str, int]
     temporaries: int
-    companions: Companions | None
     fixed: Interface | None = None
-    recursion: Recursion | None = None
     own: tuple[Program, ...] = ()
     runs: tuple[str, ...] = ()
     rounding: RoundingBounds | None = None
@@ -72,8 +70,42 @@ class Sources:
     __repr__ = short_repr
     _repr_html_ = notebook_html
 
+    @classmethod
+    def of(
+        cls,
+        program: Program | FixedProgram,
+        target: str,
+        function: str,
+        files: dict[str, str],
+        /,
+        **rest: Any,
+    ) -> Self:
+        """Return what a target prints of a program, whose function has this name; `rest` are further fields."""
+        from strapgen.ir.integer_program import FixedProgram  # sources from the cache are there without it
+
+        code = program.program if isinstance(program, FixedProgram) else program
+        fixed = program.interface if isinstance(program, FixedProgram) else None
+        signature = Function(function, code.inputs, tuple(result.signal for result in code.outputs))
+        counts = program.operations, program.temporaries
+        return cls(program.info, target, files, signature, *counts, fixed=fixed, **rest)
+
     def _in_words(self) -> str:
         return f"of {self.kernel} for {self.target}: {', '.join(self.files)}"
+
+    @property
+    def kernel(self) -> str:
+        """Name of the kernel."""
+        return self.info.name
+
+    @property
+    def companions(self) -> Companions | None:
+        """The kernels that go with an attitude step; None for every other kernel."""
+        return self.info.companions
+
+    @property
+    def recursion(self) -> Recursion | None:
+        """The outputs that are inputs of the next call."""
+        return self.info.recursion
 
     @property
     def cost(self) -> str:

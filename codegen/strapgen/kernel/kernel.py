@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import sympy as sp
 
-from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.attitude_step import Companions
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import counted_shape, notebook_latex, short_repr
 from strapgen.ir.program import RESOLUTION
-from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.kernel import unknown_values
 from strapgen.kernel.evaluation import evaluate
@@ -22,19 +22,8 @@ resolution = sp.Symbol(RESOLUTION, real=True)
 
 
 def symbols(signal: Signal) -> sp.Matrix:
-    """Return the real symbols of a signal as a column vector, or as a matrix if it is one.
+    """Return the real symbols of a signal: 3 x 3 for a matrix, otherwise one column.
 
-    Parameters
-    ----------
-    signal : Signal
-
-    Returns
-    -------
-    Matrix
-        3 x 3 for a matrix, otherwise one column.
-
-    Examples
-    --------
     >>> symbols(Signal.vector("rate", "w")).T
     Matrix([[w_x, w_y, w_z]])
     """
@@ -70,20 +59,9 @@ def evaluate_stages(
     number: Callable[[sp.Rational], Any] | None = None,
     function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the given values together with those of all elements of the stages.
+    """Return the given values together with those of all elements of the stages, each of which may use those before.
 
-    Parameters
-    ----------
-    stages : iterable of Stage
-        Each may use the inputs and the stages before it.
-    values : mapping of str to number or ring element
-        A value for every symbol that no stage defines.
-    number, function : callable, optional
-        Convert rational numbers and evaluate functions, as for `algebra.evaluate`.
-
-    Returns
-    -------
-    dict of str to number or ring element
+    There is a value for every symbol that no stage defines; `number` and `function` are those of `algebra.evaluate`.
     """
     known = {RESOLUTION: sp.S.Zero, **values}
     for stage in stages:
@@ -93,17 +71,13 @@ def evaluate_stages(
 
 
 @dataclass(frozen=True)
-class Kernel:
-    """An algorithm as exact expressions.
+class Kernel(KernelInfo):
+    """An algorithm as exact expressions. Its `KernelInfo` is the words and names that every stage passes on.
 
     Parameters
     ----------
-    name : str
-        Name on the command line, lower case with hyphens.
-    title : str
-        One line that says what it computes.
-    source : str
-        Where the algorithm comes from, with the equation's number.
+    name, title, source, arguments, notes, companions, order, recursion
+        See `KernelInfo`.
     inputs : tuple of Signal
         Inputs; their elements are the free symbols of the expressions.
     outputs : tuple of Stage
@@ -112,19 +86,8 @@ class Kernel:
         Intermediate quantities in order; later expressions may use their symbols.
     transition : str or None
         Name of the stage on which the state's update depends linearly, see `Program.transition`.
-    companions : Companions or None
-        The kernels of an attitude step; None for every other kernel.
-    order : Order or None
-        Order of an attitude step.
-    recursion : Recursion or None
-        The pairs of an output and the input that it becomes in the next call.
     own : tuple of Kernel
         Kernels that `companions` names and the catalogue does not have.
-    arguments : str
-        Name and options on the command line; by default the name alone. A whole command, such as
-        ``strapgen redundancy FILE``, where another than ``strapgen generate`` generates it.
-    notes : tuple of str
-        Remarks for the reader of generated code: domain, conventions.
     unknowns : tuple of str
         Names of the coefficients that are not known yet. Series and conditions are polynomials in them; no code can be
         generated before `substitute` has replaced all of them.
@@ -133,19 +96,11 @@ class Kernel:
         addition; `companions` has those of an attitude step.
     """
 
-    name: str
-    title: str
-    source: str
     inputs: tuple[Signal, ...]
     outputs: tuple[Stage, ...]
     stages: tuple[Stage, ...] = ()
     transition: str | None = None
-    companions: Companions | None = None
-    order: Order | None = None
-    recursion: Recursion | None = None
     own: tuple[Kernel, ...] = ()
-    arguments: str = ""
-    notes: tuple[str, ...] = field(default=())
     unknowns: tuple[str, ...] = ()
     previous: int = 0
     ahead: int = 0
@@ -162,9 +117,9 @@ class Kernel:
         return f"{self.name}: {self.title}\n{ins} -> {outs}{order}"
 
     @property
-    def identifier(self) -> str:
-        """The name in generated code."""
-        return self.name.replace("-", "_")
+    def info(self) -> KernelInfo:
+        """What programs and sources of the kernel have of it."""
+        return KernelInfo(**{field.name: getattr(self, field.name) for field in fields(KernelInfo)})
 
     @property
     def takes_velocity(self) -> bool:

@@ -19,7 +19,6 @@ from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
 from strapgen.lowering.passes import PASSES, cost, optimize
 from strapgen.lowering.passes.rewriting import rewritten
-from strapgen.lowering.share import share
 
 __all__ = ["PASSES", "candidates", "lower"]
 
@@ -57,14 +56,14 @@ def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]
     """
     if core is None:
         if sum(stage.signal.size for stage in kernel.stages) < _MANY_ELEMENTS:
-            yield gate(kernel, share(kernel))
-        yield gate(kernel, share(kernel, common=False))
+            yield gate(kernel)
+        yield gate(kernel, common=False)
         return
-    yield gate(kernel, share(kernel))
+    yield gate(kernel)
     update = replace(
         kernel, inputs=(*kernel.inputs, core.transition), stages=_behind(kernel, core), transition=None
     )
-    after = gate(update, share(update))
+    after = gate(update)
     transition = Result(core.transition, tuple(map(Reference, core.transition.elements)))
     reserved = {name for signal in kernel.inputs for name in signal.elements} | {a.name for a in after.body}
     for form in canonical.forms(core):

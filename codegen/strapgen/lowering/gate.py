@@ -6,6 +6,7 @@ they are multiplied by it, and negative terms are subtracted.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 
@@ -18,7 +19,7 @@ from strapgen.kernel.evaluation import Direction, Wrapped
 from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.names import FACTOR
-from strapgen.lowering.share import Shared
+from strapgen.lowering.share import share
 
 _FUNCTIONS = {
     sp.sin: "sin",
@@ -30,32 +31,26 @@ _FUNCTIONS = {
 }
 
 
-def gate(kernel: Kernel, shared: Shared) -> Program:
-    """Return the program of a kernel from its formulas, whose common subexpressions have names."""
+def gate(kernel: Kernel, common: bool = True) -> Program:
+    """Return the program of a kernel from its formulas, whose `common` subexpressions are named if it is true."""
+    definitions, values = share(kernel, common)
     reserved = {name for signal in kernel.signals for name in signal.elements}
-    writer = _Writer(reserved | {definition.symbol.name for definition in shared.definitions})
-    for definition in shared.definitions:
+    writer = _Writer(reserved | {definition.symbol.name for definition in definitions})
+    for definition in definitions:
         value = writer.node(definition.expression)
         writer.body.append(Assignment(definition.symbol.name, value, definition.meaning))
 
     def result(signal: Signal) -> Result:
         symbols = (sp.Symbol(name, real=True) for name in signal.elements)
-        return Result(signal, tuple(writer.node(shared.values.get(s, s)) for s in symbols))
+        return Result(signal, tuple(writer.node(values.get(s, s)) for s in symbols))
 
     stages = {stage.signal.name: stage.signal for stage in kernel.stages}
     return Program(
-        name=kernel.identifier,
-        kernel=kernel.name,
-        title=kernel.title,
-        source=kernel.source,
-        arguments=kernel.arguments or kernel.name,
-        notes=kernel.notes,
+        info=replace(kernel.info, arguments=kernel.arguments or kernel.name),
         inputs=kernel.inputs,
         body=tuple(writer.body),
         outputs=tuple(result(stage.signal) for stage in kernel.outputs),
         transition=None if kernel.transition is None else result(stages[kernel.transition]),
-        companions=kernel.companions,
-        recursion=kernel.recursion,
     )
 
 

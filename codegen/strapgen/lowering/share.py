@@ -20,17 +20,11 @@ class _Definition:
     meaning: str = ""
 
 
-@dataclass(frozen=True)
-class Shared:
-    """A kernel's formulas with every common subexpression named."""
-
-    definitions: list[_Definition]  # stages, outputs and common subexpressions, each before its first use
-    #: Elements that are numbers or other symbols, inside the kernel possibly negated: they need no computation.
-    values: dict[sp.Symbol, sp.Expr]
-
-
-def share(kernel: Kernel, common: bool = True) -> Shared:
+def share(kernel: Kernel, common: bool = True) -> tuple[list[_Definition], dict[sp.Symbol, sp.Expr]]:
     """Name the common subexpressions of a kernel, unless its formulas shall stay as they are.
+
+    Returns the definitions of stages, outputs and common subexpressions, each before its first use, and the elements
+    that need none: they are numbers, or other symbols, inside the kernel possibly negated.
 
     Elements are visited in the order of their names, so that two kernels that differ only in the order in
     which they store a state get the same arithmetic.
@@ -48,7 +42,7 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
                 definitions.append(_Definition(symbol, expression, meaning))
                 meaning = ""
     if not common:
-        return Shared(definitions, values)
+        return definitions, values
     elements = (name for signal in kernel.signals for name in signal.elements)
     excluded = [sp.Symbol(name, real=True) for name in elements]
     names = sp.numbered_symbols(SHARED, start=1, exclude=excluded, real=True)
@@ -71,4 +65,4 @@ def share(kernel: Kernel, common: bool = True) -> Shared:
     for definition, expression in zip(definitions, reduced, strict=True):
         ordered.extend(needed(expression))
         ordered.append(_Definition(definition.symbol, expression, definition.meaning))
-    return Shared(ordered, values)
+    return ordered, values

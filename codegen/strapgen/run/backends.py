@@ -468,13 +468,7 @@ class Backend:
 
 
 def fitted(backend: str, settings: Settings | None) -> Settings | None:
-    """Return the settings that a back end runs with, in its own word; None in floating point.
-
-    Raises
-    ------
-    InputError, InputTypeError
-        If the back end takes no settings, or none of this word.
-    """
+    """Return the settings that a back end runs with, in its own word; None in floating point."""
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     if not entry.fixed:
         if settings is not None:

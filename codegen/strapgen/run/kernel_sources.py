@@ -11,7 +11,7 @@ from strapgen.ir.attitude_step import Companions
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets import TARGETS
 
 
@@ -26,18 +26,7 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
     """Return what a back end runs of a program: generated text where `target` is one, else the program itself."""
     if target in TARGETS:
         return pipeline.generate(program, target, settings)
-    return _ProgramSources(
-        kernel=program.kernel,
-        target=target,
-        files={},
-        function=Function(program.name, program.inputs, tuple(result.signal for result in program.outputs)),
-        operations=program.operations,
-        temporaries=program.temporaries,
-        companions=program.companions,
-        recursion=program.recursion,
-        own=program.own,
-        program=program,
-    )
+    return _ProgramSources.of(program, target, program.name, {}, own=program.own, program=program)
 
 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:

@@ -30,17 +30,10 @@ def cached(
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return a decorator that caches the results of a stage, whose first argument is a choice.
 
-    Parameters
-    ----------
-    kind : str
-        Folder of the entries in the cache.
-    label : str
-        Format of the log's words for a result from the arguments, such as "program of {0.kernel}".
-    depends : callable, optional
-        Of the arguments behind the choice: refuses what does not go together, and returns what else the result
-        depends on.
-    copies : bool, optional
-        Whether each call gets its own copy, since what holds the result can be changed.
+    `kind` is the folder of the entries in the cache, and `label` the format of the log's words for a result from the
+    arguments, such as "program of {0.kernel}". `depends`, of the arguments behind the choice, refuses what does not go
+    together, and returns what else the result depends on. With `copies` each call gets its own copy, since what holds
+    the result can be changed.
     """
 
     def decorate(stage: Callable[P, R]) -> Callable[P, R]:

@@ -25,14 +25,14 @@ def argument_text(argument: Argument) -> str:
     limits = f"{below(argument.low * unit)} to {above(argument.high * unit)}"
     parts.append(f"range {argument.low} to {argument.high} ({limits})")
     worst = max(argument.errors)
-    places = f"{above(worst)}, {places_above(worst / unit)} of the last place"
+    bound = f"<= {above(worst)} ({places_above(worst / unit)} ulp)"
     if worst and argument.saturates:
         parts.append(
-            f"saturates at both ends; error at most {places}, where the exact value is from -1 to 1; beyond, at "
+            f"saturates at both ends; error {bound}, where the exact value is from -1 to 1; beyond, at "
             "most the larger of this and its distance from the range"
         )
     elif worst:
-        parts.append(f"error at most {places}")
+        parts.append(f"error {bound}")
     elif any(name not in signal.elements for name in argument.values):
         parts.append("exact")
     return "; ".join(parts)
@@ -113,8 +113,8 @@ def upkeep_text(program: Program, interface: Interface | None = None, target: st
     proper = "orthogonal with rows of length 1" if len(program.inputs[0].shape) == 2 else "of length 1"
     if interface is None:
         return (
-            f"A proper state is {proper}. A step keeps it so but for rounding and the error of its method: now and "
-            f"then the function of `{command}` takes these out."
+            f"A proper state is {proper}. Rounding and truncation errors accumulate: correct them from time to time "
+            f"with the function of `{command}`."
         )
     saturates = any(argument.saturates for argument in interface.inputs)
     wider = "; the range of the output is wider than that of the input because it holds for every input in its range"
@@ -126,8 +126,8 @@ def upkeep_text(program: Program, interface: Interface | None = None, target: st
         )
     sentences.append(
         f"Normalize it before, with the function of `{command} {options(interface.companion_settings)}`. After an "
-        "error code, the state is that before the call: normalize it and go on, with the rotation of that step lost, "
-        "or begin again from a known attitude."
+        "error code, the state is that before the call: normalize it and continue, without the rotation of that step, "
+        "or restart from a known attitude."
     )
     return " ".join(sentences)
 
@@ -142,7 +142,7 @@ def residuals_text(residuals: tuple[ErrorFeedback, ...]) -> str:
 
 
 def guards_text(values: tuple[Value, ...]) -> str:
-    """Return the values that are checked on the way, with their limits, in words."""
+    """Return the intermediate values that are checked, with their ranges, in words."""
     names: dict[tuple[str, str], list[str]] = {}
     for value in values:
         unit = Fraction(2) ** -value.fraction
@@ -162,7 +162,7 @@ def range_text(signal: Signal) -> str:
     """Return the range of a signal in words, for a contract."""
     if signal.bound is None:
         return "any finite number"
-    return f"any finite number; at most {signal.bound} in magnitude in proper use"
+    return f"any finite number; at most {signal.bound} in magnitude in normal use"
 
 
 def operations_text(program: Program) -> str:
@@ -178,7 +178,7 @@ def value_text(value: Value, word: int) -> str:
     error = f"error {above(value.error, 2)}" if value.error else "exact"
     low, high = below(value.low * unit, 3), above(value.high * unit, 3)
     offset = (
-        f"; stands for {value.name} {'-' if value.offset > 0 else '+'} {abs(value.offset)}"
+        f"; stores {value.name} {'-' if value.offset > 0 else '+'} {abs(value.offset)}"
         if value.offset
         else ""
     )

@@ -23,7 +23,7 @@ from strapgen.ir.version import VERSION
 from strapgen.targets.printer import ExactPrinter
 
 #: The sentence that begins the block in a header.
-HEAD = "The contract for programs, in exact arithmetic; what is indented belongs to the line before."
+HEAD = "Machine-readable contract, in exact arithmetic; an indented line continues the one before."
 _KINDS = ("strapgen", "digest", "function", "requires", "otherwise", "let", "ensures")
 
 

@@ -13,7 +13,7 @@ from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.targets.printer import Printer
 
-_IDENTITY = "the state of zero rotation"
+_IDENTITY = "the identity attitude"
 
 
 @dataclass(frozen=True)

@@ -215,7 +215,7 @@ class Naming:
         chosen = replace(
             program,
             function=self._text if self.prefix is None else f"{self._text}{{}}",
-            arguments=f"{program.arguments} {self.option} {self._text}",
+            info=replace(program.info, arguments=f"{program.arguments} {self.option} {self._text}"),
         )
         for ending in ("",) if self.prefix is None else ("", "_float", "_w32"):
             final = function_name(chosen, ending)

@@ -7,18 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
-from strapgen.ir.integer_program import (
-    FixedProgram,
-    IntegerDefinition,
-    IntegerMaximum,
-    IntegerQuotient,
-    IntegerRoot,
-    IntegerSelection,
-    IntegerSum,
-    Scaled,
-    Term,
-    Value,
-)
+from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 
@@ -123,7 +112,9 @@ class _Renaming:
     def fixed_value(self, value: Value) -> Value:
         return replace(value, name=self.value(value.name), definition=self.definition(value.definition))
 
-    def definition(self, definition: IntegerDefinition) -> IntegerDefinition:
+    def definition(
+        self, definition: IntegerSum | IntegerOperation | None
+    ) -> IntegerSum | IntegerOperation | None:
         match definition:
             case IntegerSum(residual=feedback):
                 return replace(
@@ -132,19 +123,9 @@ class _Renaming:
                     coarse=tuple(map(self.term, definition.coarse)),
                     residual=feedback and self.feedback(feedback),
                 )
-            case IntegerQuotient(numerator, denominator):
-                return IntegerQuotient(self.scaled(numerator), self.value(denominator))
-            case IntegerRoot(argument):
-                return IntegerRoot(self.scaled(argument))
-            case IntegerMaximum(arguments):
-                return IntegerMaximum(tuple(map(self.scaled, arguments)))
-            case IntegerSelection(cases, otherwise):
-                renamed_cases = tuple(
-                    (self.scaled(left), self.scaled(right), self.scaled(value))
-                    for left, right, value in cases
-                )
-                return IntegerSelection(renamed_cases, self.scaled(otherwise))
-        return definition  # an element of an input
+            case IntegerOperation(kind, arguments):
+                return IntegerOperation(kind, tuple(map(self.scaled, arguments)))
+        return None
 
     def term(self, term: Term) -> Term:
         return replace(term, names=tuple(map(self.value, term.names)))

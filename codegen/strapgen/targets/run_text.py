@@ -39,11 +39,11 @@ def run_paragraphs(interface: Interface, program: Program) -> list[str]:
 def _parameter_words(angles: AngleAccumulation) -> list[str]:
     """Return the bound of a run of a vector of parameters in words."""
     return [
-        "Over a run of N steps rounding turns the attitude by at most "
-        f"{_formula(angles)} rad from that of exact arithmetic on the same increments, while the length of the state "
-        f"is at least {_above(angles.shortest)}. From a length of at least {_above(angles.start)} that is proved for "
-        f"{angles.proved_steps:,} steps. M normalizations on the way, which multiply the words of the state by one "
-        f"factor and round each of them once, add at most {_above(angles.per_normalization)} M rad.",
+        f"Attitude error by rounding after N steps: at most {_formula(angles)} rad against exact arithmetic on the "
+        f"same increments, while the length of the state is at least {_above(angles.shortest)}. From a length of at "
+        f"least {_above(angles.start)} that is proved for {angles.proved_steps:,} steps. M normalizations in between, "
+        "which multiply the words of the state by one factor and round each of them once, add at most "
+        f"{_above(angles.per_normalization)} M rad.",
     ]
 
 
@@ -51,16 +51,16 @@ def _matrix_words(angles: AngleAccumulation) -> list[str]:
     """Return the bound of a run of a matrix in words."""
     inner, outer = angles.start**2, angles.shortest**2
     words = [
-        "Over a run of N steps rounding turns the nearest rotation to the matrix C by at most "
-        f"{_formula(angles)} rad from that of exact arithmetic on the same increments, for N up to "
+        "Error by rounding of the nearest rotation to the matrix C after N steps: at most "
+        f"{_formula(angles)} rad against exact arithmetic on the same increments, for N up to "
         f"{angles.proved_steps:,} from a C whose C'C has eigenvalues from {_above(inner)} to {_below(2 - inner)}; over "
-        f"more steps by {_above(angles.beyond)} times as much, while they stay between {_above(outer)} and "
+        f"more steps {_above(angles.beyond)} times as much, while they stay between {_above(outer)} and "
         f"{_below(2 - outer)}.",
     ]
     if angles.per_element is not None:
         fixed = f"{_above(angles.per_normalization)} + " if angles.per_normalization else ""
         words.append(
-            "M orthonormalizations on the way, at most as many steps apart, which multiply C by a symmetric expansion "
+            "M orthonormalizations in between, at most as many steps apart, which multiply C by a symmetric expansion "
             f"of the inverse root of C'C, make {_above(angles.orthonormalized)} times as much of it and add at most "
             f"({fixed}{_above(angles.per_element)} h) M rad, with h the error of an element that their header states, "
             f"up to {_below(LARGEST_ERROR)}."
@@ -84,7 +84,7 @@ def _table(interface: Interface, angles: AngleAccumulation) -> list[str]:
     apart = min(_APART, interface.normalized_within)
     is_restored = angles.per_element is not None and apart > 0
     error = _UNITS * interface.inputs[0].format.unit if angles.per_element else Fraction(0)
-    to_first_order = f"orthonormalized to first order (h = {_UNITS} units of the last place)"
+    to_first_order = f"orthonormalized to first order (h = {_UNITS} ulp)"
     kind = to_first_order if angles.per_element else "normalized"
     lines = []
     for steps, what in _runs(interface.settings.stated):

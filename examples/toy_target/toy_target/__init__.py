@@ -7,7 +7,6 @@ from fractions import Fraction
 from pathlib import Path
 
 from strapgen import Program, Signal, Sources, Target
-from strapgen.targets import Function
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.printer import Printer
 from strapgen.targets.rendering import environment
@@ -43,16 +42,7 @@ def emit(program: Program, target: str) -> Sources:
     """Print a program as one module, in which no name of the kernel collides with a keyword or with the template."""
     scalars = [signal.name for signal in program.inputs if not signal.shape]  # they are their only element
     named, files = printed(program, lambda part, _: {f"{part.name}.py": text(part, target)}, PYTHON, scalars)
-    return Sources(
-        kernel=program.kernel,
-        target=target,
-        files=files,
-        function=Function(named.name, program.inputs, tuple(result.signal for result in program.outputs)),
-        operations=program.operations,
-        temporaries=program.temporaries,
-        companions=program.companions,
-        recursion=program.recursion,
-    )
+    return Sources.of(program, target, named.name, files)
 
 
 def text(program: Program, target: str) -> str:

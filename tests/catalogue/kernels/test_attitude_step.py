@@ -9,7 +9,6 @@ from random import Random
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS
@@ -56,7 +55,7 @@ def test_increments_come_in_the_order_of_time_and_those_beside_the_step_count_fr
     assert (f"the last {ahead} are those after the step" in signal.meaning) == bool(ahead)
 
 
-@each(
+@pytest.mark.parametrize(
     ("node", "expected"),
     [
         (Fraction(0), "0"),
@@ -88,7 +87,7 @@ def test_nodes_that_are_nearly_the_same_are_told_apart():
         assert any("0_1235_2" in name for name in elements) and len(elements) == len(set(elements))
 
 
-@each("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
+@pytest.mark.parametrize("name", [*TABLEAUX, *(n for n, i in INTEGRATORS.items() if i.takes_rates)])
 def test_nodes_of_every_method_have_names_of_their_own(name):
     kernel = derive("euler", name, rates=True)
     signals = [*kernel.inputs, *(stage.signal for stage in kernel.stages)]
@@ -109,7 +108,7 @@ def test_a_signal_of_rates_lists_its_nodes():
 # Orders
 
 
-@each(
+@pytest.mark.parametrize(
     ("order", "text", "limited"),
     [
         (Order(6, 6, 3, 4), "method order 6, rate extraction order 3: the step is of order 4", True),
@@ -171,7 +170,7 @@ def test_a_note_says_where_samples_limit_the_order_and_only_there(algorithm):
 # Names and commands
 
 
-@each(
+@pytest.mark.parametrize(
     ("chosen", "name", "arguments"),
     [
         (("dcm", "rk4", 2), "dcm-rk4-2", "dcm --method rk4 --increments 2"),
@@ -199,7 +198,7 @@ def test_a_step_says_the_command_that_makes_it(chosen, name, arguments):
     kernel = catalogue.derive(choice)
     assert choice.kernel == kernel.name == name
     assert kernel.arguments == arguments
-    assert kernel.companions.previous == catalogue.previous(choice) == (chosen[4] if len(chosen) > 4 else 0)
+    assert kernel.companions.previous == choice.previous == (chosen[4] if len(chosen) > 4 else 0)
 
 
 def test_a_step_by_a_tableau_of_a_file_says_the_command_that_makes_it(tmp_path):
@@ -237,7 +236,7 @@ def values_of(kernel: Kernel, state: list, samples: list) -> dict[str, object]:
 
 
 @pytest.mark.long
-@each(
+@pytest.mark.parametrize(
     ("method", "count", "previous"),
     [("rk4", 1, 1), ("rk2", 1, 3), ("nystrom5", 2, 1), ("rk4", 3, 2), ("rk2", 8, 3)],
 )

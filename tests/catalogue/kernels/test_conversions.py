@@ -7,7 +7,6 @@ from itertools import product
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -152,8 +151,8 @@ def check_against_scipy(name: str, attitudes: list[Rotation]) -> None:
         assert min(np.abs(result - expected).max(), np.abs(result + expected).max()) <= 4 * EPS
 
 
-@each("axis", [axis for axis in product((-1, 0, 1), repeat=3) if any(axis)])
-@each("name", FROM_DCM)
+@pytest.mark.parametrize("axis", [axis for axis in product((-1, 0, 1), repeat=3) if any(axis)])
+@pytest.mark.parametrize("name", FROM_DCM)
 def test_half_turns(name, axis):
     # C = 2 n n' - I exactly; the scalar part is 0 and the sign of the axis is open.
     n = sp.Matrix(axis) / sp.sqrt(sum(x * x for x in axis))

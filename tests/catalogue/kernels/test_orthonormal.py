@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
-from gathering import each
 from scipy.spatial.transform import Rotation
 
 import strapgen
@@ -201,7 +200,7 @@ def polar_tolerance(singular: np.ndarray) -> float:
     return 64 * EPS * (singular.max() / singular.min()) ** 4
 
 
-@each("distance", [1e-16, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
+@pytest.mark.parametrize("distance", [1e-16, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
 def test_the_nearest_rotation_near_rotations(distance, rng):
     for turn in Rotation.random(50, rng=rng).as_matrix():
         C = turn + distance * rng.standard_normal((3, 3))
@@ -218,7 +217,7 @@ def test_the_nearest_rotation_far_from_rotations(rng):
         assert np.abs(scipy.linalg.polar(C)[0] - expected).max() <= polar_tolerance(singular)
 
 
-@each(
+@pytest.mark.parametrize(
     "singular", [(1, 1, 1), (2, 2, 2), (1e-3, 1e-3, 1e-3), (1e3, 1e3, 1e3), (2, 2, 1), (2, 1, 1), (3, 3, 0.3)]
 )
 def test_the_nearest_rotation_at_equal_singular_values(singular, rng):
@@ -229,7 +228,7 @@ def test_the_nearest_rotation_at_equal_singular_values(singular, rng):
         assert np.abs(difference).max() <= polar_tolerance(singular)
 
 
-@each("matrix", [np.eye(3), 2 * np.eye(3), np.diag([1.0, -1, -1]), np.diag([2.0, 2, 1])])
+@pytest.mark.parametrize("matrix", [np.eye(3), 2 * np.eye(3), np.diag([1.0, -1, -1]), np.diag([2.0, 2, 1])])
 def test_the_nearest_rotation_of_exactly_orthogonal_columns(matrix):
     expected = np.sign(matrix)
     assert np.abs(in_double(OPTIMAL, matrix) - expected).max() <= 4 * EPS

@@ -8,7 +8,6 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 
 import strapgen
 from strapgen import derive
@@ -46,7 +45,7 @@ def test_fifth_order_stops_where_the_source_says():
     assert (q[:3, :] - v * (1 - A / 24) / 2).expand() == sp.zeros(3, 1)
 
 
-@each("order", [1, 2, 3, 6])
+@pytest.mark.parametrize("order", [1, 2, 3, 6])
 def test_both_series_begin_as_the_functions(order):
     x = sp.Symbol("x", positive=True)
     for first, function in ((1, sp.sin(x) / x), (2, (1 - sp.cos(x)) / x**2), (0, sp.cos(x))):

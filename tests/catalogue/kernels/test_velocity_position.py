@@ -1,4 +1,4 @@
-"""Velocity and position over a step: their order by every method, other derivations, and all targets."""
+"""Velocity and position over a step: their order by every method, and other derivations."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import kernel
-from fixed_inputs import corners_and_random
-from gathering import each
-from kernel_checks import require_integers_of_the_model, require_what_numpy_computes, share_of_bound
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +16,6 @@ from strapgen.analysis.series import velocity_series
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import Settings
 from strapgen.kernel.power_series import Powers, outputs
 
 NAME = "velocity-position"
@@ -146,47 +142,6 @@ def test_a_window_agrees_with_a_solver_of_differential_equations(rng):
     angle, pushed = (sum(np.linalg.norm(part) for part in parts) for parts in (rate, force))
     for one, other in zip(computed, integrated(at(rate), at(force)), strict=True):
         assert np.abs(one - other).max() < angle**5 / 120 * pushed
-
-
-SETTINGS = {
-    word: Settings(word=word, largest_angle=Fraction(1, 16), ranges={"velocity_increments": Fraction(1, 2)})
-    for word in (16, 32)
-}
-TARGETS = [
-    ("rk4", 32),
-    *(
-        pytest.param(*more, marks=pytest.mark.long)
-        for more in (("rk4", 16), ("window-3-3", 32), ("coning-combined", 16))
-    ),
-]
-
-
-def proper(rng):
-    return lambda model, count: corners_and_random(model, count, rng)
-
-
-@pytest.mark.parametrize(("method", "word"), TARGETS)
-def test_every_target_is_within_its_bound(method, word, rng):
-    choice, settings = chosen(method), SETTINGS[word]
-    share = share_of_bound(choice, settings, proper(rng))
-    assert share is not None
-    assert share > 0.02
-    require_integers_of_the_model(choice, settings, proper(rng))
-    for backend in ("c", "c-float") if word == 16 else ("c",):
-        require_what_numpy_computes(choice, backend, settings, proper(rng))
-
-
-@each("name", ["dcm-translation", "euler-translation"])
-def test_translation_on_every_target(name, rng):
-    def inside(model, count):
-        """Halve what the result must not leave the range of."""
-        states = ("velocity", "displacement")
-        pairs = zip(model.interface.inputs, corners_and_random(model, count, rng), strict=True)
-        return [array // 2 if argument.signal.name in states else array for argument, array in pairs]
-
-    settings = Settings(ranges={"cycle": Fraction(1, 50)})
-    assert share_of_bound(name, settings, inside)
-    require_integers_of_the_model(name, settings, inside)
 
 
 @pytest.mark.parametrize("name", ["dcm", "euler"])

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,7 +17,7 @@ QUICK = settings(derandomize=True, database=None, deadline=None)
 ROOT = sp.sqrt(21)
 
 
-@each(
+@pytest.mark.parametrize(
     ("written", "value"),
     [
         ("9/44", Fraction(9, 44)),
@@ -46,7 +45,7 @@ def test_rationals_are_fractions_however_they_are_written(written, value):
     assert read == value
 
 
-@each(
+@pytest.mark.parametrize(
     ("written", "value"),
     [
         ("(18-sqrt(21))/180", sp.Rational(1, 10) - ROOT / 180),
@@ -115,7 +114,7 @@ def test_any_text_is_a_number_or_an_error_of_one_line(written):
         assert str(error).startswith("x is ") and "\n" not in str(error)
 
 
-@each(
+@pytest.mark.parametrize(
     ("written", "said"),
     [
         (0.5, 'is 0.5, which is not exact; a string such as "9/44"'),

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import program as lowered
-from gathering import each
 from peano_baker import generic_rate, local_error
 from tolerances import one_call
 
@@ -48,7 +47,7 @@ def fractions(text: str) -> list[Fraction]:
 # Coefficients
 
 
-@each(
+@pytest.mark.parametrize(
     ("samples", "previous", "form", "published"),
     [
         # R. B. Miller 1983 and, for more samples, tables in use (Yan Gongmin's PSINS among others).
@@ -67,7 +66,7 @@ def test_published_coefficients(samples, previous, form, published):
 
 
 @FORM
-@each(("samples", "previous"), [*FEW, (4, 3)])
+@pytest.mark.parametrize(("samples", "previous"), [*FEW, (4, 3)])
 def test_pairs_are_ordered_by_the_newer_sample_the_newest_pair_last(samples, previous, form):
     total = samples + previous
     pairs = list(design(samples, previous, form).pairs)
@@ -75,7 +74,7 @@ def test_pairs_are_ordered_by_the_newer_sample_the_newest_pair_last(samples, pre
     assert pairs == ([pair for pair in every if pair[1] == total - 1] if form == "compressed" else every)
 
 
-@each("samples", range(2, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("samples", range(2, MOST_INCREMENTS + 1))
 def test_compressed_coefficients_leave_what_the_literature_says(samples):
     # N N! / (2^(N+1) (1 3 ... (2N+1))) alpha^2 lambda^(2N+1) in a slow cycle.
     found = design(samples).residual().leading

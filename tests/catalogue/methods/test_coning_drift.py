@@ -8,7 +8,6 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from gathering import each
 
 from strapgen.catalogue.methods import coning_coefficients, coning_drift
 from strapgen.catalogue.methods.coning_drift import ConingShape
@@ -58,7 +57,7 @@ def test_the_largest_drift_of_a_band_is_that_of_its_frequencies_through_the_gyro
     assert coning_drift.largest(shape, coefficients, Fraction(1)) == pytest.approx(expected, rel=3e-5)
 
 
-@each(("samples", "previous"), [(1, 1), (1, 5), (4, 0), (3, 3)])
+@pytest.mark.parametrize(("samples", "previous"), [(1, 1), (1, 5), (4, 0), (3, 3)])
 def test_compressed_coefficients_annul_every_power_and_have_their_published_drift(samples, previous):
     design = coning_coefficients.design(samples, previous)
     newest = samples + previous - 1

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import pytest
 import sympy as sp
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from peano_baker import Series, angle, generic_rate, lowest_difference, rotation, true_rotation
@@ -65,14 +64,14 @@ def test_k_increments_are_exact_on_rates_of_degree_k_minus_1(coefficients, node,
     assert extracted(coefficients, len(coefficients), node, h) == rate(coefficients, node * h)
 
 
-@each("count", range(1, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_every_count_is_exact_at_the_nodes_of_the_methods(count):
     coefficients = [Fraction((-1) ** k * (k + 2), k + 1) for k in range(count)]
     for node in (Fraction(0), Fraction(1, 2), Fraction(1)):
         assert extracted(coefficients, count, node, Fraction(1, 8)) == rate(coefficients, node / 8)
 
 
-@each("count", range(1, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_an_irrational_node_is_exact_too(count):
     node = sp.Rational(1, 2) + sp.sqrt(21) / 14
     coefficients = [sp.Rational((-1) ** k * (k + 2), k + 1) for k in range(count)]
@@ -85,7 +84,7 @@ def test_an_irrational_node_is_exact_too(count):
     assert sp.expand(found - sum(c * node**k for k, c in enumerate(coefficients))) == 0
 
 
-@each("count", range(1, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_k_increments_are_not_exact_on_degree_k(count):
     # At a sample the derivative of the interpolation's remainder is not zero.
     coefficients = [Fraction(0)] * count + [Fraction(1)]
@@ -144,8 +143,8 @@ def test_k_and_m_increments_are_exact_on_rates_of_degree_k_plus_m_minus_1(case, 
 
 
 @pytest.mark.long
-@each("previous", range(FEW_PREVIOUS + 1))
-@each("count", range(1, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_a_fit_tells_the_same_as_weights_taylor_and_moments(count, previous):
     fit, number = from_increments(count, previous), count + previous
     assert len(fit.basis) == len(fit.at(Fraction(0))) == number
@@ -163,8 +162,8 @@ def test_a_fit_tells_the_same_as_weights_taylor_and_moments(count, previous):
         assert fit.moment(power) == list(map(exactly, expected))
 
 
-@each("previous", range(FEW_PREVIOUS + 1))
-@each("count", range(1, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_the_integral_of_the_rate_is_the_sum_of_the_increments_of_the_step(count, previous):
     assert from_increments(count, previous).moment(0) == [0] * previous + [1] * count
 
@@ -249,7 +248,7 @@ def test_the_step_order_is_that_of_the_exact_rotation_of_the_fitted_rate(count, 
         assert lowest_difference(found, true_rotation("euler", true, order + 1)) == order + 1
 
 
-@each(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
+@pytest.mark.parametrize(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
 def test_a_rate_of_the_fit_s_degree_is_followed_exactly(count, previous):
     true = generic_rate(count + previous - 1)
     found = rotation("dcm", fitted_rate(true, count, previous, 7), 7)
@@ -264,8 +263,8 @@ def test_step_orders_as_the_literature_has_them():
             assert step_order(count, previous) == count + previous + 1
 
 
-@each("previous", range(FEW_PREVIOUS + 1))
-@each("count", range(1, MOST_INCREMENTS + 1))
+@pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
+@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_equal_increments_give_a_constant_rate(count, previous):
     # Methods see the samples through the fit alone, so at a constant rate none depends on how many there are.
     fit = from_increments(count, previous)

@@ -7,7 +7,6 @@ from random import Random
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from peano_baker import generic_rate, local_error
 
 from strapgen import derive
@@ -173,7 +172,7 @@ RATE = generic_rate(3)
 
 
 @pytest.mark.long
-@each("increments", [2, 3, 5, MOST_INCREMENTS])
+@pytest.mark.parametrize("increments", [2, 3, 5, MOST_INCREMENTS])
 @ALGORITHM
 @METHOD
 def test_the_local_error_is_one_order_above_the_method(algorithm, method, increments):

@@ -6,7 +6,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen import choose, derive
@@ -111,7 +110,7 @@ WRONG = {
 }
 
 
-@each("case", WRONG)
+@pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_file_gets_one_line(case, text, tmp_path):
     old, new, words = WRONG[case]
     path = tmp_path / "wrong.toml"
@@ -123,7 +122,7 @@ def test_a_wrong_file_gets_one_line(case, text, tmp_path):
     assert str(refused.value).startswith(f"{path}: ") and "\n" not in str(refused.value)
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "words"),
     [
         ({"increments": 2}, "increments is 2; a step of coning-shaped-8 has 1"),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from gathering import each
 
 import strapgen
 from strapgen.catalogue import METHODS, STANDARD_METHODS
@@ -68,7 +67,7 @@ def test_the_catalogue_is_read_only_and_lazy():
         TABLEAUX["mine"] = TABLEAUX["rk4"]
     code = (
         "import sys; from strapgen.catalogue import METHODS; from strapgen.catalogue.methods import tableaux;"
-        "print(len(METHODS) > 4, len(tableaux._BUILT_IN._tableaux));"
+        "print(len(METHODS) > 4, len(tableaux._BUILT_IN._known));"
         "print(tableaux.TABLEAUX['dormand-prince8'].rational, 'sympy' in sys.modules);"
         "sys.modules['sympy'] = None;"  # what imports it from here on fails
         "tableaux.TABLEAUX['cooper-verner8']"
@@ -247,7 +246,7 @@ WRONG = {
 }
 
 
-@each("said", WRONG)
+@pytest.mark.parametrize("said", WRONG)
 def test_what_is_wrong_is_told_in_one_line(said, written):
     with pytest.raises(InputError) as caught:
         read(written(**WRONG[said]))
@@ -256,7 +255,7 @@ def test_what_is_wrong_is_told_in_one_line(said, written):
     assert "\n" not in message and len(message) < 250
 
 
-@each(
+@pytest.mark.parametrize(
     ("content", "said"),
     [
         (b"name = ", "mine.toml is not TOML (Invalid value"),

@@ -7,7 +7,6 @@ from random import Random
 
 import mpmath
 import pytest
-from gathering import each
 
 import strapgen
 from strapgen import choose, derive, lower
@@ -162,7 +161,7 @@ def test_names_of_windows_choose_their_samples():
         assert choose("euler", window) == choose("euler", window.name)
 
 
-@each(
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"increments": 2}, "increments is 2; a step of window-3-3 has 1"),
@@ -189,7 +188,7 @@ def test_vectors_take_windows_whose_rotation_has_one():
 def test_a_file_of_ones_own_goes_wherever_a_method_goes(tmp_path):
     from strapgen.catalogue.methods import windows
 
-    source = windows._BUILT_IN._files["window-3-3"]
+    source = windows._BUILT_IN.files["window-3-3"]
     path = tmp_path / "mine.toml"
     path.write_text(source.read_text().replace('name = "Window 1+3+3', 'name = "Mine 1+3+3', 1))
     window = read(path)

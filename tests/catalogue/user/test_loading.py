@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from gathering import each
 from peano_baker import evaluated, generic_rate, increments, local_error, true_rotation
 
 import strapgen
@@ -87,12 +86,12 @@ def test_options_reach_the_algorithm_and_the_command_in_its_code(here, chosen, n
     kernel = strapgen.derive("mrp.py", **chosen)
     assert (kernel.name, kernel.arguments) == (name, arguments)
     choice = catalogue.choose("mrp.py", **chosen)
-    assert catalogue.increments(choice) == chosen.get("increments", 2)
-    assert catalogue.previous(choice) == chosen.get("previous", 0)
+    assert choice.increments == chosen.get("increments", 2)
+    assert choice.previous == chosen.get("previous", 0)
     backend = strapgen.backend("mrp.py", **chosen)
     assert (backend.increments, backend.previous) == (
-        catalogue.increments(choice),
-        catalogue.previous(choice),
+        choice.increments,
+        choice.previous,
     )
 
 
@@ -356,7 +355,7 @@ def test_an_attitude_kernel_must_turn_the_state_into_a_matrix(folder):
         strapgen.derive("mrp.py")
 
 
-@each(
+@pytest.mark.parametrize(
     ("file", "chosen", "said"),
     [
         ("none.py", {}, "algorithm none.py is no file; a Python file with a function algorithm is needed"),

@@ -6,7 +6,6 @@ import itertools
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from small_programs import EXACT, node, program
 
 from strapgen.fixedpoint.floating import rounding_bounds
@@ -117,7 +116,7 @@ NEARLY_FOUR = {"a": 4 - UNIT, "b": UNIT * Fraction(9, 16), "c": UNIT * Fraction(
 SHIFTED = {"c": node("add", "a", 3), "d": node("add", "b", 3)}
 
 
-@each(
+@pytest.mark.parametrize(
     ("body", "limits", "rows", "share"),
     [
         # Near pi/6 the sine is just above 1/2: its unit in the last place is largest beside it, and beside sin(x)/x.
@@ -236,7 +235,7 @@ def test_the_relative_error_of_a_literal_is_all_of_it():
         assert not rest
 
 
-@each("share", [Fraction(k, 16) for k in range(17)])
+@pytest.mark.parametrize("share", [Fraction(k, 16) for k in range(17)])
 def test_a_root_is_off_by_no_larger_share_than_its_bound(share):
     """The largest change of a root is that of a smaller radicand: 1 - root(1 - share)."""
     assert (1 - _root_share(share)) ** 2 <= 1 - share

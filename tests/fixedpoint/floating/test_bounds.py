@@ -209,7 +209,7 @@ def test_the_error_of_a_step_is_that_of_its_product_and_what_its_transition_make
 
 def test_a_transition_that_calls_functions_stretches_by_no_more_than_its_distance_from_the_identity():
     code = strapgen.lower(strapgen.derive("euler", method="magnus2", increments=1))
-    code = replace(code, companions=replace(code.companions, isometry=False))
+    code = replace(code, info=replace(code.info, companions=replace(code.companions, isometry=False)))
     zero, away = (Fraction(0),) * 4, tuple(map(Fraction, (0, 3, 4, 0)))
     limits = {s.name: size for s, size in zip(code.inputs, LARGEST.values(), strict=True)}
     growth = _accumulation(code, limits, StepRounding(zero, zero, away), zero).growth

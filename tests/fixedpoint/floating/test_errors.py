@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_programs import EXACT, TYPES, computed, exactly, node, program
@@ -82,7 +81,7 @@ def test_without_the_error_of_a_literal_the_bound_would_be_exceeded(monkeypatch)
     assert bound(code) < error + NUMBERS["float"].half_ulp(Fraction(5, 6))
 
 
-@each(
+@pytest.mark.parametrize(
     "code",
     [
         program({"y": node("multiply", "a", 8)}, {"a": 1}),
@@ -114,7 +113,7 @@ def test_what_may_overflow_has_no_bound():
     assert "overflow" in rounding_bounds(code, "double").reason
 
 
-@each(
+@pytest.mark.parametrize(
     ("body", "reason"),
     [
         ({"y": node("divide", "a", "b")}, "the divisor in y may be zero"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from fractions import Fraction
 
+import pytest
 from derived import programs
-from gathering import each
 from small_programs import EXACT, node, program
 
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
@@ -20,7 +20,7 @@ def ranges(code: Program) -> ExactRanges:
     return ExactRanges(code, Expressions.of(code), box)
 
 
-@each(
+@pytest.mark.parametrize(
     ("value", "limits", "spare"),
     [
         # The range of cosine is that of its first two terms.

@@ -20,10 +20,10 @@ from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
     ErrorPropagation,
+    ExactOperation,
     InputElement,
     Quantities,
     Quantity,
-    SquareRoot,
     Sum,
 )
 from strapgen.fixedpoint.quantization import _planned, _walked
@@ -37,6 +37,7 @@ from strapgen.fixedpoint.runs.accumulation import (
 )
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import OPERATIONS, Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.fixed import ModelEvaluator
@@ -53,7 +54,7 @@ def test_a_sum_of_products_moves_by_no_more_than_is_told():
     )
     body = (Assignment("y", Operation("add", (multiple, Reference("a")))),)
     result = Result(Signal("out", (1,), ("out_1",)), (Reference("y"),))
-    made = Program("made", "made", "Made by hand", "", "made", (), (a, b), body, (result,))
+    made = Program(KernelInfo("made", "Made by hand", ""), (a, b), body, (result,))
     box = {"a": Interval.symmetric(1), "b": Interval.symmetric(Fraction(1, 4))}
     by = {"a": Fraction(1, 8), "b": Fraction(1, 2)}
 
@@ -115,7 +116,7 @@ def test_roots_functions_and_what_stands_beside_move_too():
         "b": quantity("b", InputElement("z")),
         "double": quantity("double", Sum(((("a",), 2 * one),)), beside=((("a",), -one / 2),)),
         # The root moves most from zero: to the root of what its argument moves by.
-        "root": quantity("root", SquareRoot("a"), 0),
+        "root": quantity("root", ExactOperation("sqrt", ("a",)), 0),
         "function": quantity("function", Sum(()), follows=slopes),
         "steep": quantity("steep", Sum(()), follows=replace(slopes, most=one / 8)),
     }
@@ -367,7 +368,7 @@ def test_growth_is_the_largest_singular_value_of_a_transition():
         )
         nodes = (one, Reference("a"), Reference("b"), one)
         transition = Result(Signal("transition", (2, 2), ("t1", "t2", "t3", "t4")), nodes)
-        step = Program("made", "made", "", "", "", (), (s, x), body, (), transition)
+        step = Program(KernelInfo("made", "", ""), (s, x), body, (), transition)
         growth = transition_growth(step, transition, (Fraction(1, 8),), 2, Fraction(7))
         assert float(growth) == pytest.approx(expected, rel=1e-12)
     calls = replace(step, body=(*body[:1], Assignment("b", Operation("sqrt", (Reference("x"),)))))

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from derived import program, quantized
-from gathering import each
 from scipy.spatial.transform import Rotation
 
 import strapgen
@@ -202,7 +201,7 @@ def test_a_normalization_turns_by_no_more_than_is_told(rng):
             assert float(angles.per_normalization) / 20 < worst <= float(angles.per_normalization)
 
 
-@each("kernel", [*sorted(KEEP_THE_ATTITUDE), "dcm-orthonormalize"])
+@pytest.mark.parametrize("kernel", [*sorted(KEEP_THE_ATTITUDE), "dcm-orthonormalize"])
 def test_orthonormalizations_keep_the_attitude(kernel, rng):
     normalize = strapgen.evaluator(kernel)
     shape = normalize.function.inputs[0].shape

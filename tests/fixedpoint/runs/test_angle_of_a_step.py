@@ -10,7 +10,6 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
-from gathering import each
 
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.runs.accumulation import StepErrors
@@ -47,7 +46,7 @@ def percent(count: int | Fraction) -> Fraction:
     return Fraction(count, 100)
 
 
-@each(
+@pytest.mark.parametrize(
     ("errors", "sine"),
     [
         # An error of 1/100 of a state of 1/2.
@@ -131,7 +130,7 @@ def test_rounded_increments_are_an_error_of_the_transition():
     assert angles.per_step + angles.input_rounding == pytest.approx(more.per_step, rel=1e-12)
 
 
-@each(
+@pytest.mark.parametrize(
     ("errors", "room", "lost"),
     [
         # Seven eighths of the way from 1 to 1/2 are 7/16.
@@ -166,7 +165,7 @@ def test_a_step_that_may_turn_by_more_than_a_twelfth_of_a_turn_has_no_bound():
 # Matrices
 
 
-@each(
+@pytest.mark.parametrize(
     ("errors", "added", "fed_back"),
     [
         ({"local": percent(1)}, percent(1), 0),
@@ -223,7 +222,7 @@ LONGEST = float(2 - SHORTEST**2) ** 0.5
 START = 1 - Fraction(1, 128)
 
 
-@each(
+@pytest.mark.parametrize(
     ("errors", "shorter", "longer"),
     [
         ({"local": percent(Fraction(1, 10))}, 0.001, 0.001),

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 import sympy as sp
 from derived import kernel, program
-from gathering import each
 
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.ir.program import Program
@@ -138,8 +137,8 @@ def test_values_are_named_after_what_they_are(choice):
     assert len(temporaries) <= (3 if choice.name == "dcm" else 0)
 
 
-@each("vectors", [1, 2, 3])
-@each("degree", [0, 1, 2, 3, 4, 5])
+@pytest.mark.parametrize("vectors", [1, 2, 3])
+@pytest.mark.parametrize("degree", [0, 1, 2, 3, 4, 5])
 def test_the_stated_terms_are_all_products_up_to_the_degree(degree, vectors, monkeypatch):
     """They are monomials in the scalar products, alone and with each vector and each cross product."""
     monkeypatch.setattr(canonical, "_MOST_TERMS", {"few": 0, "many": 0})

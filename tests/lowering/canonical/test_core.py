@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from gathering import each
 
 from strapgen import catalogue, derive
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, walk
@@ -61,7 +60,7 @@ def test_an_input_that_is_used_as_it_stands_is_a_vector_too():
     assert forms(extract(rates)) == {"turn_0": (1, 0, 0), "turn_1_2": (0, 1, 0), "turn_1": (0, 0, 1)}
 
 
-@each(
+@pytest.mark.parametrize(
     ("stage", "form"),
     [
         (lambda a, b: 2 * a - b / 3, (2, Fraction(-1, 3))),
@@ -105,7 +104,9 @@ def test_vectors_may_come_one_by_one():
     assert decompose(core).scalar == {((0, 0),): 1}
 
 
-@each("name", ["euler-product", "error-matrix", "dcm-orthonormalize", "dcm-from-euler", "coning-increments"])
+@pytest.mark.parametrize(
+    "name", ["euler-product", "error-matrix", "dcm-orthonormalize", "dcm-from-euler", "coning-increments"]
+)
 def test_a_kernel_without_a_transition_has_no_core(name):
     assert extract_core(catalogue.derive(catalogue.choose(name))) is None
 

@@ -62,9 +62,10 @@ def test_long_transitions_are_computed_by_their_stages_and_say_so(algorithm, cho
     assert reason in program(choice).notes and reason not in kernel(choice).notes
 
 
-@pytest.mark.parametrize("chosen", [*STAGED, ("fehlberg5", 4, 0)])
+@pytest.mark.long
+@pytest.mark.parametrize("chosen", [*STAGED, ("fehlberg5", 4, 0), *EXPANDED])
 @ALGORITHM
-def test_a_staged_program_is_its_kernel_exactly(algorithm, chosen):
+def test_a_program_is_its_kernel_exactly(algorithm, chosen):
     choice, random = Choice(algorithm, *chosen), Random(1969)
     made, exact = program(choice), kernel(choice)
     names = [name for signal in exact.inputs for name in signal.elements]
@@ -78,18 +79,6 @@ def test_a_staged_program_is_its_kernel_exactly(algorithm, chosen):
 
 def _rational(number: sp.Rational) -> object:
     return sp.QQ(int(number.p), int(number.q))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("chosen", EXPANDED)
-@ALGORITHM
-def test_an_expanded_program_is_its_kernel_exactly(algorithm, chosen):
-    choice, random = Choice(algorithm, *chosen), Random(7)
-    made, exact = program(choice), kernel(choice)
-    names = [name for signal in exact.inputs for name in signal.elements]
-    values = {name: Fraction(random.randint(-99, 99), random.randint(1, 99)) for name in names}
-    expected = exact.expand({n: sp.QQ(v.numerator, v.denominator) for n, v in values.items()}, _rational)
-    assert [sp.QQ(x.numerator, x.denominator) for x in made.run(values)["next"]] == expected["next"]
 
 
 @pytest.mark.parametrize("chosen", [*EXPANDED, ("rk3", 8, 0), ("dormand-prince5", 3, 0)])

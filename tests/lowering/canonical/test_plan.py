@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from gathering import each
+import pytest
 
 from strapgen.kernel.polynomials import ONE
 from strapgen.lowering.canonical.plan import _axes
 
 
-@each(
+@pytest.mark.parametrize(
     ("products", "axes"),
     [
         ([], []),

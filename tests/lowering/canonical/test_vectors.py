@@ -3,7 +3,6 @@
 from fractions import Fraction
 
 import pytest
-from gathering import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -48,7 +47,7 @@ def computed(made: Pool) -> dict[str, Form]:
     return forms
 
 
-@each(
+@pytest.mark.parametrize(
     ("a", "b", "c"),
     [
         ((2, -4, 0), (1, -2, 0), 2),
@@ -147,7 +146,7 @@ def test_a_sum_of_two_named_vectors_takes_three_additions():
     assert made.vectors[name].operations == 3
 
 
-@each(
+@pytest.mark.parametrize(
     ("whole", "parts", "operations"),
     [
         # (d1 + d4) + (d2 + d3)/3: two sums, a multiple and a sum

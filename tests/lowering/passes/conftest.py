@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import pytest
 
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import (
     OPERATIONS,
     Assignment,
@@ -77,7 +78,7 @@ def parse() -> Callable[..., Program]:
         moved = transition.split()
         used = {name for assignment in body for name in references(assignment.value)} | {*held, *moved}
         return Program(
-            *("p", "p", "", "", "", ()),
+            KernelInfo("p", "", ""),
             tuple(map(Signal.scalar, sorted(used - {*assigned}))),
             body,
             tuple(Result(Signal.scalar(f"output_{n}"), (Reference(n),)) for n in held),

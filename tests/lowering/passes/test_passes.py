@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import (
     Assignment,
     Constant,
@@ -72,7 +73,7 @@ def programs(draw: st.DrawFn) -> Program:
     held = [names[-1], *draw(st.lists(st.sampled_from(names), max_size=3))]
     moved = draw(st.lists(st.sampled_from(names), max_size=2))
     return Program(
-        *("p", "p", "", "", "", ()),
+        KernelInfo("p", "", ""),
         tuple(map(Signal.scalar, INPUTS)),
         tuple(body),
         tuple(Result(Signal.scalar(f"output_{k}"), (name,)) for k, name in enumerate(held)),

@@ -18,9 +18,7 @@ from sympy.polys.groebnertools import groebner
 from sympy.polys.orderings import grevlex, lex
 
 from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution, simple, with_roots
-from strapgen.ir.exceptions import InputError
-from strapgen.kernel.power_series import field
-from strapgen.kernel.ring_quotients import (
+from strapgen.analysis.unknowns.ring_quotients import (
     cancelled,
     linear_coefficient,
     may_divide,
@@ -28,6 +26,8 @@ from strapgen.kernel.ring_quotients import (
     substituted,
     without,
 )
+from strapgen.ir.exceptions import InputError
+from strapgen.kernel.power_series import field
 
 #: Most cases that are looked at, most terms of an equation, and most unknowns.
 MOST_CASES, MOST_TERMS, MOST_UNKNOWNS = 400, 5000, 40

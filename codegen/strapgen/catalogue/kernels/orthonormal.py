@@ -33,7 +33,7 @@ def _normalize(kinematics: Kinematics) -> Kernel:
         f"{kinematics.title}: normalization to length 1, exact",
         f"{THESIS}, chapter 3 C: x / sqrt(x . x)",
         notes=(
-            "The state must not be zero, which has no direction: in floating point the result is then no number.",
+            "The state must not be zero, which has no direction: in floating point the result is then NaN.",
         ),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Container, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -12,7 +12,6 @@ from strapgen.catalogue.methods import coefficients
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.registry import Registry
 
 T = TypeVar("T")
 
@@ -99,27 +98,29 @@ def gyro(table: Any) -> GyroResponse | None:
     return GyroResponse(*values)
 
 
-class InstalledFiles(Mapping[str, T], Generic[T]):
-    """Coefficients in files of installed packages, by the names of the files; each is checked when it is used."""
+class CoefficientFiles(Mapping[str, T], Generic[T]):
+    """Coefficients by name; a file is read when they are first used, and again when it has changed."""
 
-    def __init__(self, files: Registry[Path], read: Callable[[Path, str], T]) -> None:
-        self._files, self._read = files, read
-        self._known: dict[tuple[Path, int], T] = {}
+    def __init__(
+        self, files: Mapping[str, Path], read: Callable[[Path, str], T], without: Container[str] = ()
+    ) -> None:
+        self.files, self._read, self._without = files, read, without
+        self._known: dict[tuple[str, int], T] = {}
 
     def __getitem__(self, name: str) -> T:
         if name not in self:
             raise KeyError(name)
-        path = self._files[name]
-        key = path, path.stat().st_mtime_ns
+        path = self.files[name]
+        key = name, path.stat().st_mtime_ns
         if key not in self._known:
             self._known[key] = self._read(path, name)
         return self._known[key]
 
     def __contains__(self, name: object) -> bool:
-        return name not in self._files.own and name in self._files
+        return name not in self._without and name in self.files
 
     def __iter__(self) -> Iterator[str]:
-        return (name for name in self._files if name not in self._files.own)
+        return (name for name in self.files if name not in self._without)
 
     def __len__(self) -> int:
         return len(list(iter(self)))

@@ -104,16 +104,9 @@ def exponential(
     rotation_vector: Callable[[KernelBuilder, Samples], sp.Matrix],
     **rest: Any,
 ) -> Method:
-    """Return the method whose transition is the exponential of a rotation vector.
+    """Return the method whose transition is the exponential of a rotation vector; the rest is as in `Method`.
 
-    Parameters
-    ----------
-    name, title, source, order
-        As in `Method`.
-    rotation_vector : callable
-        ``rotation_vector(build, samples)`` writes its stages and returns the rotation vector of the step.
-    **rest
-        As in `Method`.
+    ``rotation_vector(build, samples)`` writes its stages and returns the rotation vector of the step.
     """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:

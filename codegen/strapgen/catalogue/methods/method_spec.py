@@ -65,13 +65,7 @@ class MethodSpec(Protocol):
         """Increments in a step of a method that says so itself."""
 
     def select(self, asked: Asked) -> tuple[MethodSpec, StepSamples]:
-        """Return the method for the samples that are asked for, and the samples.
-
-        Raises
-        ------
-        InputError
-            If it does not go with them.
-        """
+        """Return the method for the samples that are asked for, and the samples; refuse what does not go with it."""
         ...
 
 

@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import shlex
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files
-from strapgen.catalogue.methods.coefficient_files import InstalledFiles, band, entries, gyro, rational
+from strapgen.catalogue.methods.coefficient_files import CoefficientFiles, band, entries, gyro, rational
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
@@ -101,9 +100,6 @@ class ShapedConing:
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
 
-    __repr__ = short_repr
-    _repr_latex_ = notebook_latex
-
     def _in_words(self) -> str:
         return f"{self.name}: {self.title}\n{counted(self.samples, 'sample')}, {self.previous} before"
 
@@ -141,31 +137,9 @@ class ShapedConing:
         return {(newest - s, newest): c for s, c in reversed([*enumerate(self.coefficients, 1)])}
 
 
-class _BuiltInShapes(Mapping[str, ShapedConing]):
-    """The coefficients of strapgen by name; a file is read when it is first used."""
-
-    def __init__(self, files: Mapping[str, Path]) -> None:
-        self._files = files
-        self._shapes: dict[str, ShapedConing] = {}
-
-    @cached_property
-    def titles(self) -> dict[str, str]:
-        """Titles by name."""
-        return {name: str(self._content(name)["name"]) for name in self}
-
-    def __getitem__(self, name: str) -> ShapedConing:
-        if name not in self._shapes:
-            self._shapes[name] = _shape(self._content(name), name)
-        return self._shapes[name]
-
-    def _content(self, name: str) -> dict[str, Any]:
-        return tomllib.loads(self._files[name].read_text("utf-8"))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._files)
-
-    def __len__(self) -> int:
-        return len(self._files)
+def _shipped(path: Path, name: str) -> ShapedConing:
+    """Read coefficients of strapgen, whose file the tests verify."""
+    return _shape(tomllib.loads(path.read_text("utf-8")), name)
 
 
 def _installed(path: Path, name: str) -> ShapedConing:
@@ -174,33 +148,19 @@ def _installed(path: Path, name: str) -> ShapedConing:
 
 
 _FILES = Registry("coning_shapes", Path)
-_BUILT_IN = _BuiltInShapes(_FILES.own)
-_INSTALLED = InstalledFiles(_FILES, _installed)
+_BUILT_IN = CoefficientFiles(_FILES.own, _shipped)
+_INSTALLED = CoefficientFiles(_FILES, _installed, without=_FILES.own)
 
 #: The coefficients of strapgen and of installed packages, by name, and their titles.
 SHAPES: Merged[ShapedConing] = Merged(_BUILT_IN, _INSTALLED)
-SHAPE_TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
+SHAPE_TITLES: Merged[str] = Merged(
+    {name: str(tomllib.loads(path.read_text("utf-8"))["name"]) for name, path in _FILES.own.items()},
+    Titles(_INSTALLED),
+)
 
 
 def read(path: str | Path) -> ShapedConing:
-    """Read coefficients from a file and check what they are said to be.
-
-    Parameters
-    ----------
-    path : path
-        A TOML file with the keys of `KEYS`; a coefficient is a whole number or a string, see `coefficients.number`.
-
-    Returns
-    -------
-    ShapedConing
-        Named after its key `name`, in lower case with hyphens.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key or number is wrong, a power of the frequency is not annulled, or the level is
-        another one.
-    """
+    """Read coefficients from a TOML file with the keys of `KEYS`, and check what they are said to be."""
     data = toml_files.content(path, "a file of coning coefficients", MOST_BYTES)
     try:
         coefficient_files.check_keys(data, KEYS, OPTIONAL)
@@ -216,17 +176,7 @@ def read(path: str | Path) -> ShapedConing:
 
 
 def verify(shape: ShapedConing) -> None:
-    """Check that the conditions hold exactly, and that the level is right to its digits.
-
-    Parameters
-    ----------
-    shape : ShapedConing
-
-    Raises
-    ------
-    InputError
-        If it is not so.
-    """
+    """Check that the conditions hold exactly, and that the level is right to its digits."""
     from strapgen.catalogue.methods import coning_drift
 
     of = coning_drift.ConingShape(shape.samples, shape.previous, shape.gyro)

@@ -6,21 +6,19 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
-from strapgen.catalogue.methods.coefficient_files import InstalledFiles, entries
+from strapgen.catalogue.methods.coefficient_files import CoefficientFiles, entries
 from strapgen.catalogue.methods.coefficients import short_text
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.suggestions import counted, needed
 from strapgen.registry import Merged, Registry, Titles
 
@@ -42,44 +40,19 @@ MOST_TOLERANCE = Fraction(1, 10**12)
 MOST_BYTES = 200_000
 
 
-class _BuiltIn(Mapping[str, Tableau]):
-    """The tableaux of strapgen by name; each file is read when its tableau is first used.
+def _titles(files: Mapping[str, Path]) -> dict[str, str]:
+    """Return the names in the literature, by name, sorted by order, with those of the thesis first within an order."""
+    data = {name: tomllib.loads(path.read_text("utf-8")) for name, path in files.items()}
 
-    They are sorted by order, with those of the thesis first within an order. Tests verify the files.
-    """
+    def place(name: str) -> tuple[int, bool, int, str]:
+        return data[name]["order"], not name.startswith("rk"), len(data[name]["nodes"]), name
 
-    __repr__ = short_repr
+    return {name: data[name]["name"] for name in sorted(data, key=place)}
 
-    def _in_words(self) -> str:
-        return ", ".join(self)
 
-    def __init__(self, files: Mapping[str, Path]) -> None:
-        self._files = files
-        self._tableaux: dict[str, Tableau] = {}
-
-    @cached_property
-    def titles(self) -> dict[str, str]:
-        """Names in the literature, by name; no coefficient is read for them."""
-        files = {name: tomllib.loads(path.read_text("utf-8")) for name, path in self._files.items()}
-
-        def place(name: str) -> tuple[int, bool, int, str]:
-            return files[name]["order"], not name.startswith("rk"), len(files[name]["nodes"]), name
-
-        return {name: files[name]["name"] for name in sorted(files, key=place)}
-
-    def __getitem__(self, name: str) -> Tableau:
-        if name not in self._tableaux:
-            if name not in self.titles:
-                raise KeyError(name)
-            text = self._files[name].read_text("utf-8")
-            self._tableaux[name] = _tableau(tomllib.loads(text), name)
-        return self._tableaux[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.titles)
-
-    def __len__(self) -> int:
-        return len(self.titles)
+def _shipped(path: Path, name: str) -> Tableau:
+    """Read a tableau of strapgen, whose file the tests verify."""
+    return _tableau(tomllib.loads(path.read_text("utf-8")), name)
 
 
 def _installed(path: Path, name: str) -> Tableau:
@@ -88,14 +61,15 @@ def _installed(path: Path, name: str) -> Tableau:
 
 
 _FILES = Registry("tableaux", Path)
-_BUILT_IN = _BuiltIn(_FILES.own)
-_INSTALLED = InstalledFiles(_FILES, _installed)
+_BUILT_IN_TITLES = _titles(_FILES.own)
+_BUILT_IN = CoefficientFiles({name: _FILES.own[name] for name in _BUILT_IN_TITLES}, _shipped)
+_INSTALLED = CoefficientFiles(_FILES, _installed, without=_FILES.own)
 
 #: The tableaux of strapgen and of installed packages, by name.
 TABLEAUX: Merged[Tableau] = Merged(_BUILT_IN, _INSTALLED)
 
 #: Their names in the literature.
-TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
+TITLES: Merged[str] = Merged(_BUILT_IN_TITLES, Titles(_INSTALLED))
 
 
 def read(path: str | Path) -> Tableau:

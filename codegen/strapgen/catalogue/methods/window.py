@@ -18,21 +18,11 @@ Taps = tuple[Fraction, ...]
 
 
 class GyroResponse(NamedTuple):
-    """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2).
+    """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2)."""
 
-    Parameters
-    ----------
-    bandwidth_hz : Fraction
-        Natural frequency w/(2 pi) in Hz.
-    damping : Fraction
-        zeta.
-    sample_hz : Fraction
-        Sampling frequency in Hz.
-    """
-
-    bandwidth_hz: Fraction
-    damping: Fraction
-    sample_hz: Fraction
+    bandwidth_hz: Fraction  # natural frequency w/(2 pi) in Hz
+    damping: Fraction  # zeta
+    sample_hz: Fraction  # sampling frequency in Hz
 
 
 @dataclass(frozen=True)

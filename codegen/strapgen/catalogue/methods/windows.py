@@ -7,17 +7,17 @@ that commit an attitude, and one-sided filters for the same samples.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, window_conditions
 from strapgen.catalogue.methods.coefficient_files import (
-    InstalledFiles,
+    CoefficientFiles,
     band,
     entries,
     gyro,
@@ -28,7 +28,6 @@ from strapgen.catalogue.methods.coefficients import short_text
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.suggestions import counted
 from strapgen.registry import Merged, Registry, Titles
 
@@ -54,54 +53,6 @@ MOST_TERMS = 40
 
 #: Most bytes of a file; the longest family takes less.
 MOST_BYTES = 4_000_000
-
-
-class _BuiltInWindows(Mapping[str, Window]):
-    """The windows of strapgen by name, each family followed by its one-sided filters; a file is read when first used.
-
-    A file is called window-P-L, so that the names are known without reading it.
-    """
-
-    __repr__ = short_repr
-
-    def _in_words(self) -> str:
-        return ", ".join(self.titles)
-
-    def __init__(self, files: Mapping[str, Path]) -> None:
-        self._files = files
-        self._windows: dict[str, Window] = {}
-
-    @cached_property
-    def families(self) -> dict[str, str]:
-        """The name of the family of every window, by name."""
-        sizes = [(int(p), int(a)) for p, a in (name.split("-")[1:] for name in self._files)]
-        return {
-            f"window-{before}-{after}": f"window-{previous}-{ahead}"
-            for previous, ahead in sorted(sizes)
-            for before, after in [(previous, ahead), *one_sided_sizes(previous, ahead)]
-        }
-
-    @cached_property
-    def titles(self) -> dict[str, str]:
-        """The titles of the families, by name; no filter is read for them."""
-        titles = {}
-        for name in dict.fromkeys(self.families.values()):
-            head, _, _ = self._files[name].read_text("utf-8").partition("\nfilters")
-            titles[name] = str(tomllib.loads(head)["name"])
-        return titles
-
-    def __getitem__(self, name: str) -> Window:
-        if name not in self._windows:
-            family = self.families[name]
-            window = _family(tomllib.loads(self._files[family].read_text("utf-8")), family)
-            self._windows |= {one.name: one for one in (window, *window.one_sided)}
-        return self._windows[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.families)
-
-    def __len__(self) -> int:
-        return len(self.families)
 
 
 def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
@@ -134,20 +85,45 @@ def stored_sizes(previous: int, ahead: int, ideal: bool) -> list[tuple[int, int]
     return sizes[:ahead] if ideal and previous == ahead else sizes
 
 
-def _installed(path: Path, name: str) -> Window:
-    """Read the family of an installed package, which has the name of its file."""
-    return _read(path, name)
+def _families(files: Iterable[str]) -> dict[str, str]:
+    """Return the name of the family, which is that of its file, of every window; one-sided filters follow theirs."""
+    sizes = [(int(p), int(a)) for p, a in (name.split("-")[1:] for name in files)]
+    return {
+        f"window-{before}-{after}": f"window-{previous}-{ahead}"
+        for previous, ahead in sorted(sizes)
+        for before, after in [(previous, ahead), *one_sided_sizes(previous, ahead)]
+    }
+
+
+def _title(path: Path) -> str:
+    """Return the title of a family, for which no filter is read."""
+    head, _, _ = path.read_text("utf-8").partition("\nfilters")
+    return str(tomllib.loads(head)["name"])
+
+
+@cache
+def _shipped_family(path: Path) -> dict[str, Window]:
+    """Return the windows of a family of strapgen, whose file the tests verify, by name."""
+    window = _family(tomllib.loads(path.read_text("utf-8")), path.stem)
+    return {one.name: one for one in (window, *window.one_sided)}
 
 
 _FILES = Registry("windows", Path)
-_BUILT_IN = _BuiltInWindows(_FILES.own)
-_INSTALLED = InstalledFiles(_FILES, _installed)
+_FAMILIES = _families(_FILES.own)
+_BUILT_IN = CoefficientFiles(
+    {name: _FILES.own[family] for name, family in _FAMILIES.items()},
+    lambda path, name: _shipped_family(path)[name],
+)
+#: The family of an installed package has the name of its file.
+_INSTALLED = CoefficientFiles(_FILES, lambda path, name: _read(path, name), without=_FILES.own)
 
 #: The windows of strapgen and of installed packages, by name.
 WINDOWS: Merged[Window] = Merged(_BUILT_IN, _INSTALLED)
 
 #: The titles of their families.
-WINDOW_TITLES: Merged[str] = Merged(_BUILT_IN.titles, Titles(_INSTALLED))
+WINDOW_TITLES: Merged[str] = Merged(
+    {name: _title(_FILES.own[name]) for name in dict.fromkeys(_FAMILIES.values())}, Titles(_INSTALLED)
+)
 
 #: Ending of the name of a window whose rotation is exact, and the terms of its power series.
 EXACT, EXACT_TERMS = "-exact", 16

@@ -12,6 +12,7 @@ from strapgen.design.commit_late.late_filters import NEXT, SHORT, LateFilters
 from strapgen.design.commit_late.lost_samples import REACH
 from strapgen.ir.decimals import above
 from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
 from strapgen.targets.c.emit import CPrinter, real_of
@@ -128,7 +129,8 @@ def whole(
     counts = {kind: sum(each.operations[kind] for each in functions) for kind in step.operations}
     temporaries = sum(each.temporaries for each in functions)
     function = Function(name, (state,), (result,))
-    return Sources(name, step.target, files, function, counts, temporaries, None, fixed=step.fixed)
+    info = KernelInfo(name, title, filters.window.source)
+    return Sources(info, step.target, files, function, counts, temporaries, step.fixed)
 
 
 def _in_floating_point(filters: LateFilters, step: Sources) -> dict[str, object]:

@@ -15,6 +15,7 @@ from strapgen.firmware.changed_files import refuse_changed as refuse_changed
 from strapgen.firmware.project import project
 from strapgen.firmware.project.project_c import MotionRun, two_speed_main
 from strapgen.firmware.vectors.cycle_vectors_c import CycleTable, cycle_files
+from strapgen.firmware.vectors.program_evaluator import ProgramEvaluator
 from strapgen.firmware.vectors.vectors import MODEL, SEED, vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.ir.exceptions import InputError
@@ -27,7 +28,6 @@ from strapgen.navigation.two_speed.two_speed_c import wiring
 from strapgen.run.evaluators import Array
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
-from strapgen.run.program_evaluator import ProgramEvaluator
 
 #: Fast cycles in a slow cycle, slow cycles in a navigation cycle, and navigation cycles of the run that is tested.
 FAST, SLOW, NAVIGATION = 4, 2, 4

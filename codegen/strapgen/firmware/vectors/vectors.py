@@ -17,6 +17,7 @@ import numpy as np
 
 from strapgen import pipeline
 from strapgen.catalogue import Choice
+from strapgen.firmware.vectors.program_evaluator import LIBRARY_OPERATIONS, ProgramEvaluator
 from strapgen.firmware.vectors.vectors_c import CallVector, VectorTable
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -28,7 +29,6 @@ from strapgen.results.result import Result
 from strapgen.run.exact import ExactEvaluator
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
-from strapgen.run.program_evaluator import LIBRARY_OPERATIONS, ProgramEvaluator
 from strapgen.targets import BUILT_IN
 from strapgen.targets.contract import options
 from strapgen.targets.names import UNNAMED, Naming

@@ -116,7 +116,7 @@ def rounding_bounds(
     known = {*settings.ranges, *TURNING}
     for signal in program.inputs:
         if signal.bound is None and not signal.constraint and signal.name not in known:
-            reason = f"the range of {signal.name} is not known"
+            reason = f"the range of {signal.name} is unknown"
             return RoundingBounds(number, precision, reason=reason)
     return _bounds(
         program, tuple((s.name, largest_magnitude(program, s, settings)) for s in program.inputs), number

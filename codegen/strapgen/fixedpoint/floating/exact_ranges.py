@@ -15,7 +15,15 @@ from strapgen.fixedpoint.derivation_context import samples
 from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions, NoBoundError
 from strapgen.fixedpoint.floating.number_formats import exponent
 from strapgen.fixedpoint.intervals import Interval, maximum
-from strapgen.fixedpoint.quantities import Definition, InputElement, Maximum, Quantity, Sum, Terms, combined
+from strapgen.fixedpoint.quantities import (
+    Definition,
+    ExactOperation,
+    InputElement,
+    Quantity,
+    Sum,
+    Terms,
+    combined,
+)
 from strapgen.fixedpoint.ranges import Ranges
 from strapgen.ir.float_interface import Condition
 from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Program
@@ -43,6 +51,9 @@ _ON_SAMPLES: dict[str, Callable[..., Any]] = {
     "select": np.where,
 }
 _SUMS = ("add", "subtract", "multiply", "negate")
+
+#: Of a quantity whose range alone is known.
+_UNKNOWN = ExactOperation("maximum", ())
 
 
 @dataclass
@@ -93,7 +104,7 @@ class ExactRanges:
             self._items[name] = Quantity(name, Sum(tuple(terms.items())), Fraction(0), known)
             return known
         known = self._function_range(place, expression)
-        self._note(name, Maximum(()), known)
+        self._note(name, _UNKNOWN, known)
         return known
 
     def _name(self, place: int) -> str:
@@ -161,7 +172,7 @@ class ExactRanges:
         self.ranges[place] = known = self.ranges[place].meet(limits)
         name = self._name(place)
         definition = self._items[name].definition
-        self._note(name, definition if isinstance(definition, InputElement) else Maximum(()), known)
+        self._note(name, definition if isinstance(definition, InputElement) else _UNKNOWN, known)
 
 
 def _cosine(magnitude: Fraction, curvature: Fraction) -> Interval:

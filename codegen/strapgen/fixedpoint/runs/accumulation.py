@@ -14,14 +14,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from strapgen.fixedpoint.intervals import Interval, norm, root
-from strapgen.fixedpoint.quantities import (
-    Computed,
-    InputElement,
-    NearestInteger,
-    Quantities,
-    SquareRoot,
-    Sum,
-)
+from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Quantities, Sum
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.runs.singular_values import singular_value_bounds
 from strapgen.fixedpoint.series import Series, Truncated
@@ -160,9 +153,9 @@ def _moves(quantities: Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
             case Sum() as total:
                 moves[name] = _sum_move(total, quantities, moves)
                 moves[name] += sum(abs(c) * moves[m[0]] for m, c in quantity.beside)
-            case Computed() | NearestInteger():
+            case ExactOperation("computed" | "nearest"):
                 moves[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
-            case SquareRoot(argument):
+            case ExactOperation("sqrt", (str(argument),)):
                 moves[name] = root(moves[argument])
             case _:
                 return None

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.parameters import parameters as settings_of
 from strapgen.ir.units import STANDARD_GRAVITY
 from strapgen.lab.motions.motions import Motion
+from strapgen.lab.motions.parameters import parameters as settings_of
 from strapgen.lab.motions.rate_profiles import CosineSum, random_sum
 
 Array = NDArray[np.float64]

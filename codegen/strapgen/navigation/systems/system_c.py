@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
@@ -60,13 +61,12 @@ def whole(
     }
     outputs = tuple(system.cell(name).signal for name in system.outputs)
     return Sources(
-        system.name,
+        KernelInfo(system.name, system.title, ""),
         first.target,
         files,
         Function(printer.name, system.inputs, outputs),
         counts,
         sum(sources.temporaries for sources in stages.values()),
-        None,
         runs=runs_of(printer.name),
     )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, Rate, SystemStage
@@ -38,7 +39,8 @@ def whole(
     outputs = tuple(system.cell(name).signal for name in system.outputs)
     temporaries = sum(sources.temporaries for sources in stages.values())
     function = Function("run", system.inputs, outputs)
-    return Sources(system.name, first.target, files, function, counts, temporaries, None)
+    info = KernelInfo(system.name, system.title, "")
+    return Sources(info, first.target, files, function, counts, temporaries)
 
 
 @dataclass(frozen=True)

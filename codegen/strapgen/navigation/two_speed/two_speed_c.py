@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from strapgen.ir.decimals import above
 from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
@@ -104,7 +105,8 @@ def whole(name: str, title: str, command: str, system: DescribedSystem, loops: S
     counts = {kind: sum(loop.operations[kind] for loop in loops) for kind in fast.operations}
     temporaries = sum(loop.temporaries for loop in loops)
     function = Function(identifier, sum(wires.samples, ()), outputs)
-    return Sources(name, fast.target, files, function, counts, temporaries, None, runs=runs_of(identifier))
+    info = KernelInfo(name, title, "")
+    return Sources(info, fast.target, files, function, counts, temporaries, runs=runs_of(identifier))
 
 
 def _cost(which: str, loop: Sources) -> str:

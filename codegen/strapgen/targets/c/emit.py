@@ -11,7 +11,7 @@ from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.program import Operation, Program, names_in, walk
 from strapgen.ir.signals import Signal
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c.rounding_text import rounding_text, with_names
 from strapgen.targets.lines import fill_expression
@@ -117,18 +117,7 @@ def sources_of(
         language,
         scalars,
     )
-    return Sources(
-        program.kernel,
-        target,
-        files,
-        Function(name, program.inputs, tuple(result.signal for result in program.outputs)),
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-        runs=runs,
-        rounding=rounding,
-    )
+    return Sources.of(program, target, name, files, runs=runs, rounding=rounding)
 
 
 def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -> dict[str, str]:

@@ -43,9 +43,9 @@ def rounding_text(
     `flag` keeps a compiler from fusing a product and a sum, "" where none does so; `library` computes the sines.
     """
     if bounds.reason:
-        return f"no bound is known, because {bounds.reason}"
+        return f"no bound: {bounds.reason}"
     if not any(bounds.worst.values()):
-        return "none, every output is exact"
+        return "none; every output is exact"
     text = f"against exact arithmetic on the same inputs, {_errors(bounds)}"
     if bounds.accumulation is not None:
         row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
@@ -60,11 +60,11 @@ def rounding_text(
 def _errors(bounds: RoundingBounds) -> str:
     """Return the largest error of every output."""
     parts = [
-        f"{name} is off by at most {above(worst)}" if worst else f"{name} is exact"
+        f"error of {name} <= {above(worst)}" if worst else f"{name} is exact"
         for name, worst in bounds.worst.items()
     ]
     if len(parts) == 1:
-        parts[0] += f", {above(bounds.worst.popitem()[1] / bounds.unit)} units in the last place of 1"
+        parts[0] += f" ({above(bounds.worst.popitem()[1] / bounds.unit)} ulp of 1)"
     return ", ".join(parts)
 
 
@@ -79,6 +79,6 @@ def _conditions(bounds: RoundingBounds, flag: str, library: str) -> str:
     parts = [f"{', '.join(names)} {size}" for size, names in sizes.items()]
     if bounds.functions:
         names = " and ".join(bounds.functions)
-        parts.append(f"{names} of {library} within a unit in the last place")
+        parts.append(f"{names} of {library} within 1 ulp")
     parts += ["IEEE 754, each operation rounded to the nearest", *filter(None, [flag])]
     return "; ".join(parts)

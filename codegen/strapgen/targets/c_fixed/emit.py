@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from strapgen.ir.integer_program import FixedProgram
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines, definitions
 from strapgen.targets.c_fixed.statements import StatementPrinter
 from strapgen.targets.c_fixed.words import WORDS, memory_type
@@ -38,21 +38,7 @@ def sources_of(
     arguments = (*interface.inputs, *interface.outputs)
     scalars = [argument.signal.name for argument in arguments if not argument.signal.shape]
     _, texts = printed(fixed, lambda named, _: files(named, name, target), language, scalars)
-    function = Function(
-        name, *(tuple(a.signal for a in side) for side in (interface.inputs, interface.outputs))
-    )
-    return Sources(
-        fixed.program.kernel,
-        target,
-        texts,
-        function,
-        fixed.operations,
-        fixed.temporaries,
-        fixed.program.companions,
-        interface,
-        fixed.program.recursion,
-        runs=runs,
-    )
+    return Sources.of(fixed, target, name, texts, runs=runs)
 
 
 def _files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:

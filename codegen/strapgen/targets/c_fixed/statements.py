@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.integer_program import (
     FixedProgram,
-    IntegerMaximum,
-    IntegerQuotient,
-    IntegerRoot,
-    IntegerSelection,
+    IntegerOperation,
     IntegerSum,
     Scaled,
     Term,
     Value,
+    cases_of,
     used_by,
 )
 from strapgen.ir.signed_digits import signed_digits
@@ -137,20 +135,20 @@ class StatementPrinter:
         match value.definition:
             case IntegerSum() as total:
                 lines += self._sum(value, total, kind, note)
-            case IntegerQuotient(numerator, denominator):
-                text = self._call("div", self.scaled(numerator), self.as_wide(denominator))
+            case IntegerOperation("divide", (numerator, denominator)):
+                text = self._call("div", self.scaled(numerator), self.as_wide(str(denominator.value)))
                 lines.append(self._declared(kind, name, self.narrow(text, value), note))
-            case IntegerRoot(argument):
+            case IntegerOperation("sqrt", (argument,)):
                 text = self._call("rt", self.scaled(argument))
                 lines.append(self._declared(kind, name, text, note))
-            case IntegerMaximum((first, *others)):
+            case IntegerOperation("maximum", (first, *others)):
                 lines.append(self._declared(kind, name, self.narrowed(first, value), note, constant=False))
                 for other in others:
                     lines.append(_branch("if", self.scaled(other), ">", self.as_wide(name)))
                     lines.append(_assigned(name, self.narrowed(other, value)))
                     lines.append("}")
-            case IntegerSelection(cases, otherwise):
-                lines += self._selection(value, kind, cases, otherwise, note)
+            case IntegerOperation("select", arguments):
+                lines += self._selection(value, kind, arguments, note)
         # The word of a sum is checked before it is narrowed.
         if value.guarded and (value.wide or not self._checked_in_sum(value)):
             lines += self._guard(name, value)
@@ -160,22 +158,15 @@ class StatementPrinter:
     def _checked_in_sum(value: Value) -> bool:
         return isinstance(value.definition, IntegerSum) and not value.definition.in_words
 
-    def _selection(
-        self,
-        value: Value,
-        kind: str,
-        cases: Sequence[tuple[Scaled, Scaled, Scaled]],
-        otherwise: Scaled,
-        note: str,
-    ) -> list[str]:
+    def _selection(self, value: Value, kind: str, arguments: Sequence[Scaled], note: str) -> list[str]:
         """Return a chain of conditions, the first that holds before all others."""
         lines = [_noted(self.unset(kind, value.name), note)]
-        for number, (left, right, result) in enumerate(cases):
+        for number, (left, right, result) in enumerate(cases_of(arguments)):
             word = "if" if not number else "} else if"
             lines.append(_branch(word, self.scaled(left), ">=", self.scaled(right)))
             lines.append(_assigned(value.name, self.narrowed(result, value)))
         lines.append("} else {")
-        lines.append(_assigned(value.name, self.narrowed(otherwise, value)))
+        lines.append(_assigned(value.name, self.narrowed(arguments[-1], value)))
         return [*lines, "}"]
 
     def _guard(self, name: str, value: Value) -> list[str]:

@@ -10,7 +10,7 @@ from strapgen.targets.lines import fill_arguments
 from strapgen.targets.names import C, Language
 
 #: What tells that a file is not what strapgen generates.
-CHECK = "the same command with --check tells what differs"
+CHECK = "the same command with --check shows the differences"
 
 
 def _scopes(texts: Iterable[str]) -> list[set[str]]:

@@ -6,41 +6,22 @@ from collections.abc import Mapping
 
 from strapgen.ir.integer_program import (
     FixedProgram,
-    IntegerDefinition,
-    IntegerMaximum,
-    IntegerQuotient,
-    IntegerRoot,
-    IntegerSelection,
+    IntegerOperation,
     IntegerSum,
     Scaled,
     Term,
     Value,
+    cases_of,
 )
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets.names import PYTHON, printed
 from strapgen.targets.rendering import render
 
 
 def emit(fixed: FixedProgram, target: str) -> Sources:
     """Print a module whose function takes and returns integers, or arrays of them."""
-    interface = fixed.interface
     named, files = printed(fixed, lambda part, other: _files(part, other, target), PYTHON)
-    function = Function(
-        named.name,
-        tuple(argument.signal for argument in interface.inputs),
-        tuple(argument.signal for argument in interface.outputs),
-    )
-    return Sources(
-        fixed.program.kernel,
-        target,
-        files,
-        function,
-        fixed.operations,
-        fixed.temporaries,
-        fixed.program.companions,
-        interface,
-        fixed.program.recursion,
-    )
+    return Sources.of(fixed, target, named.name, files)
 
 
 def _files(fixed: FixedProgram, other: Mapping[str, str], target: str) -> dict[str, str]:
@@ -71,7 +52,7 @@ def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> 
     lines = [f"# {value.meaning}"] if value.meaning else []
     if isinstance(definition, IntegerSum):
         lines += _sum(value, definition, fixed, label)
-    else:
+    elif definition is not None:
         lines.append(f"{name} = {_expression(definition)}")
     if value.saturated:
         lines.append(f"{name} = _saturated({name}, {value.low}, {value.high})")
@@ -80,24 +61,25 @@ def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> 
     return lines
 
 
-def _expression(definition: IntegerDefinition) -> str:
+def _expression(operation: IntegerOperation) -> str:
     """Return a quotient, a root, a maximum or a selection as an expression."""
-    match definition:
-        case IntegerQuotient(numerator, denominator):
-            return f"_quotient({_scaled(numerator)}, {denominator})"
-        case IntegerRoot(argument):
-            return f"_root({_scaled(argument)})"
-        case IntegerMaximum((first, *others)):
-            text = _scaled(first)
+    first, *others = arguments = [_scaled(argument) for argument in operation.arguments]
+    match operation.kind:
+        case "divide":
+            return f"_quotient({', '.join(arguments)})"
+        case "sqrt":
+            return f"_root({first})"
+        case "maximum":
+            text = first
             for argument in others:
-                text = f"_larger({text}, {_scaled(argument)})"
+                text = f"_larger({text}, {argument})"
             return text
-        case IntegerSelection(cases, otherwise):
-            text = _scaled(otherwise)
-            for left, right, result in reversed(cases):
-                text = f"_chosen({_scaled(left)} >= {_scaled(right)}, {_scaled(result)}, {text})"
+        case "select":
+            text = arguments[-1]
+            for left, right, result in reversed(cases_of(arguments)):
+                text = f"_chosen({left} >= {right}, {result}, {text})"
             return text
-    raise TypeError(f"{type(definition).__name__} is no expression")
+    raise ValueError(f"{operation.kind} is no operation on integers")
 
 
 def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, label: str) -> list[str]:

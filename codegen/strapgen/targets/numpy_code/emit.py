@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from strapgen.ir.program import Operation, Program, Reference, walk
-from strapgen.ir.sources import Function, Sources
+from strapgen.ir.sources import Sources
 from strapgen.targets.contract import generating
 from strapgen.targets.lines import fill_expression
 from strapgen.targets.names import PYTHON, printed
@@ -42,17 +42,7 @@ def emit(program: Program, target: str) -> Sources:
     """Print a module with a function of arrays (..., shape), and of a step the function ``<name>_transition``."""
     scalars = [signal.name for signal in program.inputs if not signal.shape]
     named, files = printed(program, lambda part, _: _files(part, target), PYTHON, scalars)
-    function = Function(named.name, program.inputs, tuple(result.signal for result in program.outputs))
-    return Sources(
-        program.kernel,
-        target,
-        files,
-        function,
-        program.operations,
-        program.temporaries,
-        program.companions,
-        recursion=program.recursion,
-    )
+    return Sources.of(program, target, named.name, files)
 
 
 def _files(program: Program, target: str) -> dict[str, str]:

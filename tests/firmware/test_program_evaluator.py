@@ -8,16 +8,17 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from strapgen.firmware.vectors.program_evaluator import ProgramEvaluator
+from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.kernel_sources import sources_of_program
-from strapgen.run.program_evaluator import ProgramEvaluator
 
 
 def evaluator(target: str, node: Operation) -> ProgramEvaluator:
     """Return a program of one scalar input x and one operation."""
     program = Program(
-        *("one", "one", "one", "this test", "", ()),
+        KernelInfo("one", "one", "this test"),
         (Signal.scalar("x"),),
         (Assignment("y", node),),
         (Result(Signal("out", (1,), ("y",)), (Reference("y"),)),),

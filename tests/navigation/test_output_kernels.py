@@ -1,121 +1,19 @@
-"""The kernels of a navigator's outputs and of two rows on every target, inside their bounds, and what they compute."""
+"""The kernels of a navigator's outputs and of two rows: what they compute."""
 
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
 import sympy as sp
-from derived import kernel, program, quantized
-from fixed_inputs import corners_and_random, exactly
-from gathering import each
+from derived import kernel
 
 import strapgen
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.outputs.output_names import MOUNTINGS, OUTPUTS, TWO_ROWS
+from strapgen.navigation.outputs.output_names import MOUNTINGS
 from strapgen.navigation.outputs.variation_table import VariationTable
-from strapgen.run.kernel_sources import sources_of_program
-
-NAMES = [*OUTPUTS, *TWO_ROWS]
-AXES = [f"axes-{mounting}" for mounting in MOUNTINGS]
-#: Compiled in the quick tests: a recursion with error feedback, and functions.
-SOME = ("butterworth-2", "track-angle")
-SOME_FIRST = [pytest.param(name, marks=() if name in SOME else pytest.mark.long) for name in NAMES]
-#: Ranges of what has any unit.
-RANGES = {
-    "butterworth-2": {"sample": Fraction(128), "first": Fraction(128), "second": Fraction(192)},
-    **{name: {"sensed": Fraction(128)} for name in AXES},
-}
-
-
-def settings(name: str, word: int) -> Settings:
-    return Settings(word=word, carry="state", ranges=RANGES.get(name, {}))
-
-
-def proper_inputs(name: str, evaluator, count: int, rng) -> list[np.ndarray]:
-    """Return integers for every input: unit vectors to the place, corners of all others; of any unit a quarter."""
-    pairs = zip(evaluator.interface.inputs, corners_and_random(evaluator, 2 * count, rng), strict=True)
-    inputs = []
-    for argument, array in pairs:
-        signal = argument.signal
-        whole = array[count:] if signal.constraint else array[:count]
-        inputs.append(whole // 4 if signal.name in RANGES["butterworth-2"] else whole)
-    if name == "butterworth-2":
-        warped = np.exp(rng.uniform(-6, 3, size=(count, 1)))
-        n = 1 + math.sqrt(2) * warped + warped**2
-        for place, coefficient in enumerate((1 - 1 / n, warped / n, warped**2 / n), 3):
-            inputs[place] = np.rint(coefficient / float(evaluator.interface.inputs[place].unit)).astype(
-                np.int64
-            )
-    if "row_1" in [argument.signal.name for argument in evaluator.interface.inputs]:
-        unit = float(evaluator.interface.inputs[0].format.unit)
-        rows = np.linalg.qr(rng.normal(size=(count, 3, 2)))[0]
-        inputs[:2] = [np.rint(rows[:, :, k] / unit).astype(inputs[0].dtype) for k in range(2)]
-    return inputs
-
-
-def apart(signal, one, other):
-    """Return a difference; of an angle without whole turns."""
-    plain = np.abs(np.subtract(one, other))
-    return (
-        np.minimum(plain, np.abs(plain - 2 * math.pi)) if "_angle" in signal or "heading" in signal else plain
-    )
-
-
-@pytest.mark.parametrize("word", [pytest.param(16, marks=pytest.mark.long), 32])
-@each("name", NAMES)
-def test_no_error_exceeds_its_bound(name, word, rng):
-    chosen = settings(name, word)
-    fixed = quantized(Choice(name), chosen)
-    model = strapgen.evaluator(name, "fixed-model", chosen)
-    inputs = proper_inputs(name, model, 20, rng)
-    results, _ = model.run(inputs, model.fresh(20))
-    share = 0.0
-    for k, sample in enumerate(zip(*(array.tolist() for array in inputs), strict=True)):
-        known = exactly(fixed, sample)
-        for argument, result in zip(fixed.interface.outputs, results, strict=True):
-            for element, integer, bound in zip(argument.values, result[k], argument.errors, strict=True):
-                error = abs(int(integer) * argument.unit - known[element])
-                error = min(error, abs(error - 2 * Fraction(math.pi))) if "heading" in element else error
-                assert error <= bound, element
-                share = max(share, float(error / bound) if bound else 0.0)
-    assert share > 0.02 or name in AXES, "the bound is of the size of the errors; a permutation has none"
-
-
-@pytest.mark.parametrize("name", SOME_FIRST)
-def test_all_targets_compute_the_same(name, rng):
-    for word in (32,) if name in SOME else (16, 32):
-        in_c, model = (
-            strapgen.evaluator(name, backend, settings(name, word))
-            for backend in (f"c-fixed{word}", "fixed-model")
-        )
-        integers = proper_inputs(name, model, 60, rng)
-        for one, other in zip(
-            in_c.run(integers, in_c.fresh(60)), model.run(integers, model.fresh(60)), strict=True
-        ):
-            for array, same in zip(*map(np.atleast_1d, (one, other)), strict=True):
-                np.testing.assert_array_equal(array, same)
-    inputs = [
-        (array * float(argument.format.unit)).reshape(60, *argument.signal.shape)
-        for argument, array in zip(model.interface.inputs, integers, strict=True)
-    ]
-    expected = strapgen.evaluator(name)(*inputs)
-    for backend in ("c",) if name in SOME else ("c", "c-float"):
-        evaluator = strapgen.evaluator(name, backend)
-        results = evaluator(*(array.astype(evaluator.dtype) for array in inputs))
-        pairs = (
-            [(results, expected)] if not isinstance(results, tuple) else zip(results, expected, strict=True)
-        )
-        for signal, (one, other) in zip(program(Choice(name)).outputs, pairs, strict=True):
-            largest = max(np.abs(other).max(), *(np.abs(array).max() for array in inputs[-3:]))
-            # Sums of up to 64 products; rounding of the inputs to float among them.
-            error = apart(signal.signal.name, one.astype(float), other).max()
-            assert error <= 64 * np.finfo(evaluator.dtype).eps * largest, signal.signal.name
-    assert sources_of_program(program(Choice(name)), "numpy", None).function.name == name.replace("-", "_")
 
 
 @pytest.mark.long

@@ -7,10 +7,10 @@ import pytest
 import sympy
 
 from strapgen import derive, lower
-from strapgen.fixedpoint.floating.propagation import moved
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder
+from strapgen.navigation.systems.error_propagation import moved
 
 
 @pytest.mark.parametrize("kernel", ["euler-product", "coriolis-gravity", "dcm-velocity-2"])

@@ -1,0 +1,113 @@
+"""The layout of help: plain text as wide as the terminal. It is imported without the library of the command line."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+#: Narrowest and widest help in characters.
+_NARROWEST, _WIDEST = 40, 100
+#: A space at which no line ends, and the longest remark in brackets that is on one line.
+_SPACE, _MOST_REMARK = "\0", 30
+#: Widest column of options; the help of a longer one begins on the next line.
+_MOST_OPTION = 26
+
+
+class CommandHelp(NamedTuple):
+    """The help of a command before it is laid out."""
+
+    usage: str  # the command with its arguments, as it is typed
+    paragraphs: tuple[str, ...]  # the text without its examples, each paragraph in one line
+    examples: tuple[str, ...]  # whole commands, each in one line
+    panels: Mapping[str, Sequence[tuple[str, str]]]  # arguments and options with their help, by group
+
+
+def lay_out(parts: CommandHelp, commands: Mapping[str, Mapping[str, str]]) -> str:
+    """Return the text of a help; `commands` are those of a group with their summaries, by heading."""
+    lines = [*_filled(f"Usage: {parts.usage}", "", "       "), "", *_text(parts)]
+    labels = [label for rows in parts.panels.values() for label, _ in rows]
+    width = min(_MOST_OPTION, _width() // 3, max(map(len, labels)))
+    for title, rows in parts.panels.items():
+        lines += ["", f"{title}:", *_definitions(rows, width)]
+    width = max((len(name) for summaries in commands.values() for name in summaries), default=0)
+    for heading, summaries in commands.items():
+        lines += ["", f"{heading}:", *_definitions([*summaries.items()], width)]
+    return "\n".join(lines)
+
+
+def summary(text: str) -> str:
+    """Return the first sentence of a help text, without its full stop."""
+    first = " ".join(text.strip().split("\n\n")[0].split())
+    return re.split(r"\.(?: |$)", first)[0]
+
+
+def _definitions(rows: Sequence[tuple[str, str]], width: int) -> list[str]:
+    """Return terms with their explanations beside them, or below a term that is too long."""
+    lines: list[str] = []
+    rest = " " * (width + 4)
+    for term, meaning in rows:
+        fits = len(term) <= width
+        head = f"  {term}{' ' * (width - len(term))}  " if fits else rest
+        lines += ([] if fits else [f"  {term}"]) + (_filled(meaning, head, rest) or [head.rstrip()])
+    return lines
+
+
+def _text(parts: CommandHelp) -> list[str]:
+    """Return the paragraphs of a help text, the examples under a heading of their own at its end."""
+    lines: list[str] = []
+    for part in parts.paragraphs:
+        lines += ["", *_filled(part, "  ", "  ")]
+    if parts.examples:
+        lines += ["", "Examples:" if len(parts.examples) > 1 else "Example:"]
+    for command in parts.examples:
+        lines += ["", *_command_lines(command)]
+    return lines[1:]
+
+
+def _unbroken(remark: str, room: int) -> str:
+    """Return a remark in which no line ends, if it is short enough."""
+    return remark.replace(" ", _SPACE) if len(remark) <= room else remark
+
+
+def _command_lines(command: str) -> list[str]:
+    """Return a command on lines that end in a backslash where it goes on; an option and its values stay together."""
+    width = _width() - 2
+    lines = [" "]
+    for chunk in _chunks(command):
+        if len(lines[-1]) + 1 + len(chunk) > width and lines[-1].strip():
+            lines[-1] += " \\"
+            lines.append("   ")
+        lines[-1] += f" {chunk}"
+    return lines
+
+
+def _chunks(command: str) -> Iterator[str]:
+    chunk: list[str] = []
+    for word in command.split():
+        if word.startswith("--") and chunk:
+            yield " ".join(chunk)
+            chunk = []
+        chunk.append(word)
+    yield " ".join(chunk)
+
+
+def _filled(text: str, first: str, rest: str) -> list[str]:
+    """Return a text in lines as wide as the terminal; names with hyphens stay whole."""
+    room = min(_MOST_REMARK, _width() - len(rest))
+    whole = re.sub(r"\[(?:default|required)[^]]*\]", lambda m: _unbroken(m[0], room), text)
+    lines = textwrap.wrap(
+        whole,
+        _width(),
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+    return [line.replace(_SPACE, " ") for line in lines]
+
+
+def _width() -> int:
+    return max(_NARROWEST, min(_WIDEST, shutil.get_terminal_size().columns))

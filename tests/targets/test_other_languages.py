@@ -1,0 +1,230 @@
+"""C++ and Rust: the bits and integers of the C, its contract, and what is told where a compiler is missing or fails."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import run
+from languages import DOUBLE, SAMPLES, check_lines
+
+from strapgen import catalogue, pipeline
+from strapgen.catalogue import Choice
+from strapgen.ir.exceptions import CompilerError, InputError
+from strapgen.ir.fixed_settings import Settings
+from strapgen.run import compiler
+from strapgen.run.backends import of_sources
+from strapgen.run.evaluators import Evaluator
+from strapgen.targets.contract_lines import Contract
+
+#: The compiler that each target needs, and the target whose bits it has.
+TARGETS = {
+    **{"cpp": ("c++", "c"), "cpp-float": ("c++", "c-float"), "cpp-fixed": ("c++", "c-fixed")},
+    **{"rust": ("rustc", "c"), "rust-float": ("rustc", "c-float"), "rust-fixed": ("rustc", "c-fixed")},
+}
+FLOATING = [
+    pytest.param(name, marks=pytest.mark.needs(TARGETS[name][0])) for name in TARGETS if "fixed" not in name
+]
+FIXED = [pytest.param(name, marks=pytest.mark.needs(TARGETS[name][0])) for name in TARGETS if "fixed" in name]
+#: Words, what is carried, rounding and products: each value once.
+SETTINGS = [
+    Settings(word=32),
+    Settings(word=16, carry="all", rounding="truncation"),
+    Settings(word=64, multiply="shift-add"),
+    Settings(word=64, carry="full"),
+]
+#: Kernels with roots, quotients, selections, products of wide numbers, several outputs and scalars.
+SOME = [("euler",), ("dcm-orthonormalize-optimal",), ("euler-from-dcm",), ("euler-normalize",)]
+
+
+def both(choices: Sequence[Choice], target: str, settings: Settings | None = None) -> list[list[Evaluator]]:
+    """Return each kernel on a target and in C, compiled as one library."""
+    sources = [
+        [pipeline.compile(c, name, settings) for name in (target, TARGETS[target][1])] for c in choices
+    ]
+    compiler.compile_together(one for pair in sources for one in pair)
+    return [[of_sources(one) for one in pair] for pair in sources]
+
+
+def check_bits(choices: Sequence[Choice], target: str, rng: np.random.Generator) -> None:
+    differing = []
+    for one, reference in both(choices, target):
+        shapes = [(SAMPLES, *signal.shape) for signal in one.function.inputs]
+        samples = [rng.uniform(-0.3, 0.3, shape).astype(one.dtype) for shape in shapes]
+        results = [evaluator.evaluate(samples, (SAMPLES,)) for evaluator in (one, reference)]
+        if any(a.tobytes() != b.tobytes() for a, b in zip(*results, strict=True)):
+            differing.append(one.kernel)
+    assert differing == []
+
+
+@pytest.mark.parametrize("target", [case for case in FLOATING if "float" not in case.values[0]])
+def test_some_kernels_have_the_bits_of_c(target, rng):
+    check_bits([catalogue.choose(*words) for words in DOUBLE], target, rng)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("target", FLOATING)
+def test_every_kernel_has_the_bits_of_c(target, rng):
+    check_bits(catalogue.standard(), target, rng)
+
+
+def answer(evaluator: Evaluator, sample: list[np.ndarray]) -> bytes | str:
+    """Return what a function makes of a sample: its outputs and residuals, or why it refuses."""
+    try:
+        outputs, residuals = evaluator.run(sample, evaluator.fresh(1))
+    except InputError as error:
+        return str(error)
+    return b"".join(array.tobytes() for array in (*outputs, residuals))
+
+
+def check_integers(
+    choices: Sequence[Choice], target: str, settings: Settings, rng: np.random.Generator
+) -> None:
+    accepted = 0
+    for evaluators in both(choices, target, settings):
+        ranges = [(a.low, a.high, a.signal.size) for a in evaluators[0].interface.inputs]
+        samples = [
+            [rng.integers(low, high, size=(1, size)) for low, high, size in ranges] for _ in range(SAMPLES)
+        ]
+        one, reference = ([answer(evaluator, sample) for sample in samples] for evaluator in evaluators)
+        assert one == reference, evaluators[0].kernel
+        accepted += sum(isinstance(result, bytes) for result in one)
+    assert accepted > SAMPLES * len(choices) / 4
+
+
+@pytest.mark.parametrize("target", FIXED)
+def test_some_kernels_have_the_integers_of_c(target, rng):
+    settings = SETTINGS[1] if target == "cpp-fixed" else SETTINGS[0]
+    choices = [catalogue.choose(*words) for words in SOME]
+    check_integers([choice for choice in choices if can_lower(choice, settings)], target, settings, rng)
+
+
+@pytest.mark.long
+@pytest.mark.every_combination
+@pytest.mark.parametrize("settings", SETTINGS, ids=lambda s: f"{s.word}-{s.carry}-{s.rounding}-{s.multiply}")
+@pytest.mark.parametrize("target", FIXED)
+def test_every_kernel_has_the_integers_of_c(target, settings, rng):
+    choices = [choice for choice in catalogue.standard() if can_lower(choice, settings)]
+    assert len(choices) >= 30
+    check_integers(choices if settings.word == 32 else choices[::3], target, settings, rng)
+
+
+def can_lower(choice: Choice, settings: Settings) -> bool:
+    try:
+        pipeline.fixed_program(choice, settings)
+    except InputError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_contract_is_that_of_the_c_but_for_the_command(target):
+    choice, settings = catalogue.choose("euler"), Settings(word=32) if "fixed" in target else None
+    (text,) = pipeline.compile(choice, target, settings).step_files.values()
+    in_c = pipeline.compile(choice, TARGETS[target][1], settings).files
+    (other,) = (in_c[name] for name in in_c if name.endswith(".h") and "_runs" not in name)
+    assert Contract.read(text).items == Contract.read(other).items
+    assert Contract.read(text).digest != Contract.read(other).digest
+    assert ("-ffp-contract" in text) == (target in ("cpp", "cpp-float"))
+
+
+def written(folder: Path, target: str, settings: Settings) -> list[str]:
+    """Write the files of some kernels without their loops; return their names."""
+    names = []
+    for choice in (choice for choice in catalogue.standard()[::4] if can_lower(choice, settings)):
+        sources = pipeline.compile(choice, target, settings)
+        check_lines(sources)
+        for name, text in sources.step_files.items():
+            (folder / name).write_text(text)
+            names.append(name)
+    assert len(names) >= 5
+    return names
+
+
+@pytest.mark.needs("c++")
+def test_headers_stand_in_one_program_of_a_strict_compiler(tmp_path):
+    names = [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "cpp-fixed", s)]
+    (tmp_path / "main.cpp").write_text("".join(f'#include "{name}"\n' for name in names) + "int main() {}\n")
+    strict = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wold-style-cast", "-Werror")
+    command = ["c++", "-std=c++17", *strict, "-fsyntax-only", "main.cpp"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert said.returncode == 0, said.stderr
+
+
+@pytest.mark.needs("rustc")
+def test_modules_stand_in_one_crate_of_a_strict_compiler(tmp_path):
+    names = [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "rust-fixed", s)]
+    modules = "".join(f"pub mod {name.removesuffix('.rs')};\n" for name in names)
+    (tmp_path / "lib.rs").write_text(f"#![no_std]\n{modules}")
+    command = ["rustc", "--edition=2021", "--crate-type=rlib", "-Dwarnings", "-Cpanic=abort", "lib.rs"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert said.returncode == 0, said.stderr
+
+
+#: Processors without an instruction for the product of two words take four products of half words.
+SMALL = "-D__ARM_ARCH_6M__"
+
+
+@pytest.mark.needs("c++")
+@pytest.mark.parametrize(("right", "flags"), [(True, ()), (False, ()), (True, (SMALL,)), (False, (SMALL,))])
+def test_a_step_of_c_plus_plus_is_a_constant_expression(tmp_path, right, flags):
+    choice, settings = catalogue.choose("euler"), Settings(word=32)
+    sources = pipeline.compile(choice, "cpp-fixed", settings)
+    (name,) = sources.step_files
+    (tmp_path / name).write_text(sources.files[name])
+    reference = of_sources(pipeline.compile(choice, "c-fixed", settings))
+    state, increments = [0, 0, 0, 1 << 30], [1 << 20, 0, 0, 1 << 21, 0, 0]
+    (outputs, _) = reference.run([np.array([state]), np.array([increments])], reference.fresh(1))
+    expected = int(outputs[0][0, 0]) + (not right)
+    (tmp_path / "main.cpp").write_text(
+        f'#include "{name}"\n'
+        "constexpr std::int32_t first()\n{\n    std::array<std::int32_t, 4> next{};\n"
+        f"    const int status = strapgen::{sources.function.name}({{{{{', '.join(map(str, state))}}}}},\n"
+        f"        {{{{{', '.join(map(str, increments))}}}}}, next);\n    return status == 0 ? next[0] : 0;\n}}\n"
+        f"static_assert(first() == {expected});\n"
+    )
+    command = ["c++", "-std=c++17", "-fsyntax-only", *flags, "main.cpp"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (said.returncode == 0) == right, said.stderr
+    assert right or "static assertion failed" in said.stderr
+
+
+#: A step that no other test compiles: what is loaded already needs no compiler.
+SIMULATE = (
+    "simulate euler --method rk1 --increments 7 --motion constant --set x_deg_s=1 --step 1 --duration 2"
+)
+
+
+@pytest.mark.parametrize(
+    ("backend", "variable", "said"),
+    [
+        ("cpp", "CXX", "no C++ compiler: 'none' is not on the PATH; install g++ (or set CXX)"),
+        ("rust", "RUSTC", "no Rust compiler: 'none' is not on the PATH; install rustc (or set RUSTC)"),
+        ("octave", "OCTAVE", "no Octave: 'none' is not on the PATH; install octave (or set OCTAVE)"),
+    ],
+)
+def test_a_program_that_is_missing_is_named_in_one_line(backend, variable, said, monkeypatch, capsys):
+    monkeypatch.setenv(variable, "none --some-option")
+    run([*SIMULATE.split(), "--backend", backend], 2)
+    assert capsys.readouterr().err == f"strapgen: {said}, or use the numpy back end\n"
+
+
+@pytest.mark.parametrize(
+    ("target", "call", "said"),
+    [
+        pytest.param("cpp", "std::sqrt(", "sqroot", marks=pytest.mark.needs("c++")),
+        pytest.param("rust", "unsafe { sqrt(", "error", marks=pytest.mark.needs("rustc")),
+    ],
+)
+def test_what_does_not_compile_is_told_in_one_line(target, call, said):
+    sources = pipeline.compile(catalogue.choose("euler-normalize"), target)
+    broken = {
+        name: text.replace(call, call.replace("sqrt", "sqroot")) for name, text in sources.files.items()
+    }
+    with pytest.raises(CompilerError, match=f"failed on euler-normalize: .*{said}") as caught:
+        of_sources(replace(sources, files=broken))
+    assert "\n" not in str(caught.value)
