@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from copy import deepcopy
 from fractions import Fraction
 from functools import cache, wraps
 from pathlib import Path
@@ -54,10 +53,10 @@ def _once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return call
 
 
-_coefficients, _filters, _window_data = (
+_coefficients, _filters, _window_result = (
     _once(coning.design),
     _once(family.design),
-    cache(window_report.window_data),
+    cache(window_report.WindowResult.of),
 )
 _figures = _once(coning_reports.ShapedDrift.figures)
 _draw, _entries = figures.image, thesis_tables.entries
@@ -123,6 +122,6 @@ def shared_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coning, "design", _coefficients)
     monkeypatch.setattr(family, "design", _filters)
     monkeypatch.setattr(coning_reports.ShapedDrift, "figures", lambda drift: dict(_figures(drift)))
-    monkeypatch.setattr(window_report, "window_data", lambda filters: deepcopy(_window_data(filters)))
+    monkeypatch.setattr(window_report.WindowResult, "of", staticmethod(_window_result))
     monkeypatch.setattr(UnknownTableau, "solve", lambda self, equations="general": _solve(self, equations))
     monkeypatch.setattr(figures, "image", _image)

@@ -87,8 +87,14 @@ def test_the_command_runs(followed):
 
 
 def test_the_study_runs(followed):
-    (printed,) = followed(SECTIONS["study"])
-    assert json.loads(printed) == {"kernel": "euler-rk4-2", "multiply_per_s": 38 * 400, "add_per_s": 30 * 400}
+    printed, schema = map(json.loads, followed(SECTIONS["study"]))
+    assert printed == {
+        "schema": "strapgen/load/1",
+        "kernel": "euler-rk4-2",
+        "multiply_per_s": 38 * 400,
+        "add_per_s": 30 * 400,
+    }
+    assert schema["properties"]["add_per_s"]["unit"] == "1/s"
 
 
 def test_the_kernel_is_generated(followed, tmp_path):

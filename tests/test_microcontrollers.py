@@ -17,7 +17,7 @@ from derived import FIXED_POINT
 from strapgen import pipeline
 from strapgen.lab.cost import cost
 from strapgen.lab.cost.cost import EVERYWHERE, REFERENCE, Cost
-from strapgen.lab.cost.cost_report import catalogue_report
+from strapgen.lab.cost.cost_report import CostResult
 from strapgen.lab.cost.processors import PROCESSORS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -98,7 +98,7 @@ def rows() -> Iterator[Cost]:
 
 def test_the_page_of_the_catalogue_has_all_kernels_and_processors():
     costs = [*rows()]
-    assert catalogue_report(costs).written("markdown") + "\n" == COST.read_text()
+    assert CostResult(costs, of_catalogue=True).written("markdown") + "\n" == COST.read_text()
     assert [one.kernel for one in costs if one.cpu == REFERENCE] == [choice.kernel for choice in FIXED_POINT]
     for cpu in PROCESSORS.keys() - {REFERENCE}:
         assert {one.kernel for one in costs if one.cpu == cpu} == {*EVERYWHERE}

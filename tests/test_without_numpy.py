@@ -20,7 +20,7 @@ HEAD = f"import json, sys\nfor name in {MISSING!r}:\n    sys.modules[name] = Non
 PROGRAM = """
 import strapgen
 from strapgen.analysis.error_analysis.error_analysis import analyse
-from strapgen.analysis.error_analysis.series_report import series_report
+from strapgen.analysis.error_analysis.series_report import SeriesResult
 from strapgen.results.display.formulas import as_latex
 from strapgen.fixedpoint.floating import proved
 
@@ -36,7 +36,7 @@ print(json.dumps({{
     "operations": program.operations,
     "files": {{t: strapgen.generate(program, t).files for t in ("numpy", "c")}},
     "unproved": unproved,
-    "series": series_report([analysis]).text(),
+    "series": SeriesResult([analysis]).text(),
     "drift": rates._asdict(),
 }}))
 """

@@ -7,7 +7,7 @@ own by an entry point of the group `GROUP`. Nothing else knows which there are.
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -49,6 +49,24 @@ class Command(NamedTuple):
     summary: str = ""
 
 
+class Schema(NamedTuple):
+    """A JSON Schema: that of a "result", or of a "file" of a user's, and what has it."""
+
+    kind: str
+    #: "module:name" of a class with a method `schema`, or of a function that returns the schema
+    place: str
+    #: The installed package that brings it
+    point: EntryPoint | None = None
+
+    def read(self) -> dict[str, Any]:
+        """Return the schema."""
+        holder: Any = load(self.place) if self.point is None else loaded(self.point, self.place)
+        if isinstance(holder, InputError):
+            raise holder
+        read: Callable[[], dict[str, Any]] = holder.schema if hasattr(holder, "schema") else holder
+        return read()
+
+
 @dataclass(frozen=True)
 class Registration:
     """What a folder or a package brings; every place is a text "module:name", imported when it is used.
@@ -76,6 +94,8 @@ class Registration:
     lists : mapping of str to str, optional
         Functions without arguments that return names with their meanings, by the kind under which ``strapgen list``
         shows them.
+    results : mapping of str to str, optional
+        Results of its commands, subclasses of `strapgen.results.result.Result`, by the names of their JSON Schemas.
     extensions : mapping of str to str, optional
         What it adds to others, by the extension point that the compiler or another application defines, such as
         "lab.described".
@@ -96,6 +116,7 @@ class Registration:
     backends: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     lists: Mapping[str, str] = field(default_factory=dict)
+    results: Mapping[str, str] = field(default_factory=dict)
     extensions: Mapping[str, str] = field(default_factory=dict)
     requires: tuple[str, ...] = ()
 
@@ -205,7 +226,8 @@ def broken() -> list[str]:
         parts: list[Any] = [one]
         if isinstance(one, Registration):
             parts += [loaded(point, place, kind) for kind in KINDS for place in getattr(one, kind)]
-            parts += [loaded(point, place) for place in [*one.lists.values(), *one.extensions.values()]]
+            others = (one.lists, one.results, one.files, one.extensions)
+            parts += [loaded(point, place) for names in others for place in names.values()]
             parts += [_function(point, one, name) for name in one.commands]
         lines += [str(part) for part in parts if isinstance(part, InputError)][:1]
     return lines
@@ -247,3 +269,14 @@ def lists() -> dict[str, dict[str, str]]:
             except InputError as error:
                 kinds.setdefault(kind, {place: f"cannot be used: {error}"})
     return kinds
+
+
+def schemas() -> dict[str, Schema]:
+    """Return the JSON Schemas: of results by name, and of users' files as "<kind>.toml"."""
+    found: dict[str, Schema] = {}
+    installed = ((point, one) for point, one in read() if isinstance(one, Registration))
+    for entry, one in [*((None, one) for one in built_in().values()), *installed]:
+        for kind, end, places in (("result", "", one.results), ("file", ".toml", one.files)):
+            for name, place in places.items():
+                found.setdefault(f"{name}{end}", Schema(kind, place, entry))
+    return found

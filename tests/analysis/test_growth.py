@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.analysis.growth.growth import contraction, growth, stability
-from strapgen.analysis.growth.growth_report import stability_text
+from strapgen.analysis.growth.growth_report import StabilityResult
 from strapgen.analysis.series.constant_rate import constant_rate
 from strapgen.analysis.series.motion_rates import TIME, model, parameters
 from strapgen.catalogue import ALGORITHMS, choose, choose_step
@@ -92,7 +92,9 @@ def test_runs_grow_as_the_stretch_says(angle):
 
 
 def test_report():
-    text = stability_text([stability(choose("dcm", method, 2)) for method in ("rk1", "rk4", "magnus4")])
+    text = StabilityResult(
+        [stability(choose("dcm", method, 2)) for method in ("rk1", "rk4", "magnus4")]
+    ).text()
     assert "nowhere" in text
     assert "0 to 2.828" in text
     assert "kept" in text

@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 from strapgen.analysis.error_analysis.overview import choices, methods, overview
-from strapgen.analysis.error_analysis.overview_report import overview_text
+from strapgen.analysis.error_analysis.overview_report import OverviewResult
 from strapgen.catalogue import METHODS, choose
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES
@@ -24,8 +24,8 @@ def test_rows():
     assert magnus.constant is None
     assert magnus.contractive == "kept"
     # At the step where 544 operations a second do, 68 operations take 1/8 s.
-    assert fourth.at_equal_work == fourth.coning_rate()
-    text = overview_text(rows)
+    assert fourth.drift_at_equal_work_deg_h == fourth.coning_drift_deg_h
+    text = OverviewResult(rows).text()
     assert "1/1920 x^5" in text
     assert "1/12 w0 x w1" in text
     data = json.loads(json.dumps([row.as_dict() for row in rows]))

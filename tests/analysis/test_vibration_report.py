@@ -11,10 +11,11 @@ from strapgen.analysis.vibration import Rates, assessment
 from strapgen.analysis.vibration.vibration_report import (
     AssessedCase,
     CaseRates,
-    vibration_data,
+    vibration_rates,
     vibration_text,
 )
 from strapgen.ir.exceptions import InputError
+from strapgen.results.records import plain
 
 RATES = Rates(1e-5, 2e-5, 1e-5)
 
@@ -39,9 +40,9 @@ def test_rates_stand_under_their_heads(cycles, quadrature):
 
 def test_data_has_both_quantities_of_an_algorithm_in_one_object():
     cases = [case("dcm", "rk1", 1, quantity=quantity) for quantity in ("drift", "sculling")]
-    (data,) = vibration_data([CaseRates(one, RATES) for one in cases])
+    (data,) = map(plain, vibration_rates([CaseRates(one, RATES) for one in cases]))
     assert {"error_rad_s", "error_m_s2", "drift_closed_form", "sculling_closed_form"} <= set(data)
-    (random,) = vibration_data([CaseRates(cases[0], RATES, RATES)])
+    (random,) = map(plain, vibration_rates([CaseRates(cases[0], RATES, RATES)]))
     assert "error_quadrature_rad_s" in random
     assert not any(name.endswith("closed_form") for name in random)
 

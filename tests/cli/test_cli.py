@@ -166,7 +166,7 @@ def test_version_names_all_that_shapes_the_output(strapgen_says):
 def test_list(strapgen_says):
     data = json.loads(strapgen_says("list --format json"))
     kinds = ["algorithms", "methods", "vectors", "kernels", "systems", "motions", "targets", "backends"]
-    assert list(data) == kinds
+    assert list(data) == ["schema", *kinds]
     assert list(data["algorithms"]) == ["dcm", "euler", "cayley-klein"]
     assert list(data["methods"].items()) == list(catalogue.METHODS.items())
     assert data["vectors"].keys() == catalogue.VECTORS.keys()
@@ -345,7 +345,7 @@ def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
 @pytest.mark.long
 def test_vibration_of_several(strapgen_says, tmp_path):
     several = f"vibration euler --method rk2,rk4 --increments 1,2 {ONE}"
-    data = json.loads(strapgen_says(f"{several} --format json"))
+    data = json.loads(strapgen_says(f"{several} --format json"))["results"]
     assert [(one["kernel"], one["increments"]) for one in data] == [
         (f"euler-{method}-{count}", count) for method in ("rk2", "rk4") for count in (1, 2)
     ]
@@ -470,6 +470,7 @@ def test_derive_program(strapgen_says):
 def test_derive_json(show, strapgen_says):
     data = json.loads(strapgen_says(f"derive euler --show {show} --format json"))
     wanted = [
+        "schema",
         "kernel",
         "title",
         "source",
@@ -636,7 +637,7 @@ def test_generate_all_as_json(strapgen_says, tmp_path, monkeypatch):
     few = [derived.program(Choice(*choice)) for choice in (("euler", "rk4", 2), ("dcm-product",))]
     monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))  # of all, in tests/library
     data = json.loads(strapgen_says("generate --all --out out --format json"))
-    assert list(data) == ["files"]
+    assert list(data) == ["schema", "files"]
     written = {str(path.relative_to(tmp_path)) for path in (tmp_path / "out").rglob("*") if path.is_file()}
     assert set(data["files"]) == written
     assert strapgen_says("generate --all --check --out out").endswith(f"{len(written)} files, in step\n")
@@ -666,7 +667,7 @@ def test_simulate_json(backend, motion, settings, strapgen_says):
     )
     data = json.loads(said, parse_constant=pytest.fail)
     assert list(data) == [
-        *("algorithm", "method", "increments", "backend", "motion", "step_s", "duration_s"),
+        *("schema", "algorithm", "method", "increments", "backend", "motion", "step_s", "duration_s"),
         *("time_s", "scale", "skew_deg", "drift_deg", "mean_drift_deg"),
     ]
     named = {"algorithm": "euler", "method": "rk4", "increments": 2, "backend": backend, "motion": motion}
@@ -831,7 +832,7 @@ def test_recorded_rates(strapgen_says):
     options = f"--rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s --resample-hz 100"
     data = json.loads(strapgen_says(f"simulate dcm {options} --record 0.5 --orthonormalize 1 --format json"))
     assert list(data) == [
-        *("algorithm", "method", "increments", "backend", "source"),
+        *("schema", "algorithm", "method", "increments", "backend", "source"),
         *("step_s", "duration_s", "unused_increments", "elements", "time_s", "attitude"),
     ]
     assert data["source"] == f"{DATA}/rates_uneven.csv"

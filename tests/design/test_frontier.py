@@ -13,7 +13,7 @@ from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.design.frontier import frontier
 from strapgen.design.frontier.frontier import CANDIDATES, MOTIONS, Candidate, candidates, in_order, pareto
 from strapgen.design.frontier.frontier_plot import frontier_image
-from strapgen.design.frontier.frontier_report import frontier_report
+from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.simulate import drift
 
@@ -157,7 +157,7 @@ def test_a_users_motion_stands_alone():
     standings = in_order(frontier.frontier(several, "100", "2", jobs=1, motions=mine), several)
     assert all(list(one.drifts) == ["coning"] for one in standings)
     assert standings[1].drifts["coning"] < 1e-5 * standings[0].drifts["coning"]  # orders 1 and 4 at 1/50 rad
-    report = frontier_report(standings, 100.0, 2.0, mine)
+    report = FrontierResult(standings, 100.0, 2.0, mine)
     data = json.loads(report.written("json"))
     assert data["motions"] == {"coning": {"motion": "coning", **mine["coning"][1]}}
     assert report.written("csv").splitlines()[0].endswith(",multiply_per_s,coning deg/h")
@@ -192,7 +192,7 @@ def test_the_frontier_is_what_nothing_undercuts():
 
 def test_reports_have_every_figure(study, tmp_path):
     _, _, standings = study
-    report = frontier_report(standings, 100.0, 2.0)
+    report = FrontierResult(standings, 100.0, 2.0)
     data = json.loads(report.written("json"))
     assert [row["algorithm"] for row in data["algorithms"]] == list(FEW)
     assert data["algorithms"][1]["drift_deg_h"] == standings[1].drifts
@@ -208,4 +208,4 @@ def test_reports_have_every_figure(study, tmp_path):
 @pytest.mark.long
 def test_the_plot_is_an_image(study, tmp_path):
     _, _, standings = study
-    assert frontier_image(standings, 100.0, "title", tmp_path / "a.png").startswith(b"\x89PNG")
+    assert frontier_image(FrontierResult(standings, 100.0, 2.0), tmp_path / "a.png").startswith(b"\x89PNG")

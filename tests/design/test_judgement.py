@@ -306,5 +306,5 @@ def test_the_command_prints_the_promised_json(capsys):
     assert stop.value.code in (0, None)
     rows = json.loads(capsys.readouterr().out)
     assert [row["meets"] for row in rows] == [True, True, False, False]
-    assert list(rows[0])[:5] == ["name", "meets", "binding", "drift_deg_h", "operations_per_s"]
+    assert {"name", "meets", "binding", "drift_deg_h", "operations_per_s"} <= rows[0].keys()
     assert tuple(rows[0]["drift_deg_h"]) == CAUSES

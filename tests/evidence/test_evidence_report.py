@@ -6,7 +6,7 @@ import json
 import re
 from dataclasses import replace
 
-from strapgen.evidence.evidence_report import evidence_page, evidence_report, summary, without_versions
+from strapgen.evidence.evidence_report import EvidenceResult, evidence_page, summary, without_versions
 from strapgen.evidence.verdicts import Verdict, failures
 
 _ALARM = Verdict("dcm_w32", "no overflow: x86_64", "Frama-C Eva", "25.0", "fails", 1.25, "2 alarms")
@@ -22,16 +22,16 @@ def test_a_proof_by_one_tool_makes_up_for_alarms_of_another():
 
 
 def test_json_has_the_keys_that_programs_read():
-    rows = json.loads(evidence_report([_ALARM, _BEYOND, _MISSING]).written("json"))
+    rows = json.loads(EvidenceResult([_ALARM, _BEYOND, _MISSING]).written("json"))
     assert [{*row} for row in rows] == [
-        {"kernel", "claim", "tool", "version", "result", "seconds", "detail"}
+        {"schema", "kernel", "claim", "tool", "version", "result", "seconds", "detail"}
     ] * 2
     assert rows[0]["seconds"] == 1.25
     assert rows[1]["result"] == "not installed"
 
 
 def test_the_text_says_claim_tool_result_time_and_why():
-    text = evidence_report([_ALARM, _PROOF, _BEYOND]).written("text")
+    text = EvidenceResult([_ALARM, _PROOF, _BEYOND]).written("text")
     assert "euler_w32, error bound: one step, Gappa 1.4: a quotient" in text
     assert re.search("no overflow: x86_64 +Frama-C Eva +fails", text)
     assert "2 alarms" in text

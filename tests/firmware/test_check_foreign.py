@@ -16,7 +16,7 @@ from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.firmware.check_code import coning_causes as causes
 from strapgen.firmware.check_code.check_foreign import check_foreign
 from strapgen.firmware.check_code.cone import closed_form_deg_h, cone
-from strapgen.firmware.check_code.conformance_report import outcome_report
+from strapgen.firmware.check_code.conformance_report import ForeignResult
 from strapgen.firmware.check_code.foreign_arguments import read_arguments
 from strapgen.firmware.check_code.foreign_bridge import ForeignSource
 from strapgen.firmware.check_code.replacement import FIRST_ORDER
@@ -173,9 +173,9 @@ def test_a_fault_is_seen_and_named(name):
     outcome = check_foreign(example(name))
     assert (outcome.holds, outcome.cause) == (False, FAULTS[name])
     assert failed(outcome) == (["runs"] if name == "state_kept.c" else ["coefficients", "order", "drift"])
-    data = json.loads(outcome_report(outcome, "integrator_update").written("json"))
-    old = ["file", "holds", "order", "drift_deg_h", "closed_form_deg_h", "cause", "checks"]
-    assert list(data) == [*old, "drift_by_axis_deg_h", "coefficients", "coefficient_ratio"]
+    data = json.loads(ForeignResult(outcome, "integrator_update").written("json"))
+    old = {"file", "holds", "order", "drift_deg_h", "closed_form_deg_h", "cause", "checks"}
+    assert data.keys() == old | {"schema", "drift_by_axis_deg_h", "coefficients", "coefficient_ratio"}
     assert math.hypot(*data["drift_by_axis_deg_h"]) == pytest.approx(outcome.drift_deg_h)
     assert {tuple(check) for check in data["checks"]} == {("name", "holds", "value")}
     # What the faults leave follows from the closed form: correction times factor.

@@ -15,7 +15,7 @@ import strapgen
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.compare import comparison
-from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
+from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
 from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
 from strapgen.targets.registry import BUILT_IN
 
@@ -107,15 +107,14 @@ def test_names_that_cannot_be_used(backends, reference, said):
 
 def test_the_three_forms_say_the_same(increments):
     rows = comparison.compare("euler", "rk4", 2, ["numpy", "c-fixed16"], increments)
-    report = comparison_report([ComparedKernel("euler-rk4-2", "title", rows)], "numpy", "drift")
+    report = ComparisonResult([ComparedKernel("euler-rk4-2", "title", rows)], "numpy", "drift")
     data = json.loads(report.written("json"))
-    assert [list(row)[:8] for row in data] == [
-        ["backend", "max_abs_rad", "rms_rad", "max_ulp", "bound_rad", "drift_deg", "ns_per_step", "bytes"]
-    ] * 2
+    keys = ["backend", "max_abs_rad", "rms_rad", "max_ulp", "bound_rad", "drift_deg", "ns_per_step", "bytes"]
+    assert [list(row)[:9] for row in data] == [["schema", *keys]] * 2
     table = list(csv.DictReader(io.StringIO(report.written("csv"))))
     for plain, cells in zip(data, table, strict=True):
         for key, value in plain.items():
-            if key != "operations":
+            if key not in ("schema", "operations"):
                 assert cells[key] == ("" if value is None else str(value))
         assert cells["multiply"] == str(plain["operations"]["multiply"])
     text = report.written("text")

@@ -19,7 +19,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.converge import convergence
 from strapgen.lab.converge.convergence import Convergence, Rung, converge
-from strapgen.lab.converge.convergence_report import convergence_report, convergence_text, ladder_table
+from strapgen.lab.converge.convergence_report import ConvergenceResult, ladder_table
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.
 WITHIN = 0.15
@@ -108,7 +108,7 @@ def test_rounding_that_hides_the_order_is_no_order(coning):
     found = converge(choose("euler", "rk4", 2), coning, ["1/64", "1/128", "1/256"], 1, "c-float")
     assert found.observed is None
     assert not any(rung.used for rung in found.rungs)
-    assert "rounding hides the order on c-float" in convergence_text([found], "title")
+    assert "rounding hides the order on c-float" in ConvergenceResult([found], "title").text()
 
 
 @pytest.mark.long
@@ -174,12 +174,12 @@ FOUND = Convergence(
 
 
 def test_reports_have_every_figure():
-    text = convergence_text([FOUND] * 5, "A title")
+    text = ConvergenceResult([FOUND] * 5, "A title").text()
     assert text.startswith("A title\n")
     assert text.count("euler-butcher6-3") == 10  # a heading and a note each, four side by side and one below
     assert "out of range" in text and "6.250e-04 (4.00)*" in text
     assert "method order 6, rate extraction order 3: the step is of order 4" in text
-    rows = list(csv.DictReader(io.StringIO(convergence_report([FOUND], "A title").written("csv"))))
+    rows = list(csv.DictReader(io.StringIO(ConvergenceResult([FOUND], "A title").written("csv"))))
     assert [row["error_rad"] for row in rows] == ["", "0.01", "0.000625"]
     assert {row["predicted_order"] for row in rows} == {"4"}
     data = json.loads(json.dumps(FOUND.as_dict()))

@@ -14,23 +14,30 @@ import pytest
 import strapgen
 from strapgen.analysis.vibration.curves import Curve
 from strapgen.analysis.vibration.vibration_plot import vibration_image
+from strapgen.analysis.vibration.vibration_report import VibrationResult
 from strapgen.design.frontier.frontier import MOTIONS, Standing
 from strapgen.design.frontier.frontier_plot import frontier_image
+from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.lab.compare.comparison import AngleHistory, Comparison
 from strapgen.lab.compare.comparison_plot import comparison_image
-from strapgen.lab.compare.comparison_report import ComparedKernel
+from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
 from strapgen.lab.converge.convergence import Convergence, Rung
 from strapgen.lab.converge.convergence_plot import convergence_image
+from strapgen.lab.converge.convergence_report import ConvergenceResult
 from strapgen.lab.recordings.recording import History
 from strapgen.lab.simulate.runs import Run, simulate
-from strapgen.lab.simulate.runs_plot import history_image, plot_run, run_image
+from strapgen.lab.simulate.runs_plot import history_image, run_image
+from strapgen.lab.simulate.runs_report import HistoryResult, RunResult
 from strapgen.navigation.rate_table.rate_table import Row
 from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
+from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 from strapgen.results import figures as drawing
 from strapgen.thesis.predicted_tables import PredictedEntry
+from strapgen.thesis.predicted_tables_report import PredictedTablesResult
 from strapgen.thesis.tables_plot import predicted_tables_image, thesis_tables_image
+from strapgen.thesis.tables_report import ThesisTablesResult
 from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES, TableEntry
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
@@ -65,7 +72,7 @@ def all_figures_are_closed():
 
 
 def test_nine_axes_show_the_nine_errors(run, figures):
-    run_image(run, "A title", "run.png")
+    run_image(RunResult({}, run, "A title"), "run.png")
     (figure,) = figures
     assert figure.get_suptitle() == "A title"
     assert len(figure.axes) == 9
@@ -87,8 +94,9 @@ def test_nine_axes_show_the_nine_errors(run, figures):
 @pytest.mark.parametrize(("shape", "grid"), [((3, 3), (3, 3)), ((4,), (4, 1))])
 def test_history_has_an_axis_for_each_element(shape, grid, figures, rng):
     states = rng.normal(size=(10, *shape))
-    elements = [f"element {k}" for k in range(states[0].size)]
-    history_image(History(np.arange(10.0), states, 1.0, 0), elements, "A title", "history.png")
+    elements = tuple(f"element {k}" for k in range(states[0].size))
+    history = History(np.arange(10.0), states, 1.0, 0, elements)
+    history_image(HistoryResult({}, history, "A title"), "history.png")
     (figure,) = figures
     assert figure.axes[0].get_gridspec().get_geometry() == grid
     for k, axes in enumerate(figure.axes):
@@ -102,7 +110,7 @@ def test_convergence_has_a_line_and_a_theory_for_each_algorithm(figures):
         Convergence("euler-rk4-2", "exact", Order(4, 4, 2, 4), rungs, 4.0),
         Convergence("mine", "exact", None, (Rung(0.5, None), *rungs[1:]), None),
     ]
-    convergence_image(found, "A title", "orders.png")
+    convergence_image(ConvergenceResult(found, "A title"), "orders.png")
     (figure,) = figures
     (axes,) = figure.axes
     curve, theory = axes.get_lines()[0], axes.get_lines()[3]
@@ -121,7 +129,7 @@ def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
         for label, part in (("one", 1e-9), ("two", -1e-8))
         for unit, true in (("rad/s", 1e-6), ("m/s^2", 1e-3))
     ]
-    vibration_image(curves, "A title", "vibration.png", 10.0)
+    vibration_image(VibrationResult([], [], "", curves, "A title", 10.0), "vibration.png")
     (figure,) = figures
     drift, acceleration = figure.axes
     assert (drift.get_ylabel(), acceleration.get_ylabel()) == (
@@ -135,7 +143,7 @@ def test_vibration_has_a_panel_for_drift_and_one_for_acceleration(figures):
         np.testing.assert_allclose(lines[2].get_ydata(), 1e-8 * hertz**3 * factor)
     assert len(figure.legends[0].get_texts()) == 3
     still = [("still", Curve("still", "rad/s", hertz, 0 * hertz, 0 * hertz))]
-    vibration_image(still, "Nothing moves", "vibration.png")
+    vibration_image(VibrationResult([], [], "", still, "Nothing moves"), "vibration.png")
 
 
 def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):
@@ -160,7 +168,7 @@ def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):
         ComparedKernel("mine", "mine: a run", [row("c", list(long))], 0.5),
         ComparedKernel("still", "still: a run", [row("c", [0.0])]),
     ]
-    comparison_image(kernels, "exact", "compare.png")
+    comparison_image(ComparisonResult(kernels, "exact", "drift"), "compare.png")
     (figure,) = figures
     first, second, _, unused = figure.axes
     assert first.get_title(loc="left") == "euler-rk4-2\na run" and not unused.get_visible()
@@ -220,7 +228,7 @@ def test_the_frontier_has_a_panel_a_motion_and_labels_for_the_best(figures):
         standing("good", 40, 1e-3),
         standing("lost", 50, None),
     ]
-    frontier_image(standings, 100.0, "title", "a.png")
+    frontier_image(FrontierResult(standings, 100.0, 2.0), "a.png")
     (figure,) = figures
     assert [axes.get_title("left") for axes in figure.axes][:2] == [
         "cone of 1 deg at 10 Hz",
@@ -254,13 +262,13 @@ def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figur
         for algorithm in ALGORITHMS
         for order, printed in zip(ORDERS, table.printed[algorithm], strict=True)
     ]
-    thesis_tables_image(entries, "tables.png")
+    thesis_tables_image(ThesisTablesResult(entries), "tables.png")
     predicted = [
         PredictedEntry(4, e.algorithm, e.order, 0.5, e.normalised, 0.5, 1.0, e.thesis, True)
         for e in entries
         if (e.table, e.backend) == (4, "numpy")
     ]
-    predicted_tables_image(predicted, "predicted.png")
+    predicted_tables_image(PredictedTablesResult(predicted, []), "predicted.png")
     whole, single = figures
     assert [axes.get_visible() for axes in whole.axes] == [True] * 5 + [False]
     for axes, table in zip(whole.axes, TABLES, strict=False):
@@ -298,7 +306,7 @@ def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures)
         for backend, column in drifts.items()
         for name, drift in zip(names, column, strict=True)
     ]
-    rate_table_image(rows, "20", "0.01", "rate.png")
+    rate_table_image(RateTableResult(rows, "20", "0.01"), "rate.png")
     (figure,) = figures
     for axes, motion in zip(figure.axes, ("linear", "oscillating"), strict=True):
         assert axes.get_title(loc="left").startswith(motion)
@@ -328,7 +336,7 @@ def test_image_is_of_the_kind_that_the_ending_says(name, head):
 
 @pytest.mark.long
 def test_a_run_is_drawn_into_a_file_in_a_new_folder(run, tmp_path):
-    path = plot_run(run, "A title", tmp_path / "new" / "run.png")
+    path = run.plot(tmp_path / "new" / "run.png", "A title")
     assert path == tmp_path / "new" / "run.png"
     assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
     assert [p.name for p in path.parent.iterdir()] == ["run.png"]
@@ -342,27 +350,27 @@ def test_unknown_ending(name):
 
 def test_nothing_is_written_for_an_unknown_ending(run, tmp_path):
     with pytest.raises(InputError, match=r"^plot .*: file type 'docx' is not known"):
-        plot_run(run, "A title", tmp_path / "run.docx")
+        run.plot(tmp_path / "run.docx", "A title")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_folder_that_cannot_be_written(run, figures, tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(InputError, match=r"cannot be written"):
-        plot_run(run, "A title", tmp_path / "file" / "run.png")
+        run.plot(tmp_path / "file" / "run.png", "A title")
 
 
 def test_without_matplotlib(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtraError, match=r"^plots need matplotlib: pip install 'strapgen\[plot\]'$"):
-        plot_run(run, "A title", tmp_path / "run.png")
+        run.plot(tmp_path / "run.png", "A title")
     assert issubclass(MissingExtraError, ImportError)
 
 
 def test_no_screen_is_needed(run, figures, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setenv("MPLBACKEND", "tkagg")
-    run_image(run, "A title", "run.png")
+    run_image(RunResult({}, run, "A title"), "run.png")
     assert pyplot.get_backend().lower() == "agg"
 
 

@@ -10,7 +10,7 @@ import pytest
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.rate_table.rate_table import MOTIONS, angles, stress
-from strapgen.navigation.rate_table.rate_table_report import rate_table_text
+from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 
 
 def test_both_motions_pass_the_vertical():
@@ -61,7 +61,7 @@ def test_two_speeds():
     names = [(backend, f"{name} two-speed") for name in ("dcm", "euler") for backend in ("numpy", "c")]
     assert [(row.backend, row.algorithm) for row in rows] == names * 2
     assert all(row.drift_deg < 1e-9 for row in rows)
-    text = rate_table_text(rows, "4", "0.01")
+    text = RateTableResult(rows, "4", "0.01").text()
     assert "oscillating; pitch up to" in text
 
 

@@ -12,8 +12,9 @@ import pytest
 
 import strapgen
 from strapgen.lab.recordings.recording import History
-from strapgen.lab.simulate import runs_report
 from strapgen.lab.simulate.runs import Run, simulate
+from strapgen.lab.simulate.runs_report import HistoryResult, RunMatrices, RunResult, history_table, run_table
+from strapgen.results.records import plain_record
 
 SETTINGS = {"algorithm": "dcm", "method": "rk1", "increments": 2, "backend": "numpy", "motion": "coning"}
 SETTINGS |= {"step_s": 0.125, "duration_s": 60.0}
@@ -36,8 +37,8 @@ def floats(table: list[dict[str, str]], *names: str) -> np.ndarray:
 
 
 def test_json_has_the_keys_in_their_order(run):
-    data = json.loads(json.dumps(runs_report.run_data(run, dict(SETTINGS)), allow_nan=False))
-    wanted = [*SETTINGS, "time_s", "scale", "skew_deg", "drift_deg", "mean_drift_deg"]
+    data = json.loads(json.dumps(RunResult(dict(SETTINGS), run).data(), allow_nan=False))
+    wanted = ["schema", *SETTINGS, "time_s", "scale", "skew_deg", "drift_deg", "mean_drift_deg"]
     assert list(data) == wanted
     assert data["time_s"] == run.time.tolist()
     assert data["scale"] == run.scale.tolist()
@@ -49,12 +50,12 @@ def test_json_has_the_keys_in_their_order(run):
 
 def test_settings_are_not_changed(run):
     settings = dict(SETTINGS)
-    runs_report.run_data(run, settings)
+    RunResult(settings, run).data()
     assert settings == SETTINGS
 
 
 def test_matrices_as_data(run):
-    data = json.loads(json.dumps(runs_report.matrices_data(run)))
+    data = json.loads(json.dumps(plain_record(RunMatrices.of(run))))
     assert list(data) == ["computed", "true", "difference", "error"]
     np.testing.assert_array_equal(data["computed"], run.computed)
     np.testing.assert_array_equal(data["true"], run.true)
@@ -63,7 +64,7 @@ def test_matrices_as_data(run):
 
 
 def test_csv_columns(run):
-    header = runs_report.run_table(run).as_csv().splitlines()[0].split(",")
+    header = run_table(run).as_csv().splitlines()[0].split(",")
     wanted = ["time_s", *(f"scale_{axis}" for axis in "xyz")]
     wanted += [f"{kind}_{axis}_deg" for kind in ("skew", "drift") for axis in "xyz"]
     wanted += [f"{kind}_{place}" for kind in ("computed", "true", "difference", "error") for place in PLACES]
@@ -71,7 +72,7 @@ def test_csv_columns(run):
 
 
 def test_csv_comes_back_bit_for_bit(run):
-    table = rows(runs_report.run_table(run).as_csv())
+    table = rows(run_table(run).as_csv())
     assert len(table) == len(run.time) == 121
     np.testing.assert_array_equal(floats(table, "time_s")[:, 0], run.time)
     np.testing.assert_array_equal(floats(table, *(f"scale_{axis}" for axis in "xyz")), run.scale)
@@ -83,13 +84,13 @@ def test_csv_comes_back_bit_for_bit(run):
 
 
 def lines_of(run: Run) -> list[str]:
-    return runs_report.run_text(run, dict(SETTINGS)).splitlines()
+    return RunResult(dict(SETTINGS), run).text().splitlines()
 
 
 def test_text_begins_with_the_settings(run):
     first = lines_of(run)[0]
     assert first == ", ".join(f"{key} {value}" for key, value in SETTINGS.items())
-    assert "scheme" not in runs_report.run_text(run, SETTINGS | {"scheme": None})
+    assert "scheme" not in RunResult(SETTINGS | {"scheme": None}, run).text()
 
 
 def test_text_shows_the_matrices_at_the_end(run):
@@ -143,11 +144,11 @@ NAMES = ("e_x", "e_y", "e_z", "e_s")
 @pytest.fixture
 def history(rng) -> History:
     states = rng.normal(size=(51, 4)).astype(np.float32)
-    return History(5 + 0.25 * np.arange(51), states, 0.125, 3)
+    return History(5 + 0.25 * np.arange(51), states, 0.125, 3, NAMES)
 
 
 def test_history_csv_comes_back(history):
-    table = rows(runs_report.history_table(history, NAMES).as_csv())
+    table = rows(history_table(history).as_csv())
     assert list(table[0]) == ["time_s", *NAMES]
     np.testing.assert_array_equal(floats(table, "time_s")[:, 0], history.time)
     np.testing.assert_array_equal(floats(table, *NAMES).astype(np.float32), history.states)
@@ -155,27 +156,27 @@ def test_history_csv_comes_back(history):
 
 def test_history_data(history):
     settings = {"algorithm": "euler", "source": "gyro.csv"}
-    data = json.loads(json.dumps(runs_report.history_data(history, NAMES, settings), allow_nan=False))
+    data = json.loads(json.dumps(HistoryResult(settings, history).data(), allow_nan=False))
     wanted = ["step_s", "duration_s", "unused_increments", "elements", "time_s", "attitude"]
-    assert list(data) == [*settings, *wanted]
+    assert list(data) == ["schema", *settings, *wanted]
     assert (data["step_s"], data["duration_s"], data["unused_increments"]) == (0.125, 12.5, 3)
     assert data["elements"] == list(NAMES)
     np.testing.assert_array_equal(np.array(data["attitude"], np.float32), history.states)
 
 
 def test_history_of_matrices_is_flat():
-    history = History(np.arange(2.0), np.tile(np.eye(3), (2, 1, 1)), 1.0, 0)
-    elements = [f"C_{place}" for place in PLACES]
-    assert runs_report.history_data(history, elements, {})["attitude"][1] == [1, 0, 0, 0, 1, 0, 0, 0, 1]
-    assert len(rows(runs_report.history_table(history, elements).as_csv())[0]) == 10
+    elements = tuple(f"C_{place}" for place in PLACES)
+    history = History(np.arange(2.0), np.tile(np.eye(3), (2, 1, 1)), 1.0, 0, elements)
+    assert HistoryResult({}, history).data()["attitude"][1] == [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    assert len(rows(history_table(history).as_csv())[0]) == 10
 
 
 def test_history_text(history):
-    lines = runs_report.history_text(history, NAMES, {"algorithm": "euler"}).splitlines()
+    lines = HistoryResult({"algorithm": "euler"}, history).text().splitlines()
     assert lines[0] == "algorithm euler"
     assert lines[2].split() == ["time,", "s", *NAMES]
     assert len(lines[3].split()) == 5
     assert lines[-2] == "(37 of 51 records; --format csv prints all)"
     assert lines[-1] == "3 increments at the end make no whole step and were not used"
     whole = History(history.time, history.states, history.step, 0)
-    assert "no whole step" not in runs_report.history_text(whole, NAMES, {})
+    assert "no whole step" not in HistoryResult({}, whole).text()

@@ -14,7 +14,7 @@ from strapgen.lab.motions import users_motions
 from strapgen.lab.word_length import word_length
 from strapgen.lab.word_length.word_length import cases, run, run_case
 from strapgen.lab.word_length.word_length_plot import word_length_image
-from strapgen.lab.word_length.word_length_report import word_length_report, word_length_text
+from strapgen.lab.word_length.word_length_report import WordLengthResult
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
 
@@ -61,7 +61,7 @@ def test_pulses_have_the_noise_of_the_closed_form_beside_them(outcomes):
         assert math.radians(outcome.expected_deg) ** 2 == pytest.approx(wanted, rel=1e-3)
         # The largest error of one run with a real counter is of the size of the mean error at its end.
         assert 0.3 < outcome.quantization_deg / outcome.expected_deg < 4
-    text = word_length_text(outcomes)
+    text = WordLengthResult(outcomes).text()
     assert text.count("if their errors are independent") == 1
     assert "5*h*q**2*t*w**2/108 + q**2/12" in text
 
@@ -78,7 +78,7 @@ def test_the_file_of_a_motion_takes_the_place_of_its_parameters(tmp_path, monkey
         (case,) = cases(duration="5", words=24, carries="full", motion_name=str(file))
         assert case.settings == ()
         drifts.append(run_case(case).truncation_deg)
-        word_length_text([run_case(case)])
+        WordLengthResult([run_case(case)]).text()
     assert drifts[0] == 0 < drifts[1], "another content of the file is another case"
 
 
@@ -96,24 +96,24 @@ def test_a_run_that_leaves_its_range_is_told():
     (outcome,) = run(cases(methods=("rk1",), words=(16,), carries=("none",), steps=("0.5",), duration="180"))
     assert outcome.drift_deg is None and outcome.rounding_deg is None
     assert outcome.dominates == "range"
-    assert " - " in word_length_text([outcome])
+    assert " - " in WordLengthResult([outcome]).text()
 
 
 def test_forms(outcomes):
-    rows = list(csv.DictReader(io.StringIO(word_length_report(outcomes).written("csv"))))
+    rows = list(csv.DictReader(io.StringIO(WordLengthResult(outcomes).written("csv"))))
     assert len(rows) == len(outcomes)
     assert float(rows[0]["rounding_deg"]) == outcomes[0].rounding_deg
     assert rows[0]["settings"] == "a_deg_s=10 b_deg_s=10 g_deg_s=10"
-    text = word_length_text(outcomes)
+    text = WordLengthResult(outcomes).text()
     assert text.count("the method itself drifts by") == 2
     assert "pulses of 30 arcsec" in text
 
 
 def test_image(outcomes):
     pytest.importorskip("matplotlib")
-    assert word_length_image(outcomes, "study.png").startswith(b"\x89PNG")
+    assert word_length_image(WordLengthResult(outcomes), "study.png").startswith(b"\x89PNG")
     with pytest.raises(InputError, match="file type 'xyz'"):
-        word_length_image(outcomes, "study.xyz")
+        word_length_image(WordLengthResult(outcomes), "study.xyz")
 
 
 @pytest.mark.parametrize(

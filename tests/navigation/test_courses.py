@@ -18,7 +18,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.recordings.recording import InertialRecording, read_inertial
 from strapgen.lab.simulate.runs import drift_between
-from strapgen.navigation.courses import course_report
+from strapgen.navigation.courses.course_report import CourseResult, course_table
 from strapgen.navigation.courses.courses import NavigationFrame, course
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS
 
@@ -76,7 +76,7 @@ def test_initial_angles():
 def test_increments_that_make_no_whole_cycle_are_told(wobble):
     made = course("dcm", wobble, fast_cycles=3, slow_cycles=7)
     assert (len(made.time), made.unused) == (47, 13)
-    said = course_report.course_text(made, {"backend": "numpy"})
+    said = CourseResult({"backend": "numpy"}, made).text()
     assert "13 increments at the end make no whole navigation cycle" in said
     assert "of 47 cycles; --format csv prints all" in said
 
@@ -108,10 +108,10 @@ def test_what_is_refused(options, says, wobble):
 
 def test_reports_hold_every_number(wobble):
     made = course("euler", wobble, fast_cycles=4, slow_cycles=25)
-    data = json.loads(json.dumps(course_report.course_data(made, {"backend": "numpy"}), allow_nan=False))
+    data = json.loads(json.dumps(CourseResult({"backend": "numpy"}, made).data(), allow_nan=False))
     assert data["attitude"] == made.states.tolist()
     assert data["velocity_changes_m_s"] == made.velocity_changes.tolist()
-    rows = list(csv.DictReader(io.StringIO(course_report.course_table(made).as_csv())))
+    rows = list(csv.DictReader(io.StringIO(course_table(made).as_csv())))
     assert [float(row["time_s"]) for row in rows] == data["time_s"]
     for name in ("roll_deg", "pitch_deg", "heading_deg"):
         assert [float(row[name]) for row in rows] == data[name]

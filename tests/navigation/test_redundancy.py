@@ -14,7 +14,7 @@ import strapgen
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, geometry
 from strapgen.navigation.redundancy.geometry_file import kernels, read
-from strapgen.navigation.redundancy.geometry_report import geometry_report
+from strapgen.navigation.redundancy.geometry_report import GeometryResult
 from strapgen.navigation.redundancy.parity_equations import SensorSet
 from strapgen.navigation.redundancy.redundancy_names import HEXAD_TRIADS, REDUNDANCY
 from strapgen.run.fixed import ModelEvaluator
@@ -263,10 +263,10 @@ def test_axis_is_divided_by_its_length_where_that_is_in_the_field():
     assert one.axes[5] == (1, 1, 1) and one.lengths == (1, 1, 1, 1, 1, sp.sqrt(3))
     sensors = SensorSet("six", one)
     assert float(sensors.parity.bound) >= max(np.abs(np.array(one.equations, float)).sum(axis=1)) / 8
-    said = geometry_report(sensors, []).written("text")
+    said = GeometryResult.of(sensors, []).written("text")
     assert said.count("stands as it is") == 1
     assert "axis 5 stands as it is: its length sqrt(3) is not in the field of the axes" in said
-    data = json.loads(geometry_report(sensors, []).written("json"))
+    data = json.loads(GeometryResult.of(sensors, []).written("json"))
     assert data["lengths"][5] == "sqrt(3)" and data["axes"][4][0] == "sqrt(2)/2"
 
 

@@ -119,8 +119,9 @@ def test_a_stage_that_differs_in_one_element_is_not_written_as_a_product():
 @pytest.mark.long
 def test_data_reads_back(kernel):
     program = derived.programs()[kernel.name]
-    data = json.loads(json.dumps(formulas.as_data(kernel, program), allow_nan=False))
+    data = json.loads(json.dumps(formulas.KernelResult.of(kernel, program).data(), allow_nan=False))
     wanted = [
+        "schema",
         "kernel",
         "title",
         "source",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from strapgen.thesis import thesis_statements
-from strapgen.thesis.statements_report import statements_report, statements_text
+from strapgen.thesis.statements_report import StatementsResult
 from strapgen.thesis.thesis_runs import bend
 from strapgen.thesis.thesis_statements import COUNT, Statement, statements
 
@@ -81,11 +81,11 @@ def test_a_statement_of_the_text_against_runs(number):
 
 @pytest.mark.long
 def test_the_report_has_every_statement_in_every_format():
-    report = statements_report(outcomes())
+    report = StatementsResult(outcomes())
     assert len(outcomes()) == COUNT == len(WANTED)
-    assert report.markdown().as_markdown().count("\n") == COUNT + 1
-    assert all(f"{k}. " in statements_text(outcomes()) for k in WANTED)
-    assert max(map(len, statements_text(outcomes()).splitlines())) <= 100
+    assert report.reader().as_markdown().count("\n") == COUNT + 1
+    assert all(f"{k}. " in report.text() for k in WANTED)
+    assert max(map(len, report.text().splitlines())) <= 100
     single = outcomes()[13].numbers["single"]
     assert math.isnan(single) or single < 14, "false in single precision"
 
@@ -96,7 +96,7 @@ def test_a_verdict_that_runs_do_not_bear_out_is_told(monkeypatch):
     monkeypatch.setattr(thesis_statements, "_STATEMENTS", (case,))
     (statement,) = statements()
     assert not statement.confirmed
-    text = " ".join(statements_text([statement]).split())
+    text = " ".join(StatementsResult([statement]).text().split())
     assert "power 1.00 of the rate" in text and "the runs do not bear this out" in text
 
 

@@ -34,5 +34,17 @@ REGISTRATION = Registration(
         ),
     },
     files={"tableau-with-unknowns": f"{__package__}.unknowns.unknown_tableau:UNKNOWN_TABLEAU"},
+    results={
+        "tableau": f"{__package__}.tableau.tableau_report:TableauResult",
+        "tableau-families": f"{__package__}.unknowns.tableau_families_report:FamiliesResult",
+        "solution": f"{__package__}.unknowns.unknowns_report:SolvedResult",
+        "series": f"{__package__}.error_analysis.series_report:SeriesResult",
+        "velocity-series": f"{__package__}.series.velocity_series_report:VelocitySeriesResult",
+        "overview": f"{__package__}.error_analysis.overview_report:OverviewResult",
+        "ratio": f"{__package__}.ratios.ratios_report:RatioResult",
+        "vibration": f"{__package__}.vibration.vibration_report:VibrationResult",
+        "vibration-closed-forms": f"{__package__}.vibration.vibration_report:ClosedFormsResult",
+        "stability": f"{__package__}.growth.growth_report:StabilityResult",
+    },
     requires=("lab",),
 )

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from strapgen import registration
-from strapgen.catalogue.toml_files import UserFile
 
 #: Folder of the files, each with the name of its kind.
 FOLDER = Path(registration.__file__).parent / "schemas"
@@ -24,13 +22,8 @@ def schemas() -> dict[str, Callable[[], dict[str, Any]]]:
     >>> schemas()["coning"]()["properties"]["band"]["unit"]
     'rad a sample'
     """
-    places = (pair for one in registration.built_in().values() for pair in one.files.items())
-    return {name: partial(_schema, place) for name, place in places}
-
-
-def _schema(place: str) -> dict[str, Any]:
-    kind: UserFile[Any] = registration.load(place)
-    return kind.schema()
+    known = registration.schemas().items()
+    return {name.removesuffix(".toml"): one.read for name, one in known if one.kind == "file"}
 
 
 def text(kind: str) -> str:

@@ -39,10 +39,8 @@ def derive(
     output.check(algorithm, *method.files)
     choice = method.choose(algorithm, step=False)
     from strapgen import pipeline
-    from strapgen.results.display.formulas import formulas_report, unknown_formulas_report
+    from strapgen.results.display.formulas import KernelResult
 
     kernel = pipeline.derive(choice)
-    if kernel.unknowns and show in ("text", "latex"):
-        output.report(unknown_formulas_report(kernel, show))
-        return
-    output.report(formulas_report(kernel, pipeline.program(choice), show))
+    without_program = kernel.unknowns and show in ("text", "latex")
+    output.show(KernelResult.of(kernel, None if without_program else pipeline.program(choice), show))

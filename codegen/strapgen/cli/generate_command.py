@@ -11,10 +11,10 @@ from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, option
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, show
 from strapgen.cli.progress import track
 from strapgen.cli.rules import Excludes, OneOf, rules
-from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
+from strapgen.cli.source_options import SourceOptions, refuse_out_of_step, show_step
 from strapgen.cli.values import names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -89,20 +89,16 @@ def generate(
         return
     paths = dict(zip(files, output.write(files), strict=True))
     written = [[paths[name] for name in group] for group in groups]
-    rows = zip(results, written, strict=True)
-    if format == "json":
-        from strapgen.run.generation import generated_data
+    rows = [(task, sources, place) for (task, sources), place in zip(results, written, strict=True)]
+    from strapgen.cli.generated_result import GeneratedSources, GenerateResult
 
-        data = [
-            generated_data(task.choice, sources, task.target, [*map(str, place)])
-            for (task, sources), place in rows
-        ]
-        print_json(data if len(data) > 1 else data[0])
-    else:
-        samples = tasks[0].choice.increments_per_step
-        typer.echo(
-            "\n".join(_text(sources, place, task.settings, samples) for (task, sources), place in rows)
-        )
+    samples = tasks[0].choice.increments_per_step
+    said = "\n".join(_text(sources, place, task.settings, samples) for task, sources, place in rows)
+    generated = [
+        GeneratedSources.of(task.choice, sources, task.target, [*map(str, place)])
+        for task, sources, place in rows
+    ]
+    show(GenerateResult(generated, said), format)
 
 
 def _together(groups: list[dict[str, str]]) -> dict[str, str]:
@@ -177,10 +173,7 @@ def _generate_all(targets: tuple[str, ...] | None, output: SourceOptions, format
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total), targets)
     if output.check:
         difference = standard_tree.difference(out, files)
-        if format == "json":
-            print_json({"in_step": not difference, "difference": difference})
-        elif difference:
-            typer.echo(difference, nl=False)
+        show_step(difference, format)
         if difference:
             left = standard_tree.strangers(out, files)
             remove = f"; {left[0]} is no part of it, and yours to remove" if left else ""
@@ -190,7 +183,6 @@ def _generate_all(targets: tuple[str, ...] | None, output: SourceOptions, format
             typer.echo(f"{out}: {len(files)} files, in step")
         return
     written = standard_tree.write(out, files)
-    if format == "json":
-        print_json({"files": [str(path) for path in written]})
-    else:
-        typer.echo(f"{out}: {len(written)} files of {total} kernels")
+    from strapgen.cli.generated_result import CatalogueResult
+
+    show(CatalogueResult(written, f"{out}: {len(written)} files of {total} kernels"), format)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,11 +12,6 @@ from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.ir import checks
 from strapgen.registry import Titles
 
-if TYPE_CHECKING:
-    from strapgen.results.report import Report
-    from strapgen.results.table import TextTable
-
-_Meanings = Mapping[str, str]
 #: The kinds of names, in the order in which they are listed.
 KINDS = (
     *("algorithms", "methods", "vectors", "kernels"),
@@ -54,7 +48,9 @@ def list_names(
     if kind is None:
         short["methods"] = _with_one_line_for_taylor(parts["methods"])
         short["kernels"] = _with_one_line_for_updates(parts["kernels"])
-    output.report(_report(shown, short, kind is None))
+    from strapgen.cli.names_result import NamesResult
+
+    output.show(NamesResult(shown, short, kind is None))
 
 
 def _parts() -> dict[str, dict[str, str]]:
@@ -111,28 +107,3 @@ def _with_one_line_for_updates(kernels: dict[str, str]) -> dict[str, str]:
         elif order == first:
             lines[f"{name} to {last}"] = f"{algorithm}: update by a rotation vector, order {first} to {last}"
     return lines
-
-
-def _report(kinds: Mapping[str, _Meanings], short: Mapping[str, _Meanings], every: bool) -> Report:
-    """Return names with their meanings, by kind, as a report; `short` for its text, `every` if these are all kinds."""
-    from strapgen.results.report import Report
-    from strapgen.results.table import Column, TextTable
-
-    both = (Column("name", "<"), Column("meaning", "<"))
-
-    def text() -> str:
-        width = max(len(name) for part in short.values() for name in part)
-        columns = (Column(align="<", least=width), Column(align="<"))
-        lines = []
-        for kind, part in short.items():
-            lines += [kind] if every else []
-            lines += TextTable(columns, list(part.items())).lines("  " if every else "")
-        return "\n".join(lines)
-
-    def table() -> TextTable:
-        if every:
-            rows = [(kind, *item) for kind, part in kinds.items() for item in part.items()]
-            return TextTable([Column("kind", "<"), *both], rows)
-        return TextTable(both, [item for part in kinds.values() for item in part.items()])
-
-    return Report(text, lambda: dict(kinds), table)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -17,7 +15,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.suggestions import alternatives
 
 if TYPE_CHECKING:
-    from strapgen.results.report import Report
+    from strapgen.results.result import Result
 
 _TABLE = ("text", "json", "csv", "markdown", "latex")
 _PLAIN = ("text", "json")
@@ -107,12 +105,12 @@ class Output:
         """The file for the output; None for the terminal."""
         return None if self.out == _TERMINAL else self.out
 
-    def report(self, report: Report, image: Callable[[Path], bytes] | bytes | None = None) -> None:
-        """Deliver a report in the format of the options; `image` is called with the file of --plot, if there is one."""
-        text = report.written(self.format or "text")
-        if callable(image):
-            image = None if self.plot is None else image(self.plot)
-        self.deliver(text, image)
+    def show(self, result: Result) -> None:
+        """Deliver a result in the format of the options, and its plot if one is asked for."""
+        from strapgen.results.result import plot
+
+        text = result.written(self.format or "text")
+        self.deliver(text, None if self.plot is None else plot(result, self.plot))
 
     def deliver(self, text: str, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr names those written."""
@@ -140,8 +138,6 @@ def check_format(value: str) -> str:
     return checks.choice("format", value, _PLAIN)
 
 
-def print_json(data: Any) -> None:
-    """Print data as JSON."""
-    from strapgen.results.report import as_json
-
-    sys.stdout.write(as_json(data) + "\n")
+def show(result: Result, format: str) -> None:
+    """Print the result of a command that writes source files."""
+    typer.echo(result.written(format).rstrip("\n"))

@@ -22,5 +22,17 @@ REGISTRATION = Registration(
             "Generate",
             summary="Generate source code for an algorithm, or for the whole catalogue",
         ),
+        "schema": Command(
+            f"{__package__}.schema_command:schema",
+            "Derive",
+            summary="Print the JSON Schema of a result, or list the names of all",
+        ),
+    },
+    results={
+        "names": f"{__package__}.names_result:NamesResult",
+        "kernel": "strapgen.results.display.formulas:KernelResult",
+        "generated": f"{__package__}.generated_result:GenerateResult",
+        "in-step": f"{__package__}.generated_result:StepCheck",
+        "catalogue": f"{__package__}.generated_result:CatalogueResult",
     },
 )

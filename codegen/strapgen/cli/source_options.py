@@ -11,7 +11,7 @@ import typer
 
 from strapgen.cli.option_groups import stated
 from strapgen.cli.options import option
-from strapgen.cli.output import Project, WithRuns, print_json
+from strapgen.cli.output import Project, WithRuns, show
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -111,14 +111,19 @@ class SourceOptions:
     def show_difference(self, files: Mapping[str, str], format: str) -> None:
         """Print the difference of the files in the folder from generated ones, and exit with 1 if there is one."""
         folder, difference = self.out or Path(), self.compare(files)
-        if format == "json":
-            print_json({"in_step": not difference, "difference": difference})
-        elif difference:
-            typer.echo(difference, nl=False)
+        show_step(difference, format)
         if difference:
             refuse_out_of_step(folder, "the same command without --check writes the files again")
         if format == "text":
             typer.echo(f"{folder}: {len(files)} files, in step")
+
+
+def show_step(difference: str, format: str) -> None:
+    """Print the difference of files from generated ones; as text only if there is one."""
+    from strapgen.cli.generated_result import StepCheck
+
+    if difference or format == "json":
+        show(StepCheck(not difference, difference), format)
 
 
 def refuse_out_of_step(folder: Path, again: str) -> None:

@@ -29,6 +29,14 @@ REGISTRATION = Registration(
         ),
     },
     files={"brief": f"{__package__}.brief:BRIEF"},
+    results={
+        "coning": f"{__package__}.coning.coning_report:ConingResult",
+        "shaped-coning": f"{__package__}.coning.coning_report:ShapedResult",
+        "window": f"{__package__}.windows.window_report:WindowResult",
+        "late-sources": f"{__package__}.commit_late.commit_late_sources:LateResult",
+        "frontier": f"{__package__}.frontier.frontier_report:FrontierResult",
+        "selection": f"{__package__}.selection.selection_report:SelectionResult",
+    },
     extensions={"lab.whole-recordings": f"{__package__}.commit_late:whole_recordings"},
     requires=("lab", "analysis"),
 )

@@ -12,7 +12,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, option
-from strapgen.cli.output import format_option
+from strapgen.cli.output import format_option, show
 from strapgen.cli.progress import track
 from strapgen.cli.rules import Excludes, Needs, OneOf, rules
 from strapgen.navigation.systems.built_in import is_system
@@ -85,7 +85,7 @@ def evidence(
     Example: strapgen evidence euler --method rk4 --out out/evidence
     """
     from strapgen.evidence import collection
-    from strapgen.evidence.evidence_report import evidence_page, evidence_report
+    from strapgen.evidence.evidence_report import EvidenceResult, evidence_page
     from strapgen.ir import checks
 
     checks.choice("format", format, _FORMATS)
@@ -96,7 +96,7 @@ def evidence(
         verdicts = collection.in_order(
             [verdict for part in track(tasks, "examining", total) for verdict in part], subjects
         )
-    typer.echo(evidence_report(verdicts).written(format).rstrip("\n"))
+    show(EvidenceResult(verdicts), format)
     status = _status(verdicts, complete)
     if page is not None:
         text = evidence_page(verdicts, {subject.name: subject.digest for subject in subjects})

@@ -6,10 +6,10 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from strapgen.evidence.verdicts import Verdict
-from strapgen.results.report import Report
+from strapgen.results.records import reader_table
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 _HEAD = """# Evidence for the standard catalogue
@@ -27,9 +27,31 @@ the version of strapgen, so that a changed file shows.
 _VERSIONS = "## Versions"
 
 
-def evidence_report(verdicts: Sequence[Verdict]) -> Report:
-    """Return verdicts as a report."""
-    return Report(lambda: _text(verdicts), lambda: _data(verdicts), lambda: _table(verdicts))
+@dataclass(frozen=True)
+class EvidenceResult(Result):
+    """What independent tools say of generated code: a row for each promise, kernel and tool."""
+
+    row = Verdict
+
+    verdicts: Sequence[Verdict]
+
+    def rows(self) -> list[Verdict]:
+        """Return what tools say of the claims that they can examine; the text and the page name the others too."""
+        return [verdict for verdict in self.verdicts if verdict.result != "not examined"]
+
+    def reader(self) -> TextTable:
+        """Return all that they say."""
+        return reader_table(self.rows(), Verdict)
+
+    def text(self) -> str:
+        """Return a table, and what is said beside it."""
+        notes = [
+            f"{verdict.kernel}, {verdict.claim}, {verdict.tool} {verdict.version}: {verdict.detail}"
+            for verdict in self.verdicts
+            if verdict.detail
+        ]
+        table = reader_table(self.verdicts, Verdict, "kernel", "claim", "tool", "result", "seconds")
+        return "\n".join([table.as_text(), *([""] if notes else []), *notes])
 
 
 def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> str:
@@ -157,43 +179,3 @@ def _reasons(verdicts: Sequence[Verdict]) -> list[str]:
         return "all" if every == {*kernels} and len(every) > 1 else ", ".join(kernels)
 
     return ["\n".join(f"- {text} ({named(kernels)})" for text, kernels in said.items())] if said else []
-
-
-def _data(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
-    """Return what tools say of the claims that they can examine; the text and the page name the others too."""
-    return [
-        {
-            "kernel": verdict.kernel,
-            "claim": verdict.claim,
-            "tool": verdict.tool,
-            "version": verdict.version,
-            "result": verdict.result,
-            "seconds": round(verdict.seconds, 2),
-            "detail": verdict.detail,
-        }
-        for verdict in verdicts
-        if verdict.result != "not examined"
-    ]
-
-
-def _table(verdicts: Sequence[Verdict]) -> TextTable:
-    columns = [
-        *(Column(name, "<") for name in ("kernel", "claim", "tool", "version", "result")),
-        Column("seconds", ">", ".1f"),
-        Column("detail", "<"),
-    ]
-    return TextTable(columns, [[*row.values()] for row in _data(verdicts)])
-
-
-def _text(verdicts: Sequence[Verdict]) -> str:
-    columns = [
-        *(Column(name, "<") for name in ("kernel", "claim", "tool", "result")),
-        Column("s", ">", ".1f"),
-    ]
-    rows = [[v.kernel, v.claim, v.tool, v.result, v.seconds] for v in verdicts]
-    notes = [
-        f"{verdict.kernel}, {verdict.claim}, {verdict.tool} {verdict.version}: {verdict.detail}"
-        for verdict in verdicts
-        if verdict.detail
-    ]
-    return "\n".join([TextTable(columns, rows).as_text(), *([""] if notes else []), *notes])

@@ -13,5 +13,6 @@ REGISTRATION = Registration(
             summary="Have independent tools examine what generated C promises",
         ),
     },
+    results={"evidence": f"{__package__}.evidence_report:EvidenceResult"},
     requires=("lab", "navigation", "firmware"),
 )

@@ -6,8 +6,10 @@ import importlib.util
 import shutil
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from strapgen.results.records import entry
 
 Result = Literal["proved", "agrees", "fails", "not examined", "not installed"]
 
@@ -17,18 +19,18 @@ class Verdict:
     """What an independent tool says of one promise of a kernel's code."""
 
     #: Name of the kernel with its word, as the files have it: "euler_rk4_2_w32"
-    kernel: str
+    kernel: str = field(metadata=entry("kernel", align="<"))
     #: The promise and the case, as "no overflow: x86_64" or "same bits: cortex-m0"
-    claim: str
+    claim: str = field(metadata=entry("claim", align="<"))
     #: As "Frama-C Eva", "26.0"
-    tool: str
-    version: str
+    tool: str = field(metadata=entry("tool", align="<"))
+    version: str = field(metadata=entry("version", align="<"))
     #: "proved" is of all inputs in the ranges; "agrees" is of those that were run; "not examined" is where the
     #: tool has no theorem for the code, and the detail tells for what
-    result: Result
-    seconds: float
+    result: Result = field(metadata=entry("result", align="<"))
+    seconds: float = field(metadata=entry("seconds", ".1f", write=lambda seconds: round(seconds, 2)))
     #: What a reader needs beside it: the figures that were compared, the first alarm, the reason
-    detail: str = ""
+    detail: str = field(default="", metadata=entry("detail", align="<"))
 
 
 def verdict(kernel: str, claim: str, tool: Tool, judge: Callable[[], tuple[Result, str]]) -> Verdict:

@@ -23,6 +23,13 @@ REGISTRATION = Registration(
             summary="Test what every attitude step must do; exit with 1 if it fails",
         ),
     },
+    results={
+        "vectors": f"{__package__}.vectors.vectors:VectorsResult",
+        "findings": f"{__package__}.check_code.conformance_report:FindingsResult",
+        "foreign-check": f"{__package__}.check_code.conformance_report:ForeignResult",
+        "verification": f"{__package__}.verify.verification:Verification",
+        "whole-verification": f"{__package__}.verify.whole_verification:WholeVerification",
+    },
     extensions={
         "generate.project": f"{__package__}.project:project",
         "lab.source-files": f"{__package__}.verify:source_files",

@@ -20,6 +20,7 @@ from strapgen.lab.simulate.runs_report import AXES, SKEW_PLANES
 from strapgen.results import figures
 from strapgen.results.display.frames import MATRIX, VECTOR, Variables, table, variables
 from strapgen.results.display.objects import figure, html
+from strapgen.results.records import keyed_table
 from strapgen.results.table import TextTable
 
 
@@ -53,12 +54,12 @@ def _(run: Run) -> TextTable:
 
 @table.register
 def _(history: History) -> TextTable:
-    return runs_report.history_table(history, runs_report.history_elements(history))
+    return runs_report.history_table(history)
 
 
 @table.register
 def _(rows: Comparisons) -> TextTable:
-    return comparison_report.figures_table(rows)
+    return keyed_table(rows)
 
 
 @table.register
@@ -93,4 +94,4 @@ def _(run: Run, title: str) -> Any:
 
 @figure.register
 def _(history: History, title: str) -> Any:
-    return runs_plot.history_figure(history, runs_report.history_elements(history), title)
+    return runs_plot.history_figure(history, title)

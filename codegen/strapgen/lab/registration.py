@@ -39,5 +39,15 @@ REGISTRATION = Registration(
     },
     motions=(f"{__package__}.motions.motion_names:TABLE",),
     files={"sensor-errors": f"{__package__}.sensor_errors.error_file:ERRORS"},
+    results={
+        "run": f"{__package__}.simulate.runs_report:RunResult",
+        "attitude": f"{__package__}.simulate.runs_report:HistoryResult",
+        "comparison": f"{__package__}.compare.comparison_report:ComparisonResult",
+        "convergence": f"{__package__}.converge.convergence_report:ConvergenceResult",
+        "word-length": f"{__package__}.word_length.word_length_report:WordLengthResult",
+        "cost": f"{__package__}.cost.cost_report:CostResult",
+        "random-runs": f"{__package__}.monte_carlo.random_runs_report:RandomRunsResult",
+        "sensor-errors": f"{__package__}.sensor_error_study.sensor_error_report:SensorErrorResult",
+    },
     lists={"motions": f"{__package__}.motions.motions:titles"},
 )

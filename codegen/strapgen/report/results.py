@@ -7,20 +7,20 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from strapgen.cli.generated_result import GeneratedSources, GenerateResult
 from strapgen.design.frontier.frontier import Standing
-from strapgen.design.frontier.frontier_report import frontier_report
+from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
-from strapgen.lab.converge.convergence_report import convergence_report
-from strapgen.lab.simulate.runs_report import run_data, step_facts
+from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
+from strapgen.lab.converge.convergence_report import ConvergenceResult
+from strapgen.lab.simulate.runs_report import RunResult, step_facts
 from strapgen.report.conditions import Conditions
 from strapgen.report.dossier import REFERENCE, AlgorithmDossier, StepRuns, run_settings
 from strapgen.report.gathering import motions
-from strapgen.results.display.formulas import formulas_report
-from strapgen.run.generation import generated_data
+from strapgen.results.display.formulas import KernelResult
 from strapgen.targets import contract
-from strapgen.thesis.tables_report import thesis_tables_report
+from strapgen.thesis.tables_report import ThesisTablesResult
 from strapgen.thesis.thesis_tables import TableEntry
 
 #: What makes every command print its data.
@@ -49,13 +49,13 @@ def arguments(known: AlgorithmDossier) -> str:
 
 def of_algorithm(known: AlgorithmDossier, conditions: Conditions) -> dict[str, CommandResult]:
     """Return the results of one algorithm by the names of the commands; `generate` is that of fixed point."""
-    formulas = formulas_report(known.kernel, known.program, "operations")
+    formulas = KernelResult.of(known.kernel, known.program, "operations")
     derive = f"strapgen derive {arguments(known)} --show operations {_JSON}"
     results = {"derive": CommandResult(derive, formulas.data())}
     if known.fixed is not None:
         command = f"{contract.command(known.fixed, 'c-fixed')} {_JSON}"
-        data = generated_data(known.choice, known.sources["c-fixed"], "c-fixed", ())
-        results["generate"] = CommandResult(command, data)
+        generated = GeneratedSources.of(known.choice, known.sources["c-fixed"], "c-fixed", ())
+        results["generate"] = CommandResult(command, GenerateResult([generated]).data())
     if known.runs is not None:
         results |= _of_runs(known, known.runs, conditions)
     return results
@@ -71,7 +71,7 @@ def _of_runs(known: AlgorithmDossier, runs: StepRuns, conditions: Conditions) ->
         "step_s": float(schedule.step),
         "duration_s": float(schedule.duration),
     }
-    results = {"simulate": CommandResult(simulate, run_data(runs.run, facts))}
+    results = {"simulate": CommandResult(simulate, RunResult(facts, runs.run).data())}
     if runs.comparison:
         names = ",".join(row.backend for row in runs.comparison)
         rounding = _rounding(runs.settings) if any("fixed" in row.backend for row in runs.comparison) else ""
@@ -79,8 +79,8 @@ def _of_runs(known: AlgorithmDossier, runs: StepRuns, conditions: Conditions) ->
             f"strapgen compare {step} --backend {names} --reference {REFERENCE} {where}{rounding} {_JSON}"
         )
         compared = ComparedKernel(known.choice.kernel, "", runs.comparison)
-        results["compare"] = CommandResult(compare, comparison_report([compared], REFERENCE, "").data())
-    ladder = convergence_report([runs.ladder], "").data()
+        results["compare"] = CommandResult(compare, ComparisonResult([compared], REFERENCE, "").data())
+    ladder = ConvergenceResult([runs.ladder], "").data()
     results["converge"] = CommandResult(f"strapgen converge {step} {_JSON}", ladder)
     return results
 
@@ -97,7 +97,7 @@ def _rounding(settings: Settings) -> str:
 def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> CommandResult:
     """Return the tables of the thesis as the result of `tables`."""
     command = f"strapgen tables --backend {','.join(backends)} {_JSON}"
-    return CommandResult(command, thesis_tables_report([*entries]).data())
+    return CommandResult(command, ThesisTablesResult([*entries]).data())
 
 
 def of_frontier(
@@ -108,4 +108,4 @@ def of_frontier(
     names = shlex.quote(",".join(methods))
     command = f"strapgen frontier --method {names} {conditions.options} {words} {_JSON}"
     hertz, seconds = (float(checks.number("", text)) for text in (conditions.sample_hz, conditions.duration))
-    return CommandResult(command, frontier_report(standings, hertz, seconds, motions(conditions)).data())
+    return CommandResult(command, FrontierResult(standings, hertz, seconds, motions(conditions)).data())

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from fractions import Fraction
-from typing import Any
+from dataclasses import dataclass, field
 
 from strapgen import catalogue
 from strapgen.analysis.series.prediction import Prediction, predict
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.simulate.runs import simulate
+from strapgen.results.records import Record, entry, properties
 from strapgen.run.backends import backend
 from strapgen.thesis.printed_tables import ALGORITHMS, ORDERS, TABLES, Table, agrees
-from strapgen.thesis.thesis_tables import DURATION, INTERVAL, STEP, drift_deg
+from strapgen.thesis.thesis_tables import DURATION, INTERVAL, STEP, drift_deg, printed_number
 
 
 @dataclass(frozen=True)
-class PredictedEntry:
+class PredictedEntry(Record):
     """One figure of a table."""
+
+    computed = properties(thesis_printed=entry(), deviation=entry())
 
     table: int
     algorithm: str
@@ -32,7 +33,7 @@ class PredictedEntry:
     simulated_deg: float
     simulated: float
     #: The ratio as the thesis prints it
-    thesis: str
+    thesis: str = field(metadata=entry(write=printed_number, kind=float))
     #: Whether `normalised` has the printed digits
     agrees: bool
     #: As for `TableEntry`
@@ -49,13 +50,10 @@ class PredictedEntry:
         """Relative difference of the predicted ratio from the simulated one."""
         return self.normalised / self.simulated - 1
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry as plain JSON data, the thesis's figure as a number and as it is printed."""
-        return asdict(self) | {
-            "thesis": float(Fraction(self.thesis)),
-            "thesis_printed": self.thesis,
-            "deviation": self.deviation,
-        }
+    @property
+    def thesis_printed(self) -> str:
+        """The figure as the thesis prints it."""
+        return self.thesis
 
 
 def predicted(tables: Sequence[Table] = TABLES) -> Iterator[PredictedEntry]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from strapgen.analysis.ratios.ratios import Claim
 from strapgen.analysis.ratios.ratios_report import claims_text
-from strapgen.results.report import Report, flat_table
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.thesis.predicted_tables import PredictedEntry
 from strapgen.thesis.tables_report import repair_notes
@@ -45,13 +46,19 @@ def predicted_text(entries: Sequence[PredictedEntry]) -> str:
     return "\n".join(lines)
 
 
-def predicted_report(entries: Sequence[PredictedEntry], claims: Sequence[Claim]) -> Report:
-    """Return predicted tables, and the ratios that the thesis reads from them, as a report."""
-    rows = [entry.as_dict() for entry in entries]
-    data = {"entries": rows, "ratios": [claim.as_dict() for claim in claims]}
-    return Report(
-        lambda: f"{predicted_text(entries)}\n{claims_text(claims)}", lambda: data, lambda: flat_table(rows)
-    )
+@dataclass(frozen=True)
+class PredictedTablesResult(Result):
+    """The tables of the thesis as the series predict them, and the ratios that the thesis reads from them."""
+
+    rows_in = "entries"
+    drawn_by = "strapgen.thesis.tables_plot:predicted_tables_image"
+
+    entries: Sequence[PredictedEntry]
+    ratios: Sequence[Claim]
+
+    def text(self) -> str:
+        """Return the tables and the ratios."""
+        return f"{predicted_text(self.entries)}\n{claims_text(self.ratios)}"
 
 
 def _cells(entry: PredictedEntry) -> tuple[str | float | None, ...]:

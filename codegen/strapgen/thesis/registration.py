@@ -18,5 +18,10 @@ REGISTRATION = Registration(
             summary="Run the statements of the thesis's text, and say whether they hold",
         ),
     },
+    results={
+        "thesis-tables": f"{__package__}.tables_report:ThesisTablesResult",
+        "predicted-tables": f"{__package__}.predicted_tables_report:PredictedTablesResult",
+        "statements": f"{__package__}.statements_report:StatementsResult",
+    },
     requires=("lab", "analysis"),
 )

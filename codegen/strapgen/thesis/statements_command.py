@@ -19,8 +19,8 @@ def statements(*, output: Annotated[Output, Shown(only=TEXT_OUTPUT)]) -> None:
     Example: strapgen statements --format markdown
     """
     output.check()
-    from strapgen.thesis.statements_report import statements_report
+    from strapgen.thesis.statements_report import StatementsResult
     from strapgen.thesis.thesis_statements import COUNT
     from strapgen.thesis.thesis_statements import statements as runs
 
-    output.report(statements_report(list(track(runs(), "simulating", COUNT))))
+    output.show(StatementsResult(list(track(runs(), "simulating", COUNT))))

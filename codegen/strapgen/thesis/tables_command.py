@@ -62,11 +62,9 @@ def tables(
     output.check()
     if predict:
         return _predict(output)
-    from strapgen.thesis.tables_plot import thesis_tables_image
-    from strapgen.thesis.tables_report import thesis_tables_report
+    from strapgen.thesis.tables_report import ThesisTablesResult
 
-    entries = _simulated(backend or runnable(), table, orthonormalize, fixed)
-    output.report(thesis_tables_report(entries), lambda path: thesis_tables_image(entries, path))
+    output.show(ThesisTablesResult(_simulated(backend or runnable(), table, orthonormalize, fixed)))
 
 
 def _simulated(
@@ -101,15 +99,12 @@ def _predict(output: Output) -> None:
     """Deliver the tables as the series predict them, and the ratios that the thesis reads from its tables."""
     from strapgen.analysis.ratios import ratios
     from strapgen.thesis import predicted_tables
-    from strapgen.thesis.predicted_tables_report import predicted_report
-    from strapgen.thesis.tables_plot import predicted_tables_image
+    from strapgen.thesis.predicted_tables_report import PredictedTablesResult
     from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES
 
     cases = len(TABLES) * len(ALGORITHMS) * len(ORDERS)
     entries = list(track(predicted_tables.predicted(), "predicting", cases))
-    output.report(
-        predicted_report(entries, ratios.claims()), lambda path: predicted_tables_image(entries, path)
-    )
+    output.show(PredictedTablesResult(entries, ratios.claims()))
 
 
 def runnable() -> tuple[str, ...]:

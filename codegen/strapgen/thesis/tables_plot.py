@@ -13,8 +13,8 @@ from strapgen.thesis.tables_report import NAMES
 from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table
 
 if TYPE_CHECKING:
-    from strapgen.thesis.predicted_tables import PredictedEntry
-    from strapgen.thesis.thesis_tables import TableEntry
+    from strapgen.thesis.predicted_tables_report import PredictedTablesResult
+    from strapgen.thesis.tables_report import ThesisTablesResult
 
 _COLOURS = dict(zip(ALGORITHMS, figures.COLOURS, strict=False))
 _MARKERS = "osD^vP*X"
@@ -36,7 +36,7 @@ class _Figure(NamedTuple):
     agrees: bool
 
 
-def thesis_tables_image(entries: Sequence[TableEntry], path: str | Path) -> bytes:
+def thesis_tables_image(result: ThesisTablesResult, path: str | Path) -> bytes:
     """Return tables of the thesis as panels: the ratio of each drift over the order, of both representations.
 
     A bar is the figure that the thesis prints; beside it stands a mark for each back end, filled where it has the
@@ -45,21 +45,21 @@ def thesis_tables_image(entries: Sequence[TableEntry], path: str | Path) -> byte
     return _image(
         [
             _Figure(e.table, e.algorithm, e.order, e.backend, e.normalised, e.drift_deg, e.agrees)
-            for e in entries
+            for e in result.entries
         ],
         path,
     )
 
 
-def predicted_tables_image(entries: Sequence[PredictedEntry], path: str | Path) -> bytes:
+def predicted_tables_image(result: PredictedTablesResult, path: str | Path) -> bytes:
     """Return predicted tables as `thesis_tables_image` does simulated ones, beside a simulation in numpy."""
     predicted = [
         _Figure(e.table, e.algorithm, e.order, "predicted", e.normalised, e.drift_deg, e.agrees)
-        for e in entries
+        for e in result.entries
     ]
     simulated = [
         _Figure(e.table, e.algorithm, e.order, "simulated", e.simulated, e.simulated_deg, e.agrees_simulated)
-        for e in entries
+        for e in result.entries
     ]
     return _image([*predicted, *simulated], path)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from strapgen.results.report import Report, flat_table
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES, Table, TableEntry
 
@@ -51,15 +52,20 @@ def thesis_table_text(table: Table, entries: Sequence[TableEntry]) -> str:
     return "\n".join([*text, *_notes(entries), *repair_notes(table)])
 
 
-def thesis_tables_report(entries: Sequence[TableEntry]) -> Report:
-    """Return the entries of one table or of several as a report."""
-    data = [entry.as_dict() for entry in entries]
+@dataclass(frozen=True)
+class ThesisTablesResult(Result):
+    """The tables of the thesis beside simulations: a row for each figure and back end."""
 
-    def text() -> str:
-        of_tables = ((table, [e for e in entries if e.table == table.number]) for table in TABLES)
+    rows_in = "entries"
+    row = TableEntry
+    drawn_by = "strapgen.thesis.tables_plot:thesis_tables_image"
+
+    entries: Sequence[TableEntry]
+
+    def text(self) -> str:
+        """Return one table after the other."""
+        of_tables = ((table, [e for e in self.entries if e.table == table.number]) for table in TABLES)
         return "\n\n".join(thesis_table_text(table, here) for table, here in of_tables if here)
-
-    return Report(text, lambda: data, lambda: flat_table(data))
 
 
 def repair_notes(table: Table) -> list[str]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from strapgen.ir.exceptions import CompilerError
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.simulate.runs import simulate
+from strapgen.results.records import entry
 from strapgen.run.backends import backend
 from strapgen.thesis.printed_tables import ALGORITHMS, ORDERS, TABLES
 from strapgen.thesis.thesis_runs import bend, last_drift, last_scale, thesis_run
@@ -33,19 +33,15 @@ class Statement:
 
     number: int
     #: The statement in few words
-    said: str
+    said: str = field(metadata=entry("statement of the text", align="<"))
     #: What the runs measure, with the numbers in it
-    run: str
+    run: str = field(metadata=entry("run", align="<"))
     #: Whether it holds
-    verdict: str
+    verdict: str = field(metadata=entry("verdict", align="<"))
     #: Whether the numbers bear out the verdict
     confirmed: bool
     #: The numbers by name
     numbers: Numbers
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the statement as plain JSON data."""
-        return asdict(self)
 
 
 def statements() -> Iterator[Statement]:

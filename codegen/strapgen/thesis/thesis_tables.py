@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
 
 from strapgen.catalogue import choose_step
 from strapgen.ir.exceptions import InputError
@@ -14,6 +13,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.simulate.runs import Run, largest_increment, simulate
+from strapgen.results.records import Record, entry, properties
 from strapgen.run.backends import BACKENDS, Backend, backend, sources_to_build
 from strapgen.run.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.run.compiler import compile_together
@@ -28,9 +28,16 @@ DURATION = Fraction(180)
 INTERVAL = Fraction(5)
 
 
+def printed_number(figure: str) -> float:
+    """Return a figure of the thesis as a number."""
+    return float(Fraction(figure))
+
+
 @dataclass(frozen=True)
-class TableEntry:
+class TableEntry(Record):
     """One figure of a table."""
+
+    computed = properties(thesis_printed=entry())
 
     table: int
     backend: str
@@ -42,7 +49,7 @@ class TableEntry:
     #: Drift over that of the direction cosine matrix, of first order or (table 3) of the same order
     normalised: float
     #: The figure in the thesis's print
-    thesis: str
+    thesis: str = field(metadata=entry(write=printed_number, kind=float))
     #: Whether `normalised`, rounded or truncated, has the printed digits
     agrees: bool
     #: Remark on the entry
@@ -54,9 +61,10 @@ class TableEntry:
     #: What was repaired of the thesis for this entry, its figure or its motion, and why
     repairs: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry as plain JSON data, the thesis's figure as a number and as it is printed."""
-        return asdict(self) | {"thesis": float(Fraction(self.thesis)), "thesis_printed": self.thesis}
+    @property
+    def thesis_printed(self) -> str:
+        """The figure as the thesis prints it."""
+        return self.thesis
 
 
 def drift_deg(table: Table, run: Run) -> float:

@@ -11,4 +11,5 @@ REGISTRATION = Registration(
     motions=("toy_application.names:MOTIONS",),
     targets=("toy_application.target:TARGETS",),
     backends=("toy_application.names:BACKENDS",),
+    results={"twist": "toy_application.twist:TwistResult"},
 )

@@ -1,17 +1,34 @@
 """A study: how much of a coning motion is a rotation about z, in float beside double."""
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.ir.exceptions import InputError
-from strapgen.results.report import Report
-from strapgen.results.table import Column, TextTable
+from strapgen.results.result import Result
 
 
-def angles(half_angle_deg: float, backends: tuple[str, ...]) -> list[tuple[str, float]]:
-    """Return the angle about z in rad, of an attitude on a cone, from each back end."""
+@dataclass(frozen=True)
+class Angle:
+    """The angle about z of an attitude, from a back end."""
+
+    backend: str
+    angle_rad: float
+
+
+@dataclass(frozen=True)
+class TwistResult(Result):
+    """How much of a coning motion is a rotation about z: a row for each back end."""
+
+    row, rows_in = Angle, "angles"
+
+    angles: list[Angle]
+
+
+def angles(half_angle_deg: float, backends: tuple[str, ...]) -> list[Angle]:
+    """Return the angle about z, of an attitude on a cone, from each back end."""
     import math
 
     import numpy as np
@@ -21,7 +38,7 @@ def angles(half_angle_deg: float, backends: tuple[str, ...]) -> list[tuple[str, 
     half = math.radians(half_angle_deg) / 2
     attitude = np.array([math.sin(half), 0.0, 0.1 * math.cos(half), math.sqrt(0.99) * math.cos(half)])
     twists = ((name, strapgen.evaluator("twist-z", backend=name)(attitude)) for name in backends)
-    return [(name, 2 * math.atan2(*map(float, twist))) for name, twist in twists]
+    return [Angle(name, 2 * math.atan2(*map(float, twist))) for name, twist in twists]
 
 
 @grouped
@@ -36,7 +53,4 @@ def study_twist(
     """
     if not 0 <= half_angle < 180:
         raise InputError(f"half_angle_deg is {half_angle:g}; 0 to 180 are allowed")
-    rows = angles(half_angle, ("numpy", "c", "c-float"))
-    table = TextTable([Column("back end", "<"), Column("angle_rad", spec=".15g")], rows)
-    data = [{"backend": name, "angle_rad": angle} for name, angle in rows]
-    output.report(Report(table.as_text, lambda: data, lambda: table))
+    output.show(TwistResult(angles(half_angle, ("numpy", "c", "c-float"))))

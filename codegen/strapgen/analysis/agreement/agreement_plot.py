@@ -11,14 +11,16 @@ from strapgen.results import figures
 
 if TYPE_CHECKING:
     from strapgen.analysis.agreement.agreement import Agreement, StepAgreement
+    from strapgen.analysis.error_analysis.series_report import SeriesResult
 
 
-def agreement_image(agreements: Sequence[Agreement], title: str, path: str | Path) -> bytes:
+def agreement_image(result: SeriesResult, path: str | Path) -> bytes:
     """Return predicted against simulated drift: over time at the longest step, and their difference by step length."""
+    agreements = result.agreements
     figure, (left, right) = figures.pyplot().subplots(1, 2, figsize=(11.5, 4.8), layout="constrained")
     _draw_over_time(left, agreements[-1].rungs[0])
     _draw_against_step(right, agreements)
-    figures.title(figure, title)
+    figures.title(figure, result.plot_title)
     return figures.image(figure, path)
 
 

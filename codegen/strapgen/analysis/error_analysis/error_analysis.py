@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -16,22 +15,54 @@ from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.lab.motions.motion_files import is_file
+from strapgen.results.records import INTERNAL, Record, entry
 
 
 @dataclass(frozen=True)
-class ErrorAnalysis:
+class ClosedForm:
+    """The errors at a constant rate in closed form, as text that SymPy can read; x is the angle of a step."""
+
+    angle_lost: str
+    stretch_squared: str
+    #: Intervals of x in which no state grows
+    contractive: list[tuple[float, float | None]] | None
+    errors: dict[str, list[str]] = field(metadata=entry(key="errors_after_N_steps"))
+    errors_orthonormalized: dict[str, list[str]] = field(
+        metadata=entry(key="errors_after_N_steps_orthonormalized")
+    )
+
+    @staticmethod
+    def of(constant: ConstantRate) -> ClosedForm:
+        """Return the closed form of a step."""
+        return ClosedForm(
+            sp.sstr(constant.angle_lost),
+            sp.sstr(constant.stretch_squared),
+            contraction(constant),
+            _texts(constant.errors()),
+            _texts(constant.errors_orthonormalized()),
+        )
+
+
+def _texts(errors: Mapping[str, Sequence[sp.Expr]]) -> dict[str, list[str]]:
+    return {part: [sp.sstr(x) for x in errors[part]] for part in PARTS}
+
+
+@dataclass(frozen=True)
+class ErrorAnalysis(Record):
     """The errors of an algorithm on a motion."""
 
     #: Errors of one step
-    step: ErrorSeries
+    step: ErrorSeries = field(metadata=entry(spread=True))
     #: Change of length and determinant in a step
     growth: Growth
     #: Drift of a run; None for a general motion, or for the reason in `no_run`
-    run: RunDrift | None
+    run: RunDrift | None = field(metadata=entry(optional=True))
     #: Closed form of the errors at a constant rate
-    constant: ConstantRate | None
+    constant: ConstantRate | None = field(
+        metadata=entry(key="closed_form", optional=True, write=ClosedForm.of, kind=ClosedForm)
+    )
     #: The reason why there is no closed form of a run; "" if there is one
-    no_run: str = ""
+    no_run: str = field(default="", metadata=INTERNAL)
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -48,26 +79,6 @@ class ErrorAnalysis:
     def growth_powers(self) -> list[int]:
         """Powers of the step in the growth of the errors per second."""
         return [power - 1 for part in PARTS for power in self.step.coefficients(part)]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the analysis as plain JSON data, with expressions as text that SymPy can read."""
-        data = self.step.as_dict()
-        data["growth"] = self.growth.as_dict()
-        if self.run is not None:
-            data["run"] = self.run.as_dict()
-        if self.constant is not None:
-            data["closed_form"] = {
-                "angle_lost": sp.sstr(self.constant.angle_lost),
-                "stretch_squared": sp.sstr(self.constant.stretch_squared),
-                "contractive": contraction(self.constant),
-                "errors_after_N_steps": _texts(self.constant.errors()),
-                "errors_after_N_steps_orthonormalized": _texts(self.constant.errors_orthonormalized()),
-            }
-        return data
-
-
-def _texts(errors: Mapping[str, Sequence[sp.Expr]]) -> dict[str, list[str]]:
-    return {part: [sp.sstr(x) for x in errors[part]] for part in PARTS}
 
 
 def analyse(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorAnalysis:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -18,6 +17,8 @@ from strapgen.analysis.series.notation import covariant_text, intervals_text
 from strapgen.analysis.series.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.results.records import Record, entry, properties
+from strapgen.results.table import ERROR
 
 #: Highest order of a series in the overview; with higher orders the error is far below that of any gyro.
 _HIGHEST_SERIES = 8
@@ -28,15 +29,22 @@ WORK = 544.0
 
 
 @dataclass(frozen=True)
-class OverviewRow:
+class OverviewRow(Record):
     """The errors and the operations of one algorithm."""
 
-    kernel: str
+    computed = properties(
+        constant_term=entry("constant", align="<", internal=True),
+        coning_drift_deg_h=entry("coning, deg/h", ERROR),
+        drift_per_operation_rad=entry("per operation", ".2e"),
+        drift_at_equal_work_deg_h=entry("equal work", ".2e"),
+    )
+
+    kernel: str = field(metadata=entry("algorithm", align="<"))
     increments: int
     #: Order of the step on a general motion
-    order: int | None
+    order: int | None = field(metadata=entry("order"))
     #: Operations of a step, of all kinds
-    operations: int
+    operations: int = field(metadata=entry("operations"))
     #: At a constant rate the angle in rad lost in a step is ``constant x^constant_power`` with x = |w| h; None
     #: if no angle is lost
     constant_power: int | None
@@ -48,7 +56,7 @@ class OverviewRow:
     #: Leading term of the drift of a step on a general motion
     general: str
     #: Angles of a step, in rad, at which no state grows
-    contractive: str
+    contractive: str = field(metadata=entry("contractive", align="<"))
 
     def coning_rate(self, step: float = STEP_S) -> float | None:
         """Return the leading secular drift rate in rad/s on the motion of table 5 of the thesis, for a step in s.
@@ -62,36 +70,39 @@ class OverviewRow:
         return abs(factor) * step**self.coning_power * math.sqrt(5) * rate
 
     @property
-    def per_operation(self) -> float | None:
-        """Leading secular drift of a step in rad, divided by its operations."""
+    def constant_term(self) -> str | None:
+        """The angle that a step loses at a constant rate, with the power of x."""
+        return _term(self.constant, self.constant_power)
+
+    @property
+    def coning_drift_deg_h(self) -> float | None:
+        """Leading secular drift rate on the motion of table 5 of the thesis."""
+        return _deg_h(self.coning_rate())
+
+    @property
+    def drift_per_operation_rad(self) -> float | None:
+        """That drift of a step, divided by the operations of the step."""
         rate = self.coning_rate()
         return None if rate is None else rate * STEP_S / self.operations
 
     @property
-    def at_equal_work(self) -> float | None:
-        """Leading secular drift rate in rad/s if the step is so long that it takes `WORK` operations per second."""
-        return self.coning_rate(self.operations / WORK)
+    def drift_at_equal_work_deg_h(self) -> float | None:
+        """That drift rate if the step is so long that it takes as many operations a second as all others."""
+        return _deg_h(self.coning_rate(self.operations / WORK))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the row as plain JSON data."""
-        rate = self.coning_rate()
-        return {
-            "kernel": self.kernel,
-            "increments": self.increments,
-            "order": self.order,
-            "operations": self.operations,
-            "constant_power": self.constant_power,
-            "constant": None if self.constant is None else sp.sstr(self.constant),
-            "coning_power": self.coning_power,
-            "coning": None if self.coning is None else sp.sstr(self.coning),
-            "general": self.general,
-            "contractive": self.contractive,
-            "coning_drift_deg_h": None if rate is None else math.degrees(rate) * 3600,
-            "drift_per_operation_rad": self.per_operation,
-            "drift_at_equal_work_deg_h": (
-                None if self.at_equal_work is None else math.degrees(self.at_equal_work) * 3600
-            ),
-        }
+
+def _deg_h(rate: float | None) -> float | None:
+    """Return a rate in rad/s in deg/h."""
+    return None if rate is None else math.degrees(rate) * 3600
+
+
+def _term(number: sp.Expr | None, power: int | None) -> str | None:
+    if number is None or power is None:
+        return None
+    size = sp.Rational(number) if number.is_Rational else None
+    if size is None or size.q > 10**9:
+        return f"{float(number):.4g} x^{power}"
+    return f"{size} x^{power}"
 
 
 def methods() -> list[str]:

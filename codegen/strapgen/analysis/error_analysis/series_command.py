@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -24,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, in_words
 
 if TYPE_CHECKING:
+    from strapgen.analysis.agreement.agreement import Agreement
     from strapgen.catalogue import Choice
 
 _Text = str | None
@@ -89,10 +91,9 @@ class DriftPlot:
     ] = None
     duration: Duration = Positive("2")
 
-    def draw(self, choice: Choice, motion: str, count: int, path: Path) -> bytes:
-        """Return the image of the drift on a motion of the catalogue."""
+    def agreements(self, choice: Choice, motion: str, count: int) -> tuple[Sequence[Agreement], str]:
+        """Return the drift on a motion of the catalogue, predicted and simulated, with a title."""
         from strapgen.analysis.agreement import agreement
-        from strapgen.analysis.agreement.agreement_plot import agreement_image
         from strapgen.catalogue import MOTIONS
         from strapgen.lab.motions import motions
 
@@ -108,7 +109,7 @@ class DriftPlot:
             f"{agreements[0].kernel}: drift, predicted and simulated\n"
             f"{self.duration} s of {motion} motion, {in_words(settings)}"
         )
-        return agreement_image(agreements, title, path)
+        return agreements, title
 
 
 @dataclass(frozen=True)
@@ -200,18 +201,18 @@ def series(
     if versus.versus is not None:
         return _ratios(choices[0], versus.choose(versus.versus, methods.each()[0]), motion, terms, output)
     from strapgen.analysis.error_analysis.error_analysis import analyse
-    from strapgen.analysis.error_analysis.series_report import series_report
+    from strapgen.analysis.error_analysis.series_report import SeriesResult
 
-    image = None if output.plot is None else plot.draw(choices[0], motion, terms, output.plot)
-    output.report(series_report([analyse(choice, motion, terms) for choice in choices]), image)
+    drawn = ((), "") if output.plot is None else plot.agreements(choices[0], motion, terms)
+    output.show(SeriesResult([analyse(choice, motion, terms) for choice in choices], *drawn))
 
 
 def _ratios(first: Choice, second: Choice, motion: str, terms: int, output: Output) -> None:
     """Deliver the errors of two algorithms and their ratio."""
     from strapgen.analysis.ratios import ratios
-    from strapgen.analysis.ratios.ratios_report import ratio_report
+    from strapgen.analysis.ratios.ratios_report import RatioResult
 
-    output.report(ratio_report(ratios.versus(first, second, motion, terms)))
+    output.show(RatioResult(ratios.versus(first, second, motion, terms)))
 
 
 def _may_be_velocity(algorithm: str) -> bool:
@@ -228,20 +229,20 @@ def _of_velocity(choices: list[Choice], motion: str, terms: int, versus: Versus,
             f"series of {choices[0].name} hold for any motion; --motion, --versus and --plot go with an attitude"
         )
     from strapgen.analysis.series import velocity_series
-    from strapgen.analysis.series.velocity_series_report import velocity_series_report
+    from strapgen.analysis.series.velocity_series_report import VelocitySeriesResult
 
-    output.report(velocity_series_report([velocity_series.series(choice, terms) for choice in choices]))
+    output.show(VelocitySeriesResult([velocity_series.series(choice, terms) for choice in choices]))
 
 
 def _overview(algorithm: _Text, methods: SeveralMethods, output: Output) -> None:
     """Deliver the table of all algorithms and methods side by side."""
     from strapgen import catalogue
     from strapgen.analysis.error_analysis import overview
-    from strapgen.analysis.error_analysis.overview_report import overview_report
+    from strapgen.analysis.error_analysis.overview_report import OverviewResult
 
     algorithms = list(catalogue.ALGORITHMS)
     if algorithm is not None:
         algorithms = [checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)]
     names = methods.method and [checks.choice("method", name, catalogue.METHODS) for name in methods.method]
     choices = overview.choices(algorithms, names)
-    output.report(overview_report(list(track(overview.overview(choices), "deriving", len(choices)))))
+    output.show(OverviewResult(list(track(overview.overview(choices), "deriving", len(choices)))))

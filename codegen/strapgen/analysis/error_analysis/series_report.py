@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -14,7 +15,10 @@ from strapgen.analysis.series.notation import LATEX, covariant_text, intervals_t
 from strapgen.analysis.series.series import PARTS, STEP
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
-from strapgen.results.report import Report
+from strapgen.results.result import Result
+
+if TYPE_CHECKING:
+    from strapgen.analysis.agreement.agreement import Agreement
 
 
 def series_text(analysis: ErrorAnalysis) -> str:
@@ -61,18 +65,29 @@ def series_text(analysis: ErrorAnalysis) -> str:
     return "\n".join(lines)
 
 
-def series_report(analyses: Sequence[ErrorAnalysis]) -> Report:
-    """Return one analysis, or several side by side, as a report."""
+@dataclass(frozen=True)
+class SeriesResult(Result):
+    """What one step loses, as power series in its length, with the drift of a run; expressions are text for SymPy."""
 
-    def data() -> Any:
-        every = [analysis.as_dict() for analysis in analyses]
-        return every if len(every) > 1 else every[0]
+    each = ErrorAnalysis
+    drawn_by = "strapgen.analysis.agreement.agreement_plot:agreement_image"
 
-    return Report(
-        lambda: "\n\n".join(map(series_text, analyses)),
-        data,
-        latex=lambda: "\n\n".join(map(series_latex, analyses)),
-    )
+    analyses: Sequence[ErrorAnalysis]
+    #: Predicted and simulated drift, for a plot, with its title
+    agreements: Sequence[Agreement] = ()
+    plot_title: str = ""
+
+    def results(self) -> Sequence[ErrorAnalysis]:
+        """Return the analyses."""
+        return self.analyses
+
+    def text(self) -> str:
+        """Return the analyses one after the other."""
+        return "\n\n".join(map(series_text, self.analyses))
+
+    def latex(self) -> str:
+        """Return the analyses as align environments."""
+        return "\n\n".join(map(series_latex, self.analyses))
 
 
 def _growth_lines(gain: Growth) -> Iterator[str]:

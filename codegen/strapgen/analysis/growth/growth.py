@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
@@ -13,7 +14,7 @@ import sympy as sp
 from strapgen.analysis.series import motion_rates
 from strapgen.analysis.series.constant_rate import ANGLE, ConstantRate, constant_rate
 from strapgen.analysis.series.invariants import scalar, scalar_value
-from strapgen.analysis.series.notation import intervals_text, scalar_text
+from strapgen.analysis.series.notation import intervals_text, scalar_text, sum_text
 from strapgen.analysis.series.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
@@ -24,6 +25,7 @@ from strapgen.kernel.rotations import cross_elements, dot
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.step_series import one_step
 from strapgen.lab.step_series.one_step import Step
+from strapgen.results.records import INTERNAL, Record, entry
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,37 +35,37 @@ if TYPE_CHECKING:
 _DIGITS = 60
 
 
+def _sum(terms: Mapping[int, sp.Expr]) -> str:
+    return sum_text(terms, STEP)
+
+
+def _invariant(parts: Mapping[str, Mapping[int, Polynomial]]) -> Any:
+    """Return the terms as text; None without any."""
+    return {
+        name: {power: scalar_text(one) for power, one in rows.items()} for name, rows in parts.items()
+    } or None
+
+
 @dataclass(frozen=True)
-class Growth:
+class Growth(Record):
     """The change in one step of a length and of a determinant that should both stay 1."""
 
-    kernel: str
-    motion: str
+    kernel: str = field(metadata=INTERNAL)
+    motion: str = field(metadata=INTERNAL)
     #: The first terms that are not zero, by power of the step length, of the length of a state of four
-    #: parameters (None for other states) and of the determinant of the direction cosine matrix
-    length: dict[int, sp.Expr] | None
-    determinant: dict[int, sp.Expr]
+    #: parameters; None for other states
+    length: dict[int, sp.Expr] | None = field(metadata=entry(optional=True, write=_sum, kind=str))
+    #: The same of the determinant of the direction cosine matrix
+    determinant: dict[int, sp.Expr] = field(metadata=entry(write=_sum, kind=str))
     #: For a general rate the terms of "length" and "determinant" in scalar products
-    invariant: dict[str, dict[int, Polynomial]]
+    invariant: dict[str, dict[int, Polynomial]] = field(
+        metadata=entry(optional=True, write=_invariant, kind=dict[str, dict[str, str]])
+    )
 
     __repr__ = short_repr
 
     def _in_words(self) -> str:
         return f"of {self.kernel}, {self.motion} motion"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the sums as plain JSON data."""
-        data: dict[str, Any] = {}
-        for name in ("length", "determinant"):
-            terms = getattr(self, name)
-            if terms is not None:
-                data[name] = sp.sstr(sp.Add(*(x * STEP**p for p, x in terms.items())), order="lex")
-        if self.invariant:
-            data["invariant"] = {
-                name: {str(power): scalar_text(one) for power, one in rows.items()}
-                for name, rows in self.invariant.items()
-            }
-        return data
 
 
 def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
@@ -182,14 +184,16 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(Record):
     """The change of the length of a state in a step at a constant rate."""
 
-    kernel: str
+    kernel: str = field(metadata=entry("step", align="<"))
     #: Square of the factor by which the state grows across the axis, a function of the angle x of the step
-    stretch_squared: sp.Expr
+    stretch_squared: sp.Expr = field(metadata=entry("square of the stretch, x = |w| h", align="<", cell=str))
     #: The intervals from `contraction`
-    contractive: list[tuple[float, float | None]] | None
+    contractive: list[tuple[float, float | None]] | None = field(
+        metadata=entry("x at which no state grows", align="<", least=26, cell=intervals_text)
+    )
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -207,14 +211,6 @@ class Stability:
         squares = sp.lambdify(ANGLE, self.stretch_squared, "numpy")(angles)
         factors: NDArray[np.float64] = np.sqrt(np.broadcast_to(np.asarray(squares, np.float64), angles.shape))
         return factors
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the stability as plain JSON data."""
-        return {
-            "kernel": self.kernel,
-            "stretch_squared": sp.sstr(self.stretch_squared),
-            "contractive": self.contractive,
-        }
 
 
 def stability(choice: Choice) -> Stability:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +11,12 @@ from strapgen.results import figures
 
 if TYPE_CHECKING:
     from strapgen.analysis.growth.growth import Stability
+    from strapgen.analysis.growth.growth_report import StabilityResult
 
 
-def stability_image(stabilities: Sequence[Stability], title: str, path: str | Path) -> bytes:
+def stability_image(result: StabilityResult, path: str | Path) -> bytes:
     """Return the growth of a state at a constant rate against the angle of a step; below, where the step contracts."""
+    stabilities = result.steps
     ends = [end for one in stabilities for pair in one.contractive or () for end in pair if end is not None]
     reach = 1.15 * max([*ends, 2.0])
     below = 0.28 * len(stabilities)
@@ -39,7 +40,7 @@ def stability_image(stabilities: Sequence[Stability], title: str, path: str | Pa
     bars.set_xlim(0.0, reach)
     figures.style(curves)
     figures.style(bars, grid="x")
-    figures.title(figure, title)
+    figures.title(figure, "constant rate: growth of the state in a step, and where it contracts")
     return figures.image(figure, path)
 
 

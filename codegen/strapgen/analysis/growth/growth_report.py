@@ -1,23 +1,35 @@
-"""Reports the stability of steps."""
+"""The stability of steps as a result."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-import sympy as sp
+from dataclasses import dataclass
 
 from strapgen.analysis.growth.growth import Stability
-from strapgen.analysis.series.notation import intervals_text
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
-from strapgen.results.report import Report
-from strapgen.results.table import Column, TextTable
+from strapgen.results.records import reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import TextTable
 
-_COLUMNS = (
-    Column("step", "<"),
-    Column("x at which no state grows", "<", least=26),
-    Column("square of the stretch, x = |w| h", "<"),
-)
+
+@dataclass(frozen=True)
+class StabilityResult(Result):
+    """The growth of states in steps at a constant rate: a row for each step."""
+
+    rows_in = "steps"
+    row = Stability
+    drawn_by = "strapgen.analysis.growth.growth_plot:stability_image"
+
+    steps: Sequence[Stability]
+
+    def table(self) -> TextTable:
+        """Return the steps as a table."""
+        return reader_table(self.steps, Stability, "kernel", "contractive", "stretch_squared")
+
+    def latex(self) -> str:
+        """Return the squares of the stretches."""
+        return stability_latex(self.steps)
 
 
 def stability_latex(stabilities: Sequence[Stability]) -> str:
@@ -26,25 +38,3 @@ def stability_latex(stabilities: Sequence[Stability]) -> str:
         (rf"\rho_{{\mathrm{{{one.kernel}}}}}^{{2}}", expression_latex(one.stretch_squared))
         for one in stabilities
     )
-
-
-def stability_text(stabilities: Sequence[Stability]) -> str:
-    """Return stabilities as a table."""
-    return _table(stabilities).as_text()
-
-
-def stability_report(stabilities: Sequence[Stability]) -> Report:
-    """Return stabilities as a report."""
-    return Report(
-        lambda: stability_text(stabilities),
-        lambda: [one.as_dict() for one in stabilities],
-        lambda: _table(stabilities),
-        latex=lambda: stability_latex(stabilities),
-    )
-
-
-def _table(stabilities: Sequence[Stability]) -> TextTable:
-    rows = [
-        (one.kernel, intervals_text(one.contractive), sp.sstr(one.stretch_squared)) for one in stabilities
-    ]
-    return TextTable(_COLUMNS, rows)

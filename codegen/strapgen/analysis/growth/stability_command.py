@@ -59,9 +59,6 @@ def stability(
             methods = replace(methods, increments=("enough",))
     choices = methods.choices(algorithm)
     from strapgen.analysis.growth import growth
-    from strapgen.analysis.growth.growth_plot import stability_image
-    from strapgen.analysis.growth.growth_report import stability_report
+    from strapgen.analysis.growth.growth_report import StabilityResult
 
-    steps = [growth.stability(choice) for choice in choices]
-    title = "constant rate: growth of the state in a step, and where it contracts"
-    output.report(stability_report(steps), lambda path: stability_image(steps, title, path))
+    output.show(StabilityResult([growth.stability(choice) for choice in choices]))

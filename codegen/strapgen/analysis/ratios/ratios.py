@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -12,9 +11,11 @@ from strapgen import catalogue
 from strapgen.analysis.series.accumulation import accumulate
 from strapgen.analysis.series.constant_rate import constant_rate
 from strapgen.analysis.series.motion_rates import TIME
+from strapgen.analysis.series.notation import sum_text
 from strapgen.analysis.series.series import MOTIONS, STEP, series
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
+from strapgen.results.records import INTERNAL, Record, entry, properties
 
 #: The angle of a step at a constant rate, |w| h.
 STEP_ANGLE = sp.Symbol("x")
@@ -25,8 +26,14 @@ Terms = Mapping[int, Sequence[sp.Expr]]
 
 
 @dataclass(frozen=True)
-class Ratio:
+class Ratio(Record):
     """The ratio of the errors of two algorithms."""
+
+    computed = properties(
+        first_terms=entry(),
+        second_terms=entry(),
+        expression=entry(key="ratio", write=lambda ratio: sp.sstr(ratio, order="lex"), kind=str | None),
+    )
 
     #: The kernels
     first: str
@@ -37,10 +44,10 @@ class Ratio:
     #: The variable of both series
     symbol: sp.Symbol
     #: The terms of both, by power of the symbol
-    terms: tuple[Terms, Terms]
+    terms: tuple[Terms, Terms] = field(metadata=INTERNAL)
     #: The first terms of the quotient by power of the symbol; None if one of the two has no error, or their
     #: drifts are not parallel
-    ratio: dict[int, sp.Expr] | None
+    ratio: dict[int, sp.Expr] | None = field(metadata=INTERNAL)
 
     @property
     def expression(self) -> sp.Expr | None:
@@ -49,28 +56,21 @@ class Ratio:
             return None
         return sp.Add(*(x * self.symbol**power for power, x in self.ratio.items()))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain JSON data."""
-        return {
-            "first": self.first,
-            "second": self.second,
-            "motion": self.motion,
-            "quantity": self.quantity,
-            "symbol": self.symbol.name,
-            "first_terms": [_sum(row, self.symbol) for row in columns(self.terms[0])],
-            "second_terms": [_sum(row, self.symbol) for row in columns(self.terms[1])],
-            "ratio": None if self.ratio is None else _sum(self.ratio, self.symbol),
-        }
+    @property
+    def first_terms(self) -> list[str]:
+        """The terms of the first, a sum for each element."""
+        return [sum_text(row, self.symbol) for row in columns(self.terms[0])]
+
+    @property
+    def second_terms(self) -> list[str]:
+        """The terms of the second, a sum for each element."""
+        return [sum_text(row, self.symbol) for row in columns(self.terms[1])]
 
 
 def columns(terms: Terms) -> list[dict[int, sp.Expr]]:
     """Return the coefficients of each element by power: one dict for a number, three for a vector."""
     length = max((len(row) for row in terms.values()), default=1)
     return [{power: row[k] for power, row in terms.items()} for k in range(length)]
-
-
-def _sum(row: Mapping[int, sp.Expr], symbol: sp.Symbol) -> str:
-    return str(sp.sstr(sp.Add(*(x * symbol**power for power, x in row.items())), order="lex"))
 
 
 def versus(first: Choice, second: Choice, motion: str = "general", terms: int = 2) -> Ratio:
@@ -170,17 +170,15 @@ def _reduced(upper: sp.Expr, lower: sp.Expr) -> sp.Expr:
 
 
 @dataclass(frozen=True)
-class Claim:
+class Claim(Record):
     """A ratio that the thesis states, with its derived value."""
 
     #: What is compared
     statement: str
     #: Its first terms by power of the angle x = |w| h of a step
-    ratio: dict[int, sp.Expr]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the claim as plain JSON data."""
-        return {"statement": self.statement, "ratio": _sum(self.ratio, STEP_ANGLE)}
+    ratio: dict[int, sp.Expr] = field(
+        metadata=entry(write=lambda ratio: sum_text(ratio, STEP_ANGLE), kind=str)
+    )
 
 
 def claims() -> list[Claim]:

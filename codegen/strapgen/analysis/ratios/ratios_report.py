@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import sympy as sp
 
 from strapgen.analysis.ratios.ratios import STEP_ANGLE, Claim, Ratio, columns
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import PAGE, equations, unbroken
-from strapgen.results.report import Report
+from strapgen.results.records import entry
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 
@@ -20,11 +22,12 @@ def ratio_text(comparison: Ratio) -> str:
     ]
     if comparison.symbol == STEP_ANGLE:
         lines.append("x = |w| h, the angle of a step")
-    data = comparison.as_dict()
-    for name, key in ((comparison.first, "first_terms"), (comparison.second, "second_terms")):
-        axes = ("",) if len(data[key]) == 1 else (", x", ", y", ", z")
-        lines += ["", *(f"{name}{axis} = {text}" for axis, text in zip(axes, data[key], strict=True))]
-    lines += ["", f"ratio = {data['ratio']}" if comparison.ratio is not None else _no_ratio(comparison)]
+    both = ((comparison.first, comparison.first_terms), (comparison.second, comparison.second_terms))
+    for name, terms in both:
+        axes = ("",) if len(terms) == 1 else (", x", ", y", ", z")
+        lines += ["", *(f"{name}{axis} = {text}" for axis, text in zip(axes, terms, strict=True))]
+    ratio = comparison.as_dict()["ratio"]
+    lines += ["", _no_ratio(comparison) if ratio is None else f"ratio = {ratio}"]
     return "\n".join(lines)
 
 
@@ -55,9 +58,19 @@ def ratio_latex(comparison: Ratio) -> str:
     return f"% {comparison.quantity}, {comparison.motion} motion\n{equations(rows)}"
 
 
-def ratio_report(comparison: Ratio) -> Report:
-    """Return a comparison as a report."""
-    return Report(lambda: ratio_text(comparison), comparison.as_dict, latex=lambda: ratio_latex(comparison))
+@dataclass(frozen=True)
+class RatioResult(Result):
+    """The ratio of the errors of two algorithms; expressions are text that SymPy can read."""
+
+    comparison: Ratio = field(metadata=entry(spread=True))
+
+    def text(self) -> str:
+        """Return the terms of both, and the ratio."""
+        return ratio_text(self.comparison)
+
+    def latex(self) -> str:
+        """Return the same as an align environment."""
+        return ratio_latex(self.comparison)
 
 
 def claims_text(claims: Sequence[Claim]) -> str:

@@ -8,7 +8,8 @@ and it prevents scale and skew from accumulating.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,27 +18,39 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.analysis.series.error_rate import ErrorRate, error_rate
 from strapgen.analysis.series.motion_rates import TIME, is_plain, parameters
+from strapgen.analysis.series.notation import sum_text, vector_texts
 from strapgen.analysis.series.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.kernel import rotations
 from strapgen.kernel.power_series import Powers
 from strapgen.lab.step_series import one_step
+from strapgen.results.records import INTERNAL, Record, entry
+
+
+def _sums(terms: Mapping[int, sp.Matrix]) -> list[str]:
+    return vector_texts(terms, STEP)
 
 
 @dataclass(frozen=True)
-class RunDrift:
+class RunDrift(Record):
     """The drift of a run that begins at time 0."""
 
-    kernel: str
-    motion: str
+    kernel: str = field(metadata=INTERNAL)
+    motion: str = field(metadata=INTERNAL)
     #: Drift rate in rad/s, reference axes: coefficients by power of the step length
-    secular: dict[int, sp.Matrix]
+    secular: dict[int, sp.Matrix] = field(
+        metadata=entry(key="drift_rate", unit="rad/s", write=_sums, kind=list[str])
+    )
     #: Oscillating part of the drift in rad as a function of the time t, zero at time 0; to first order in the
     #: error
-    bounded: dict[int, sp.Matrix]
+    bounded: dict[int, sp.Matrix] = field(
+        metadata=entry(key="drift_bounded", unit="rad", write=_sums, kind=list[str])
+    )
     #: Rate in 1/s at which the logarithm of the scale across the drift grows, by power of the step length
-    growth: dict[int, sp.Expr]
+    growth: dict[int, sp.Expr] = field(
+        metadata=entry(key="growth_rate", unit="1/s", write=lambda terms: sum_text(terms, STEP), kind=str)
+    )
 
     def drift(self, time: sp.Expr = TIME) -> list[sp.Expr]:
         """Return the drift in rad on x, y, z after a time in s, as the sum of the known terms."""
@@ -47,21 +60,6 @@ class RunDrift:
         for power, row in self.bounded.items():
             total += row.subs(TIME, time) * STEP**power
         return list(total)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the terms as plain JSON data: a sum for each axis, in the symbols h and t."""
-
-        def sums(rows: dict[int, sp.Matrix]) -> list[str]:
-            return [
-                sp.sstr(sp.Add(*(row[axis] * STEP**p for p, row in rows.items())), order="lex")
-                for axis in range(3)
-            ]
-
-        return {
-            "drift_rate": sums(self.secular),
-            "drift_bounded": sums(self.bounded),
-            "growth_rate": sp.sstr(sp.Add(*(x * STEP**p for p, x in self.growth.items())), order="lex"),
-        }
 
 
 def accumulate(choice: Choice, motion: str, terms: int = 2) -> RunDrift:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -154,3 +154,13 @@ def intervals_text(intervals: Sequence[tuple[float, float | None]] | None) -> st
         return "kept"
     parts = [f"{low:.4g} up" if high is None else f"{low:.4g} to {high:.4g}" for low, high in intervals]
     return ", ".join(parts) or "nowhere"
+
+
+def sum_text(terms: Mapping[int, sp.Expr], symbol: sp.Symbol) -> str:
+    """Return the sum of terms by power of a symbol as text that SymPy can read."""
+    return str(sp.sstr(sp.Add(*(x * symbol**power for power, x in terms.items())), order="lex"))
+
+
+def vector_texts(terms: Mapping[int, Sequence[sp.Expr]], symbol: sp.Symbol) -> list[str]:
+    """Return the elements of vectors, by power of a symbol, as sums; three zeros for no terms."""
+    return [sum_text({power: row[axis] for power, row in terms.items()}, symbol) for axis in range(3)]

@@ -9,14 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
 from strapgen import catalogue
 from strapgen.analysis.series import motion_rates
 from strapgen.analysis.series.invariants import Invariants, invariants, matrix
-from strapgen.analysis.series.notation import covariant_text
+from strapgen.analysis.series.notation import covariant_text, vector_texts
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -26,6 +26,7 @@ from strapgen.kernel.power_series import Powers
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.step_series import one_step
 from strapgen.lab.step_series.one_step import Step, errors
+from strapgen.results.records import Record, entry, properties
 
 #: Motions for which a series can be derived.
 MOTIONS = ("general", *catalogue.MOTIONS)
@@ -39,8 +40,32 @@ PARTS = ("drift", "scale", "skew")
 Coefficients = dict[int, tuple[sp.Expr, sp.Expr, sp.Expr]]
 
 
+def _sums(terms: Coefficients) -> list[str]:
+    return vector_texts(terms, STEP)
+
+
+class _Invariant(NamedTuple):
+    """Terms of one power of the step in vectors."""
+
+    drift: str
+    scale_and_skew: str
+
+
+def _invariant(terms: Mapping[int, Invariants]) -> dict[int, _Invariant] | None:
+    """Return the terms as text; None without any."""
+    texts = {
+        power: _Invariant(covariant_text(one.drift), covariant_text(one.symmetric, symmetric=True))
+        for power, one in terms.items()
+    }
+    return texts or None
+
+
+def _or_none(names: Sequence[str]) -> Sequence[str] | None:
+    return names or None
+
+
 @dataclass(frozen=True)
-class ErrorSeries:
+class ErrorSeries(Record):
     """The error of one step.
 
     Parameters
@@ -57,14 +82,18 @@ class ErrorSeries:
         Coefficients of the kernel that are not known: all terms are polynomials in them.
     """
 
+    computed = properties(order=entry())
+
     kernel: str
     motion: str
-    drift: Coefficients
-    scale: Coefficients
-    skew: Coefficients
-    known: int
-    invariant: dict[int, Invariants] = field(default_factory=dict)
-    unknowns: tuple[str, ...] = ()
+    drift: Coefficients = field(metadata=entry(write=_sums, kind=list[str]))
+    scale: Coefficients = field(metadata=entry(write=_sums, kind=list[str]))
+    skew: Coefficients = field(metadata=entry(write=_sums, kind=list[str]))
+    known: int = field(metadata=entry(key="known_to_power"))
+    invariant: dict[int, Invariants] = field(
+        default_factory=dict, metadata=entry(optional=True, write=_invariant, kind=dict[str, _Invariant])
+    )
+    unknowns: tuple[str, ...] = field(default=(), metadata=entry(optional=True, write=_or_none))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -90,24 +119,6 @@ class ErrorSeries:
         """Return the three sums of terms of "drift", "scale" or "skew"."""
         rows = self.coefficients(part).items()
         return [sp.Add(*(row[axis] * STEP**power for power, row in rows)) for axis in range(3)]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the series as plain JSON data, with expressions as text that SymPy can read."""
-        data: dict[str, Any] = {"kernel": self.kernel, "motion": self.motion, "order": self.order}
-        for part in PARTS:
-            data[part] = [sp.sstr(expression, order="lex") for expression in self.expressions(part)]
-        data["known_to_power"] = self.known
-        if self.unknowns:
-            data["unknowns"] = list(self.unknowns)
-        if self.motion == "general":
-            data["invariant"] = {
-                str(power): {
-                    "drift": covariant_text(one.drift),
-                    "scale_and_skew": covariant_text(one.symmetric, symmetric=True),
-                }
-                for power, one in self.invariant.items()
-            }
-        return data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ErrorSeries:

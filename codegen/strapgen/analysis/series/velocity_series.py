@@ -7,9 +7,9 @@ axes. Their increments are exact, and so are the true changes: the integral of R
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -20,12 +20,13 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.kernel import reading
+from strapgen.kernel import power_series, reading
 from strapgen.kernel.covariants import Coefficients, Frame
 from strapgen.kernel.evaluation import exact
 from strapgen.kernel.kernel import Kernel
-from strapgen.kernel.power_series import Powers, field, outputs
+from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab.step_series import one_step, sampled_motion
+from strapgen.results.records import entry, plain_record
 
 #: The parts of a series, which are the outputs of a kernel by what changes.
 PARTS = ("velocity", "position")
@@ -81,19 +82,7 @@ class VelocitySeries:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the series as plain JSON data."""
-        notation = with_forces(TEXT, self.known)
-        data: dict[str, Any] = {"kernel": self.kernel, "motion": "general", "order": self.order}
-        for part in self.parts:
-            data[part] = {
-                str(power): covariant_text(one, notation=notation)
-                for power, one in self.coefficients(part).items()
-            }
-        data["known_to_power"] = self.known
-        data["terms"] = {
-            part: {str(power): _as_terms(one) for power, one in self.coefficients(part).items()}
-            for part in self.parts
-        }
-        return data | ({"unknowns": list(self.unknowns)} if self.unknowns else {})
+        return plain_record(VelocityTerms.of(self))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> VelocitySeries:
@@ -113,14 +102,52 @@ class VelocitySeries:
         return cls(data["kernel"], velocity, position, data["known_to_power"], tuple(parts), unknowns)
 
 
-def _as_terms(coefficients: Coefficients) -> list[dict[str, Any]]:
-    """Return the terms of an error: numbers of vectors, the scalar products that stand before them, and a number."""
-    return [
-        {
-            "vectors": [*covariant],
-            "products": [[*product] for product in monomial],
-            "number": sp.sstr(exact(number)),
+class _Term(NamedTuple):
+    """A term of an error: numbers of vectors, the scalar products that stand before them, and a number."""
+
+    vectors: list[int]
+    products: list[list[int]]
+    number: str
+
+
+@dataclass(frozen=True)
+class VelocityTerms:
+    """The errors of a step of velocity and position by power of its length, as text and as terms."""
+
+    kernel: str
+    motion: str
+    order: int | None
+    #: Error of the velocity change by power of the step
+    velocity: dict[str, str] | None = field(metadata=entry(optional=True))
+    #: Error of the position change, divided by the step, by power of the step
+    position: dict[str, str] | None = field(metadata=entry(optional=True))
+    #: The last power of the step that was derived
+    known_to_power: int
+    #: The terms of velocity and position by power of the step
+    terms: dict[str, dict[str, list[_Term]]]
+    #: Coefficients of the kernel that are not known
+    unknowns: tuple[str, ...] | None = field(metadata=entry(optional=True))
+
+    @staticmethod
+    def of(series: VelocitySeries) -> VelocityTerms:
+        """Return a series as text and terms."""
+        notation = with_forces(TEXT, series.known)
+        rows = {part: series.coefficients(part) for part in series.parts}
+        texts = {
+            part: {str(power): covariant_text(one, notation=notation) for power, one in row.items()}
+            for part, row in rows.items()
         }
+        terms = {
+            part: {str(power): _as_terms(one) for power, one in row.items()} for part, row in rows.items()
+        }
+        both = (texts.get("velocity"), texts.get("position"))
+        facts = (series.kernel, "general", series.order)
+        return VelocityTerms(*facts, *both, series.known, terms, series.unknowns or None)
+
+
+def _as_terms(coefficients: Coefficients) -> list[_Term]:
+    return [
+        _Term([*covariant], [[*product] for product in monomial], sp.sstr(exact(number)))
         for covariant, polynomial in coefficients.items()
         for monomial, number in polynomial.items()
     ]
@@ -242,7 +269,7 @@ def share_of_change(part: str, n: int, j: int) -> sp.Expr:
 def domain(kernel: Kernel) -> Any:
     """Return the smallest domain that holds the numbers of a kernel and polynomials in its unknowns."""
     expressions = [x for stage in (*kernel.stages, *kernel.outputs) for x in stage.expressions]
-    return field(expressions, kernel.unknowns)
+    return power_series.field(expressions, kernel.unknowns)
 
 
 def coefficients(kernel: Kernel, top: int, terms: int | None = None) -> dict[str, dict[int, Coefficients]]:

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from strapgen.analysis.series.notation import LATEX, TEXT, covariant_text, with_forces
-from strapgen.analysis.series.velocity_series import VelocitySeries
+from strapgen.analysis.series.velocity_series import VelocitySeries, VelocityTerms
 from strapgen.results.display.latex import equations
-from strapgen.results.report import Report
+from strapgen.results.result import Result
 
 #: Names of the errors in LaTeX.
 _SYMBOLS = {"velocity": r"\delta\mathbf{v}", "position": r"\delta\mathbf{r}/h"}
 
 
-def velocity_series_report(several: Sequence[VelocitySeries]) -> Report:
-    """Return the series of one method, or of several side by side, as a report."""
+@dataclass(frozen=True)
+class VelocitySeriesResult(Result):
+    """What one step of velocity and position loses, as power series in its length."""
 
-    def data() -> Any:
-        every = [one.as_dict() for one in several]
-        return every if len(every) > 1 else every[0]
+    each = VelocityTerms
 
-    return Report(
-        lambda: "\n\n".join(map(_text, several)),
-        data,
-        latex=lambda: "\n\n".join(map(velocity_series_latex, several)),
-    )
+    several: Sequence[VelocitySeries]
+
+    def results(self) -> Sequence[VelocityTerms]:
+        """Return the series as text and terms."""
+        return [VelocityTerms.of(one) for one in self.several]
+
+    def text(self) -> str:
+        """Return the series one after the other."""
+        return "\n\n".join(map(_text, self.several))
+
+    def latex(self) -> str:
+        """Return the series as align environments."""
+        return "\n\n".join(map(velocity_series_latex, self.several))
 
 
 def _text(series: VelocitySeries) -> str:

@@ -68,7 +68,7 @@ def tableau(
     Example: strapgen tableau examples/kutta4.toml --set c2=1/3 c3=2/3 --format toml
     """
     output.check(method)
-    from strapgen.analysis.tableau.tableau_report import tableau_data, tableau_report
+    from strapgen.analysis.tableau.tableau_report import TableauResult
     from strapgen.analysis.unknowns import unknown_tableau
     from strapgen.analysis.unknowns.tableau_families_report import toml_text
     from strapgen.catalogue.methods import tableaux
@@ -89,20 +89,20 @@ def tableau(
     if output.format == "toml":
         output.deliver(toml_text(butcher))
     else:
-        output.report(tableau_report(tableau_data(butcher), butcher))
+        output.show(TableauResult.of(butcher))
 
 
 def _families(method: str, output: Output) -> None:
     """Deliver the families of a tableau with unknowns."""
     from strapgen.analysis.unknowns import unknown_tableau
-    from strapgen.analysis.unknowns.tableau_families_report import families_report
+    from strapgen.analysis.unknowns.tableau_families_report import FamiliesResult
 
     if output.format not in ("text", "json", "latex"):
         raise InputError(f"--format {output.format} goes with --set; families are text, json or latex")
     unknown = unknown_tableau.read(method)
     with waiting(f"solving the conditions of {method}"):
         solutions = {equations: unknown.solve(equations) for equations in unknown_tableau.EQUATIONS}
-    output.report(families_report(unknown, solutions))
+    output.show(FamiliesResult.of(unknown, solutions))
 
 
 def _member(method: str, settings: dict[str, str], family: int) -> Tableau:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -12,8 +12,8 @@ import sympy as sp
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.ir.suggestions import counted
-from strapgen.kernel import unknown_values
-from strapgen.kernel.power_series import field
+from strapgen.kernel import power_series, unknown_values
+from strapgen.results.records import entry, properties
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,18 @@ class Equation:
     """
 
     label: str
-    order: int
-    value: sp.Expr
+    order: int = field(metadata=entry(key="power"))
+    value: sp.Expr = field(metadata=entry(key="expression"))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
         return f"{self.label}: {self.value} = 0"
+
+
+def _shown(expressions: Sequence[sp.Expr]) -> list[str]:
+    return list(map(shown, expressions))
 
 
 @dataclass(frozen=True)
@@ -57,10 +61,12 @@ class Family:
         Irreducible polynomials in the free unknowns that must be zero; empty for almost all families.
     """
 
-    values: dict[sp.Symbol, sp.Expr]
-    free: tuple[sp.Symbol, ...]
-    nonzero: tuple[sp.Expr, ...] = ()
-    equations: tuple[sp.Expr, ...] = ()
+    computed = properties(dimension=entry())
+
+    values: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
+    free: tuple[sp.Symbol, ...] = field(metadata=entry(key="parameters", kind=list[str]))
+    nonzero: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_shown, kind=list[str]))
+    equations: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_shown, kind=list[str]))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -112,10 +118,10 @@ class PolynomialSolution:
         If there is no solution, the highest order up to which the equations have one; None if not even the lowest have.
     """
 
-    unknowns: tuple[sp.Symbol, ...]
+    unknowns: tuple[sp.Symbol, ...] = field(metadata=entry(kind=list[str]))
     families: tuple[Family, ...]
-    reason: str = ""
-    solvable: int | None = None
+    reason: str = field(default="", metadata=entry(write=lambda reason: reason or None, kind=str | None))
+    solvable: int | None = field(default=None, metadata=entry(key="solvable_order"))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -140,7 +146,7 @@ def shown(polynomial: sp.Expr) -> str:
     >>> shown(sp.Symbol("c") - sp.Rational(2, 3))
     '3*c - 2'
     """
-    if polynomial.free_symbols and field([polynomial]) == sp.QQ:
+    if polynomial.free_symbols and power_series.field([polynomial]) == sp.QQ:
         polynomial = sp.Poly(polynomial, *polynomial.free_symbols, domain=sp.QQ).clear_denoms(convert=True)[1]
         polynomial = polynomial.primitive()[1].as_expr()
     return str(sp.sstr(polynomial))

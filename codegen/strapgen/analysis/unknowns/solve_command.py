@@ -87,7 +87,7 @@ def solve(
     orders = _orders(on, order)
     choice = method.choose(algorithm, step=False)
     from strapgen.analysis.unknowns import solving
-    from strapgen.analysis.unknowns.unknowns_report import solved_report
+    from strapgen.analysis.unknowns.unknowns_report import SolvedResult
 
     with waiting(f"solving the conditions of {algorithm}"):
         solved = solving.solve(choice, orders)
@@ -97,7 +97,7 @@ def solve(
             raise InputError(f"--set: {solved.solution.reason}; there is no solution")
         number = checks.count("family", family, largest=len(solved.families))
         chosen = solved.values(settings, number - 1)
-    output.report(solved_report(solved, chosen))
+    output.show(SolvedResult.of(solved, chosen))
 
 
 def _orders(on: tuple[str, ...], order: int) -> dict[str, int]:

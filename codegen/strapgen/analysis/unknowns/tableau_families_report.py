@@ -1,59 +1,105 @@
-"""Reports the families of Runge-Kutta methods that satisfy the order conditions of a tableau with unknowns."""
+"""The families of Runge-Kutta methods that satisfy the order conditions of a tableau with unknowns, as a result."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from strapgen.analysis.unknowns.families import Equation, PolynomialSolution
+import sympy as sp
+
+from strapgen.analysis.unknowns.families import Family, PolynomialSolution
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.analysis.unknowns.unknowns_latex import solution_latex, unknown_tableau_latex
-from strapgen.analysis.unknowns.unknowns_report import family_lines, solution_data, text_of
+from strapgen.analysis.unknowns.unknowns_report import family_lines, text_of
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
 
 #: Most families that a text shows; data has all.
 _MOST_FAMILIES = 12
+#: Fields that the result has from the tableau.
+_SAME = ("name", "title", "source", "order", "unknowns", "nodes", "matrix", "weights")
 _TITLES = {
     "general": "any differential equation",
     "attitude": "x' = A(t) x, which attitude kinematics is",
 }
 
 
-def families_report(unknown: UnknownTableau, solutions: dict[str, PolynomialSolution]) -> Report:
-    """Return the families of a tableau with unknowns as a report."""
-    leading = [unknown.leading(family) for family in solutions["general"].families]
+@dataclass(frozen=True)
+class TableauFamily:
+    """Methods with free parameters, and the errors that they leave."""
 
-    def latex() -> str:
-        return f"{unknown_tableau_latex(unknown)}\n\n{solution_latex(solutions['general'])}"
-
-    return Report(
-        lambda: _text(unknown, solutions, leading), lambda: _data(unknown, solutions, leading), latex=latex
-    )
+    family: Family = field(metadata=entry(spread=True))
+    #: Error coefficients of the next order, as functions of the free parameters
+    leading_error: dict[str, str] | None = field(metadata=entry(optional=True))
 
 
-def _data(
-    unknown: UnknownTableau, solutions: dict[str, PolynomialSolution], leading: list[list[Equation]]
-) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "name": unknown.name,
-        "title": unknown.title,
-        "source": unknown.source,
-        "stages": len(unknown.nodes),
-        "order": unknown.order,
-        "unknowns": list(unknown.unknowns),
-        "nodes": list(map(text_of, unknown.nodes)),
-        "matrix": [list(map(text_of, row)) for row in unknown.matrix],
-        "weights": list(map(text_of, unknown.weights)),
-    }
-    for equations, solution in solutions.items():
-        data[equations] = {"conditions": len(unknown.conditions(equations)), **solution_data(solution)}
-    for family, terms in zip(data["general"]["families"], leading, strict=True):
-        family["leading_error"] = {each.label: text_of(each.value) for each in terms}
-    return data
+@dataclass(frozen=True)
+class SolvedConditions:
+    """The order conditions on one kind of equations, solved."""
+
+    #: Number of conditions
+    conditions: int
+    solution: PolynomialSolution = field(metadata=entry(spread=True))
+    families: list[TableauFamily]
+
+
+@dataclass(frozen=True)
+class FamiliesResult(Result):
+    """The families of Runge-Kutta methods that a tableau with unknowns has; expressions are text."""
+
+    unknown: UnknownTableau = field(metadata=INTERNAL)
+    solutions: Mapping[str, PolynomialSolution] = field(metadata=INTERNAL)
+    name: str
+    title: str
+    source: str
+    stages: int
+    order: int
+    unknowns: tuple[str, ...]
+    nodes: tuple[sp.Expr, ...]
+    matrix: tuple[tuple[sp.Expr, ...], ...]
+    weights: tuple[sp.Expr, ...]
+    #: On any differential equation
+    general: SolvedConditions
+    #: On x' = A(t) x, which attitude kinematics is
+    attitude: SolvedConditions
+
+    @staticmethod
+    def of(unknown: UnknownTableau, solutions: Mapping[str, PolynomialSolution]) -> FamiliesResult:
+        """Return the families of a tableau, and the leading errors of those on any equation."""
+
+        def solved(equations: str) -> SolvedConditions:
+            families = [
+                TableauFamily(family, _leading(unknown, family) if equations == "general" else None)
+                for family in solutions[equations].families
+            ]
+            return SolvedConditions(len(unknown.conditions(equations)), solutions[equations], families)
+
+        return FamiliesResult(
+            unknown,
+            solutions,
+            **{name: getattr(unknown, name) for name in _SAME},
+            stages=len(unknown.nodes),
+            general=solved("general"),
+            attitude=solved("attitude"),
+        )
+
+    def text(self) -> str:
+        """Return the conditions and the families on both kinds of equations."""
+        return _text(self.unknown, self.solutions, [one.leading_error or {} for one in self.general.families])
+
+    def latex(self) -> str:
+        """Return the tableau and the families on any equation as align environments."""
+        return f"{unknown_tableau_latex(self.unknown)}\n\n{solution_latex(self.solutions['general'])}"
+
+
+def _leading(unknown: UnknownTableau, family: Family) -> dict[str, str]:
+    return {each.label: text_of(each.value) for each in unknown.leading(family)}
 
 
 def _text(
-    unknown: UnknownTableau, solutions: dict[str, PolynomialSolution], leading: list[list[Equation]]
+    unknown: UnknownTableau, solutions: Mapping[str, PolynomialSolution], leading: Sequence[Mapping[str, str]]
 ) -> str:
     lines = [f"{unknown.name}: {unknown.title}", f"source: {unknown.source}"]
     lines.append(
@@ -66,7 +112,7 @@ def _text(
             lines += ["", f"and {len(leading) - _MOST_FAMILIES} smaller families, which --format json shows"]
             break
         lines += ["", *family_lines(number, family), f"  error coefficients of order {unknown.order + 1}"]
-        lines += [f"    {each.label}: {text_of(each.value)}" for each in terms] or ["    none"]
+        lines += [f"    {label}: {value}" for label, value in terms.items()] or ["    none"]
     lines += ["", *_solution_lines(unknown, "attitude", attitude)]
     if attitude.families == general.families:
         lines += ["the same families" if general.families else "none either"]

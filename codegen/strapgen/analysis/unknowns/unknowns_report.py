@@ -1,16 +1,19 @@
-"""Reports conditions on unknown coefficients, and the families that satisfy them, as text and plain data."""
+"""Conditions on unknown coefficients, and the families that satisfy them, as text and as a result."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import sympy as sp
 
+from strapgen.analysis.unknowns.demands import Demand
 from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution, shown
 from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep
 from strapgen.analysis.unknowns.unknowns_latex import solved_latex
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 #: Most conditions, and most families, that a text shows; data has all.
@@ -24,27 +27,6 @@ def text_of(expression: sp.Expr) -> str:
 
 
 # Families
-
-
-def family_data(family: Family) -> dict[str, Any]:
-    """Return a family as plain JSON data; expressions are text that SymPy can read."""
-    return {
-        "parameters": [symbol.name for symbol in family.free],
-        "dimension": family.dimension,
-        "values": {symbol.name: text_of(value) for symbol, value in family.values.items()},
-        "nonzero": [shown(x) for x in family.nonzero],
-        "equations": [shown(x) for x in family.equations],
-    }
-
-
-def solution_data(solution: PolynomialSolution) -> dict[str, Any]:
-    """Return a solution as plain JSON data."""
-    return {
-        "unknowns": [symbol.name for symbol in solution.unknowns],
-        "families": [family_data(family) for family in solution.families],
-        "reason": solution.reason or None,
-        "solvable_order": solution.solvable,
-    }
 
 
 def family_lines(number: int, family: Family) -> list[str]:
@@ -71,42 +53,70 @@ def condition_lines(conditions: Sequence[Equation]) -> Iterator[str]:
 # Steps
 
 
-def solved_report(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None = None) -> Report:
-    """Return the conditions on a step's unknowns and their solution as a report."""
-
-    def data() -> dict[str, Any]:
-        return _solved_data(solved) | ({} if chosen is None else {"chosen": _texts(chosen)})
-
-    return Report(lambda: _solved_text(solved, chosen), data, latex=lambda: solved_latex(solved))
+def _texts(values: Mapping[Any, sp.Expr]) -> dict[str, str]:
+    return {str(name): text_of(value) for name, value in values.items()}
 
 
-def _solved_data(solved: SolvedStep) -> dict[str, Any]:
-    data = {
-        "kernel": solved.kernel.name,
-        "demands": [{"motion": demand.motion, "order": demand.order} for demand in solved.demands],
-        "conditions": [
-            {"label": each.label, "power": each.order, "expression": text_of(each.value)}
-            for each in solved.conditions
-        ],
-        **solution_data(solved.solution),
-    }
-    for family, errors in zip(data["families"], solved.leading, strict=True):
-        family["leading_errors"] = [_leading_data(error) for error in errors]
-    return data
+@dataclass(frozen=True)
+class LeadingTerms:
+    """The first error that a family leaves on a motion."""
+
+    motion: str
+    #: Power of the step at which it stands
+    power: int
+    #: Its coefficients as functions of the free parameters
+    terms: dict[str, str]
+    sum_of_squares: str
+    #: Free parameters at which the sum of squares is least; empty where it does not depend on them
+    least: dict[str, str]
+
+    @staticmethod
+    def of(error: LeadingError) -> LeadingTerms:
+        """Return a leading error as text."""
+        terms = {each.label: text_of(each.value) for each in error.terms}
+        return LeadingTerms(error.motion, error.power, terms, text_of(error.square), _texts(error.least))
 
 
-def _leading_data(error: LeadingError) -> dict[str, Any]:
-    return {
-        "motion": error.motion,
-        "power": error.power,
-        "terms": {each.label: text_of(each.value) for each in error.terms},
-        "sum_of_squares": text_of(error.square),
-        "least": {symbol.name: text_of(value) for symbol, value in error.least.items()},
-    }
+@dataclass(frozen=True)
+class SolvedFamily:
+    """Solutions with free parameters, and the errors that they leave."""
+
+    family: Family = field(metadata=entry(spread=True))
+    leading_errors: list[LeadingTerms]
 
 
-def _texts(values: Mapping[str, sp.Expr]) -> dict[str, str]:
-    return {name: text_of(value) for name, value in values.items()}
+@dataclass(frozen=True)
+class SolvedResult(Result):
+    """The conditions on the unknowns of a step, and the families that satisfy them; expressions are text."""
+
+    solved: SolvedStep = field(metadata=INTERNAL)
+    kernel: str
+    #: Motions, with the order that is asked for on each
+    demands: tuple[Demand, ...]
+    #: What has to vanish
+    conditions: tuple[Equation, ...]
+    solution: PolynomialSolution = field(metadata=entry(spread=True))
+    families: list[SolvedFamily]
+    #: Values of the unknowns of a member that was chosen
+    chosen: Mapping[str, sp.Expr] | None = field(metadata=entry(optional=True, kind=dict[str, str]))
+
+    @staticmethod
+    def of(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None = None) -> SolvedResult:
+        """Return what a step was solved to."""
+        families = [
+            SolvedFamily(family, list(map(LeadingTerms.of, errors)))
+            for family, errors in zip(solved.families, solved.leading, strict=True)
+        ]
+        name, demands, conditions = solved.kernel.name, solved.demands, solved.conditions
+        return SolvedResult(solved, name, demands, conditions, solved.solution, families, chosen)
+
+    def text(self) -> str:
+        """Return the conditions, the families and their leading errors."""
+        return _solved_text(self.solved, self.chosen)
+
+    def latex(self) -> str:
+        """Return the same as align environments."""
+        return solved_latex(self.solved)
 
 
 def _solved_text(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None) -> str:

@@ -21,6 +21,7 @@ from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.analysis.vibration import Assessment
+    from strapgen.analysis.vibration.curves import Curve
     from strapgen.analysis.vibration.vibration_report import AssessedCase, CaseRates
 
 _Text = str | None
@@ -266,18 +267,16 @@ def vibration(
     --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 1.5 --acceleration-y 5
     """
     output.check(algorithm, *methods.files, source.spectrum)
-    from strapgen.analysis.vibration.vibration_report import closed_forms_report, vibration_report
+    from strapgen.analysis.vibration.vibration_report import ClosedFormsResult, VibrationResult
 
     if cases := _cases_with_unknowns(algorithm, methods, source, output):
-        output.report(closed_forms_report(cases))
+        output.show(ClosedFormsResult(cases))
         return
     source.check()
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
-    output.report(
-        vibration_report(outcomes, cases, f"{words}; step {source.step} s"),
-        lambda path: _image(cases, source, output, path),
-    )
+    drawn = ((), "", None) if output.plot is None else _curves(cases, source, output)
+    output.show(VibrationResult(outcomes, cases, f"{words}; step {source.step} s", *drawn))
 
 
 def _cases_with_unknowns(
@@ -356,9 +355,11 @@ def _quantities(algorithm: str, possible: tuple[str, ...], source: VibrationSour
     return quantities
 
 
-def _image(cases: list[AssessedCase], source: VibrationSource, output: VibrationOutput, path: Path) -> bytes:
+def _curves(
+    cases: list[AssessedCase], source: VibrationSource, output: VibrationOutput
+) -> tuple[list[tuple[str, Curve]], str, float]:
+    """Return the errors over frequency by label, a title, and the frequency in Hz to mark."""
     from strapgen.analysis.vibration import curves
-    from strapgen.analysis.vibration.vibration_plot import vibration_image
 
     assert source.step and source.frequency, "the source is checked"
     step, marked = source.step, float(source.frequency)
@@ -368,4 +369,4 @@ def _image(cases: list[AssessedCase], source: VibrationSource, output: Vibration
         (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
         for case in cases
     ]
-    return vibration_image(drawn, f"Errors under vibration, step {step} s\n{source.words}", path, marked)
+    return drawn, f"Errors under vibration, step {step} s\n{source.words}", marked

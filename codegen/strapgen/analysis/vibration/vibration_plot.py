@@ -13,6 +13,7 @@ from strapgen.results.table import READABLE_UNITS
 
 if TYPE_CHECKING:
     from strapgen.analysis.vibration.curves import Curve
+    from strapgen.analysis.vibration.vibration_report import VibrationResult
 
 #: The mean rate of each unit that is drawn.
 _RATES = {"rad/s": "mean drift", "m/s^2": "mean acceleration"}
@@ -22,13 +23,12 @@ _COLOURS = figures.several_colours(8)
 _LINES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 
 
-def vibration_image(
-    curves: Sequence[tuple[str, Curve]], title: str, path: str | Path, mark_hz: float | None = None
-) -> bytes:
+def vibration_image(result: VibrationResult, path: str | Path) -> bytes:
     """Return the errors of algorithms under vibration against frequency: drift in deg/h, acceleration in micro-g.
 
-    `curves`: labels and curves; those in rad/s and those in m/s^2 have a panel each.
+    Curves in rad/s and those in m/s^2 have a panel each.
     """
+    curves, mark_hz = result.curves, result.marked_hz
     panels = {unit: [(label, curve) for label, curve in curves if curve.unit == unit] for unit in _RATES}
     panels = {unit: group for unit, group in panels.items() if group}
     size = (8.5, 1.0 + 3.4 * len(panels) + 0.11 * len(curves))
@@ -40,7 +40,7 @@ def vibration_image(
             _mark(axes, mark_hz)
     grid[-1, 0].set_xlabel("frequency, Hz")
     figures.common_legend(figure, grid[:, 0], loc="outside lower center", ncols=2)
-    figures.title(figure, title)
+    figures.title(figure, result.plot_title)
     return figures.image(figure, path)
 
 

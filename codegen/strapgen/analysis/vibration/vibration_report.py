@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from strapgen.analysis.vibration import Assessment
 from strapgen.analysis.vibration.mean_rates import Rates
 from strapgen.ir.exceptions import InputError
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
-from strapgen.results.report import Report, flat_table
+from strapgen.results.records import entry
+from strapgen.results.result import Result
 from strapgen.results.table import READABLE_UNITS, Column, TextTable
+
+if TYPE_CHECKING:
+    from strapgen.analysis.vibration.curves import Curve
 
 #: The units as parts of the names of data.
 _UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
@@ -79,31 +83,64 @@ class CaseRates:
     quadrature: Rates | None = None
 
 
-def vibration_data(outcomes: Sequence[CaseRates]) -> list[dict[str, Any]]:
-    """Return mean rates as plain JSON data, an object for each algorithm."""
+class ClosedForms(NamedTuple):
+    """Closed forms of a mean rate, as text that SymPy can read."""
+
+    computed: str
+    continuous: str
+
+
+@dataclass(frozen=True)
+class VibrationRates:
+    """The mean rates of one algorithm about z; those in rad/s are drift, those in m/s^2 sculling."""
+
+    #: The true rate
+    continuous_rad_s: float | None = field(default=None, metadata=entry(optional=True))
+    #: The rate of the algorithm
+    computed_rad_s: float | None = field(default=None, metadata=entry(optional=True))
+    #: The latter less the former
+    error_rad_s: float | None = field(default=None, metadata=entry(optional=True))
+    #: Estimates of the error of quadrature, under random vibration
+    continuous_quadrature_rad_s: float | None = field(default=None, metadata=entry(optional=True))
+    computed_quadrature_rad_s: float | None = field(default=None, metadata=entry(optional=True))
+    error_quadrature_rad_s: float | None = field(default=None, metadata=entry(optional=True))
+    continuous_m_s2: float | None = field(default=None, metadata=entry(optional=True))
+    computed_m_s2: float | None = field(default=None, metadata=entry(optional=True))
+    error_m_s2: float | None = field(default=None, metadata=entry(optional=True))
+    continuous_quadrature_m_s2: float | None = field(default=None, metadata=entry(optional=True))
+    computed_quadrature_m_s2: float | None = field(default=None, metadata=entry(optional=True))
+    error_quadrature_m_s2: float | None = field(default=None, metadata=entry(optional=True))
+    kernel: str = ""
+    #: Samples in a step
+    increments: int = 0
+    #: At one frequency
+    drift_closed_form: ClosedForms | None = field(default=None, metadata=entry(optional=True))
+    #: At one frequency
+    sculling_closed_form: ClosedForms | None = field(default=None, metadata=entry(optional=True))
+
+
+def vibration_rates(outcomes: Sequence[CaseRates]) -> list[VibrationRates]:
+    """Return the mean rates of each algorithm."""
     groups: dict[str, list[CaseRates]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.case.label, []).append(outcome)
-    return [_algorithm_data(group) for group in groups.values()]
+    return [_algorithm_rates(group) for group in groups.values()]
 
 
-def _algorithm_data(group: Sequence[CaseRates]) -> dict[str, Any]:
+def _algorithm_rates(group: Sequence[CaseRates]) -> VibrationRates:
     """Return the rates of one algorithm, and their closed forms at one frequency."""
-    data: dict[str, Any] = {}
+    first = group[0].case
+    data: dict[str, Any] = {"kernel": first.assessment.kernel, "increments": first.samples}
     for outcome in group:
-        unit = _UNIT_SUFFIXES[outcome.case.assessment.unit]
+        unit, assessment = _UNIT_SUFFIXES[outcome.case.assessment.unit], outcome.case.assessment
         data |= {f"{part}_{unit}": value for part, value in outcome.rates._asdict().items()}
         if outcome.quadrature is not None:
             errors = outcome.quadrature._asdict()
             data |= {f"{part}_quadrature_{unit}": value for part, value in errors.items()}
-    first = group[0].case
-    data |= {"kernel": first.assessment.kernel, "increments": first.samples}
-    for outcome in group:
-        if outcome.quadrature is None:
-            data[f"{outcome.case.quantity}_closed_form"] = {
-                part: outcome.case.assessment.text(part) for part in ("computed", "continuous")
-            }
-    return data
+        else:
+            forms = ClosedForms(assessment.text("computed"), assessment.text("continuous"))
+            data[f"{outcome.case.quantity}_closed_form"] = forms
+    return VibrationRates(**data)
 
 
 def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
@@ -127,12 +164,48 @@ def vibration_text(outcomes: Sequence[CaseRates], title: str) -> str:
     return "\n".join(lines)
 
 
-def closed_forms_report(cases: Sequence[AssessedCase]) -> Report:
-    """Return the rates of kernels with unknowns as a report: closed forms, without numbers."""
+class UnknownForms(NamedTuple):
+    """Closed forms of a mean rate in the unknowns of a kernel, as text that SymPy can read."""
 
-    def text() -> str:
+    computed: str
+    continuous: str
+    error: str
+
+
+@dataclass(frozen=True)
+class UnknownRates:
+    """The mean rate of a kernel with unknowns."""
+
+    kernel: str
+    #: Samples in a step
+    increments: int
+    unknowns: tuple[str, ...]
+    drift_closed_form: UnknownForms | None = field(metadata=entry(optional=True))
+    sculling_closed_form: UnknownForms | None = field(metadata=entry(optional=True))
+
+
+@dataclass(frozen=True)
+class ClosedFormsResult(Result):
+    """Mean rates of kernels with unknowns in closed form, without numbers: a row for each."""
+
+    row = UnknownRates
+
+    cases: Sequence[AssessedCase]
+
+    def rows(self) -> list[UnknownRates]:
+        """Return the rates."""
+        rows = []
+        for case in self.cases:
+            text, unknowns = case.assessment.text, case.assessment.unknowns
+            forms = UnknownForms(text("computed"), text("continuous"), text("error"))
+            both = (forms, None) if case.quantity == "drift" else (None, forms)
+            rows.append(UnknownRates(case.assessment.kernel, case.samples, unknowns, *both))
+        return rows
+
+    def text(self) -> str:
+        """Return the closed forms."""
         lines = ["mean rates about z, to second order in the amplitudes, in closed form"]
-        for case in cases:
+        for case in self.cases:
             lines += ["", f"{case.label}, {case.quantity} rate in {case.assessment.unit}"]
             unknowns = ", ".join(case.assessment.unknowns)
             lines += [f"  unknowns   = {unknowns or 'none'}"]
@@ -140,21 +213,6 @@ def closed_forms_report(cases: Sequence[AssessedCase]) -> Report:
                 f"  {part:10} = {case.assessment.text(part)}" for part in ("continuous", "computed", "error")
             ]
         return "\n".join(lines)
-
-    def data() -> list[dict[str, Any]]:
-        return [
-            {
-                "kernel": case.assessment.kernel,
-                "increments": case.samples,
-                "unknowns": list(case.assessment.unknowns),
-                f"{case.quantity}_closed_form": {
-                    part: case.assessment.text(part) for part in ("computed", "continuous", "error")
-                },
-            }
-            for case in cases
-        ]
-
-    return Report(text, data)
 
 
 def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
@@ -181,22 +239,37 @@ def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
     return TextTable(columns, rows)
 
 
-def vibration_report(outcomes: Sequence[CaseRates], cases: Sequence[AssessedCase], title: str) -> Report:
-    """Return mean rates as a report, whose table has a row for each quantity of each algorithm.
+@dataclass(frozen=True)
+class VibrationResult(Result):
+    """Mean rates of algorithms under vibration, computed and true."""
 
-    `title`: the vibration in words.
-    """
+    each = VibrationRates
+    drawn_by = "strapgen.analysis.vibration.vibration_plot:vibration_image"
 
-    def data() -> Any:
-        every = vibration_data(outcomes)
-        return every if len(every) > 1 else every[0]
+    outcomes: Sequence[CaseRates]
+    cases: Sequence[AssessedCase]
+    #: The vibration in words
+    title: str
+    #: Errors over frequency for a plot, by the label of the algorithm, with a title and the frequency in Hz to mark
+    curves: Sequence[tuple[str, Curve]] = ()
+    plot_title: str = ""
+    marked_hz: float | None = None
 
-    return Report(
-        lambda: vibration_text(outcomes, title),
-        data,
-        lambda: flat_table([_flat(outcome) for outcome in outcomes]),
-        latex=lambda: vibration_latex(cases),
-    )
+    def results(self) -> list[VibrationRates]:
+        """Return the rates of each algorithm."""
+        return vibration_rates(self.outcomes)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a row for each quantity of each algorithm."""
+        return list(map(_flat, self.outcomes))
+
+    def text(self) -> str:
+        """Return tables for drift and sculling, and closed forms where one algorithm is assessed."""
+        return vibration_text(self.outcomes, self.title)
+
+    def latex(self) -> str:
+        """Return the closed forms."""
+        return vibration_latex(self.cases)
 
 
 def _flat(outcome: CaseRates) -> dict[str, Any]:

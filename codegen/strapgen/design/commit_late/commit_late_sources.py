@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 
 from strapgen import pipeline, targets
 from strapgen.catalogue import Choice, choose_step
@@ -20,6 +22,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
+from strapgen.results.result import Result
 from strapgen.targets import BUILT_IN, contract
 from strapgen.targets.c.emit import real_of
 
@@ -31,6 +34,21 @@ _TITLES = {"dcm": "Direction cosine matrix", "euler": "Euler parameters"}
 
 #: Attitude algorithms that commit late, each with the kernel that removes rounding from a committed attitude.
 NORMALIZATIONS = {"dcm": "dcm-orthonormalize-first-order", "euler": "euler-normalize-first-order"}
+
+
+@dataclass(frozen=True)
+class LateResult(Result):
+    """C that commits an attitude late and answers it now, as it was written."""
+
+    name: str
+    target: str
+    files: Sequence[Path]
+    #: Operations of a call by kind
+    operations: Mapping[str, int]
+
+    def text(self) -> str:
+        """Return the name and the files."""
+        return "\n".join([f"{self.name} for {self.target}", *(f"  {path}" for path in self.files)])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.help import PlainCommand
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import CTarget, option
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, show
 from strapgen.cli.progress import waiting
 from strapgen.cli.rules import Needs, rules
 from strapgen.cli.source_options import SourceOptions
@@ -72,19 +72,9 @@ def generate(
         typer.echo(difference, nl=False)
         raise typer.Exit(1 if difference else 0)
     written = output.write(files)
-    if format == "json":
-        print_json(
-            {
-                "name": sources.function.name,
-                "target": target,
-                "files": [str(path) for path in written],
-                "operations": sources.operations,
-            }
-        )
-        return
-    typer.echo(f"{sources.function.name} for {target}")
-    for path in written:
-        typer.echo(f"  {path}")
+    from strapgen.design.commit_late.commit_late_sources import LateResult
+
+    show(LateResult(sources.function.name, target, written, sources.operations), format)
 
 
 def generated(

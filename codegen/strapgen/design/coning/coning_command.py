@@ -208,10 +208,9 @@ def coning(
             f"{samples + previous} are given"
         )
     from strapgen.catalogue.methods import coning_coefficients
-    from strapgen.design.coning.coning_report import coning_data, coning_report
+    from strapgen.design.coning.coning_report import ConingResult
 
-    coefficients = coning_coefficients.design(samples, previous, form)
-    output.report(coning_report(coefficients, coning_data(coefficients, terms)))
+    output.show(ConingResult.of(coning_coefficients.design(samples, previous, form), terms))
 
 
 def _deliver_design(options: ConingDesign, samples: int, previous: int, output: ConingOutput) -> None:
@@ -219,14 +218,14 @@ def _deliver_design(options: ConingDesign, samples: int, previous: int, output: 
     brief = options.brief(samples, previous)
     from strapgen.catalogue.methods import shaped_coning
     from strapgen.design.coning import coning, coning_file
-    from strapgen.design.coning.coning_report import ShapedDrift, figure_lines, shaped_report
+    from strapgen.design.coning.coning_report import ShapedDrift, ShapedResult, figure_lines
 
     with waiting("designing"):
         shape = coning.design(brief)
         shaped_coning.verify(shape)
         drift = ShapedDrift(shape, brief.lines)
         if output.format != _FILE_FORMAT:
-            output.report(shaped_report(drift))
+            output.show(ShapedResult.of(drift))
             return
         figures = figure_lines(drift)
     numbers = {"--samples": samples, "--previous": previous}

@@ -1,13 +1,12 @@
-"""Reports coning coefficients, exact ones and those for a band or a spectrum, and the drift that remains."""
+"""Coning coefficients, exact ones and those for a band or a spectrum, with the drift that remains, as results."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,8 @@ from strapgen.catalogue.methods.samples import sample_names
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design.coning.coning import annulling
 from strapgen.design.coning.lines import Lines
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, entry, reader_table
+from strapgen.results.result import Result
 from strapgen.results.table import READABLE_UNITS, Column, TextTable
 
 _PAIR_COLUMNS = (Column(align="<"), Column(), Column(spec=".9f", least=12))
@@ -31,90 +31,104 @@ _HIGHER_TERMS = {
 }
 #: Frequencies at which the drift is shown, up to the end of the band, or to 3 rad a sample for a spectrum.
 _POINTS, _WIDEST = 16, 3.0
-_DRIFT_COLUMNS = (
-    Column("frequency_rad_sample", spec=".4g"),
-    Column("drift_rad_step", spec=".3e"),
-    Column("drift_annulling_rad_step", spec=".3e"),
-)
-_DRIFT_HEADINGS = ("rad a sample", "these", "annulling powers")
 
 
-def coning_data(design: Design, terms: bool = False) -> dict[str, Any]:
-    """Return a design as plain JSON data; coefficients and residual are text that SymPy can read."""
-    names = sample_names(design.samples, design.previous)
-    drift = design.residual()
-    order = method(design.form).step_order(design.samples, design.previous)
-    data: dict[str, Any] = {
-        "coefficients": [str(c) for c in design.pairs.values()],
-        "residual": drift.expression,
-        "leading": drift.leading_expression,
-        "pairs": [[names[older], names[newer]] for older, newer in design.pairs],
-        "order": order.step,
-    }
-    if terms:
-        third, fourth = sample_terms(design.samples, design.previous)
-        data["third_order"] = {names[k]: _products(row, names) for k, row in third.items()}
-        data["fourth_order"] = {
-            f"{names[k]} x {names[m]}": _products(row, names) for (k, m), row in fourth.items()
-        }
-    return data
+@dataclass(frozen=True)
+class ConingResult(Result):
+    """Coning coefficients, and the drift that remains; coefficients and residual are text that SymPy can read."""
+
+    design: Design = field(metadata=INTERNAL)
+    coefficients: list[str]
+    #: Mean drift on coning, computed less true, to second order in the half-angle of the cone
+    residual: str = field(metadata=entry(unit="rad/s"))
+    #: Its leading term
+    leading: str = field(metadata=entry(unit="rad/s"))
+    #: The samples of the pairs, older and newer
+    pairs: list[list[str]]
+    #: Order of a step on any motion
+    order: int
+    #: By the vector, the coefficients of its scalar products
+    third_order: dict[str, dict[str, str]] | None = field(metadata=entry(optional=True))
+    fourth_order: dict[str, dict[str, str]] | None = field(metadata=entry(optional=True))
+
+    @staticmethod
+    def of(design: Design, terms: bool = False) -> ConingResult:
+        """Return a design, with its terms of third and fourth order if they are asked for."""
+        names = sample_names(design.samples, design.previous)
+        drift = design.residual()
+        third, fourth = sample_terms(design.samples, design.previous) if terms else ({}, {})
+        by_sample = {names[k]: _products(row, names) for k, row in third.items()}
+        by_pair = {f"{names[k]} x {names[m]}": _products(row, names) for (k, m), row in fourth.items()}
+        return ConingResult(
+            design=design,
+            coefficients=[str(c) for c in design.pairs.values()],
+            residual=drift.expression,
+            leading=drift.leading_expression,
+            pairs=[[names[older], names[newer]] for older, newer in design.pairs],
+            order=method(design.form).step_order(design.samples, design.previous).step,
+            third_order=by_sample if terms else None,
+            fourth_order=by_pair if terms else None,
+        )
+
+    def rows(self) -> list[PairRow]:
+        """Return the pairs."""
+        both = zip(self.pairs, self.coefficients, self.design.pairs.values(), strict=True)
+        return [PairRow(older, newer, text, float(c)) for (older, newer), text, c in both]
+
+    def reader(self) -> TextTable:
+        """Return the pairs for a reader."""
+        return reader_table(self.rows(), PairRow)
+
+    def latex(self) -> str:
+        """Return the correction as a formula."""
+        from strapgen.results.display.methods import coning_latex  # loads SymPy
+
+        return coning_latex(self.design)
+
+    def text(self) -> str:
+        """Return the coefficients, the drift that remains, and the terms of higher order."""
+        design = self.design
+        lines = [
+            f"{design.form} coning coefficients, {_samples_text(design)}",
+            f"source of the form: {SOURCES[design.form]}",
+            "",
+            *_pair_lines(self),
+            "",
+            "residual: mean drift on coning, computed minus true, rad/s, to second order in alpha",
+            f"  {self.residual}",
+            f"  leading term {self.leading}",
+            "  alpha: half-angle of the cone in rad; omega: its frequency in rad/s; T: time between samples in s",
+            f"order of a step on any motion: {self.order}",
+        ]
+        if design.form in _HIGHER_TERMS:
+            lines.append(f"terms of third and fourth order: {_HIGHER_TERMS[design.form]}; --terms lists them")
+        for kind, rows in (("third", self.third_order or {}), ("fourth", self.fourth_order or {})):
+            if rows:
+                lines += ["", f"terms of {kind} order: each vector times its sum of scalar products"]
+            for vector, row in rows.items():
+                lines.append(f"  {vector} * ({' + '.join(f'{c} {product}' for product, c in row.items())})")
+        option = f"--method coning-{design.form} --increments {design.samples}"
+        if design.previous:
+            option += f" --previous {design.previous}"
+        lines += [
+            "",
+            f"kernels: strapgen derive rotation-vector {option}; euler, dcm and sculling take the same options",
+        ]
+        return "\n".join(lines).replace("+ -", "- ")
+
+
+@dataclass(frozen=True)
+class PairRow:
+    """The coefficient of the cross product of two samples."""
+
+    older: str = field(metadata=entry("older", align="<"))
+    newer: str = field(metadata=entry("newer", align="<"))
+    coefficient: str = field(metadata=entry("coefficient"))
+    decimal: float = field(metadata=entry("decimal", ".9f"))
 
 
 def _products(row: Scalars, names: list[str]) -> dict[str, str]:
     return {f"{names[i]}.{names[j]}": str(c) for (i, j), c in row.items()}
-
-
-def coning_text(design: Design, data: Mapping[str, Any]) -> str:
-    """Return a design as text."""
-    lines = [
-        f"{design.form} coning coefficients, {_samples_text(design)}",
-        f"source of the form: {SOURCES[design.form]}",
-        "",
-        *_pair_lines(design, data),
-        "",
-        "residual: mean drift on coning, computed minus true, rad/s, to second order in alpha",
-        f"  {data['residual']}",
-        f"  leading term {data['leading']}",
-        "  alpha: half-angle of the cone in rad; omega: its frequency in rad/s; T: time between samples in s",
-        f"order of a step on any motion: {data['order']}",
-    ]
-    if design.form in _HIGHER_TERMS:
-        lines.append(f"terms of third and fourth order: {_HIGHER_TERMS[design.form]}; --terms lists them")
-    for kind in ("third", "fourth"):
-        rows = data.get(f"{kind}_order", {})
-        if rows:
-            lines += ["", f"terms of {kind} order: each vector times its sum of scalar products"]
-        for vector, row in rows.items():
-            lines.append(f"  {vector} * ({' + '.join(f'{c} {product}' for product, c in row.items())})")
-    option = f"--method coning-{design.form} --increments {design.samples}"
-    if design.previous:
-        option += f" --previous {design.previous}"
-    lines += [
-        "",
-        f"kernels: strapgen derive rotation-vector {option}; euler, dcm and sculling take the same options",
-    ]
-    return "\n".join(lines).replace("+ -", "- ")
-
-
-def coning_report(design: Design, data: Mapping[str, Any]) -> Report:
-    """Return a design as a report, whose table has a row for each pair; parameters as for `coning_text`."""
-    columns = (
-        Column("older", "<"),
-        Column("newer", "<"),
-        Column("coefficient"),
-        Column("decimal", spec=".9f"),
-    )
-
-    def table() -> TextTable:
-        pairs = zip(data["pairs"], data["coefficients"], design.pairs.values(), strict=True)
-        return TextTable(columns, [(older, newer, text, float(c)) for (older, newer), text, c in pairs])
-
-    def latex() -> str:
-        from strapgen.results.display.methods import coning_latex  # loads SymPy
-
-        return coning_latex(design)
-
-    return Report(lambda: coning_text(design, data), lambda: data, table, latex=latex)
 
 
 def _samples_text(design: Design) -> str:
@@ -123,16 +137,11 @@ def _samples_text(design: Design) -> str:
     return f"{design.samples} {'sample' if one else 'samples'}{before}"
 
 
-def _pair_lines(design: Design, data: Mapping[str, Any]) -> list[str]:
+def _pair_lines(result: ConingResult) -> list[str]:
     """Return a line for each pair: its samples, its coefficient exactly and as a decimal."""
-    if not design.pairs:
+    if not result.pairs:
         return ["  one sample has no pairs: there is no correction"]
-    rows = [
-        (f"{older} x {newer}", text, float(number))
-        for (older, newer), text, number in zip(
-            data["pairs"], data["coefficients"], design.pairs.values(), strict=True
-        )
-    ]
+    rows = [(f"{row.older} x {row.newer}", row.coefficient, row.decimal) for row in result.rows()]
     return TextTable(_PAIR_COLUMNS, rows).lines("  ")
 
 
@@ -193,60 +202,6 @@ class ShapedDrift:
         )
 
 
-def shaped_data(drift: ShapedDrift) -> dict[str, Any]:
-    """Return coefficients and their drift as plain JSON data; the coefficients are text, exact."""
-    shape = drift.shape
-    return {
-        "name": shape.name,
-        "title": shape.title,
-        "source": shape.source,
-        "samples": shape.samples,
-        "previous": shape.previous,
-        "objective": shape.objective,
-        "powers": shape.powers,
-        "products": shape.products,
-        "band_rad_sample": None if shape.band is None else float(shape.band),
-        "gyro": None
-        if shape.gyro is None
-        else {key: float(value) for key, value in vars(shape.gyro).items()},
-        "coefficients": [str(c) for c in shape.coefficients],
-        **drift.figures(),
-        "drift": [
-            dict(zip((column.header for column in _DRIFT_COLUMNS), row, strict=True)) for row in drift.rows
-        ],
-    }
-
-
-def shaped_text(drift: ShapedDrift) -> str:
-    """Return coefficients and their drift as text."""
-    shape = drift.shape
-    names = sample_names(shape.samples, shape.previous)
-    rows = [
-        (f"{names[older]} x {names[newer]}", f"{float(c): .15g}")
-        for (older, newer), c in reversed(shape.pairs.items())
-    ]
-    columns = [
-        Column(heading, spec=column.spec)
-        for heading, column in zip(_DRIFT_HEADINGS, _DRIFT_COLUMNS, strict=True)
-    ]
-    return "\n".join(
-        [
-            f"{shape.name}: {shape.title}",
-            f"source: {shape.source}",
-            "",
-            *TextTable((Column(align="<"), Column(align="<")), rows).lines("  "),
-            "",
-            *figure_lines(drift),
-            "",
-            "drift on coning in rad a step, for each squared radian of the half-angle:",
-            *TextTable(columns, drift.rows).lines("  "),
-            "",
-            "the coefficients answer coning in their band alone; on other motion the step is of low order",
-            "--format toml --out FILE writes them; --coning FILE takes them wherever --method goes",
-        ]
-    )
-
-
 def figure_lines(drift: ShapedDrift) -> list[str]:
     """Return what the coefficients reach as lines of text."""
     figures = drift.figures()
@@ -263,10 +218,102 @@ def figure_lines(drift: ShapedDrift) -> list[str]:
     ]
 
 
-def shaped_report(drift: ShapedDrift) -> Report:
-    """Return coefficients and their drift as a report, whose table has the drift over the band."""
-    return Report(
-        lambda: shaped_text(drift),
-        lambda: shaped_data(drift),
-        lambda: TextTable(_DRIFT_COLUMNS, drift.rows),
-    )
+@dataclass(frozen=True)
+class ReachedDrift:
+    """What coefficients reach, and what those reach that annul powers; over a band, or under a spectrum."""
+
+    #: Largest drift over the band
+    largest_rad_step: float | None = field(metadata=entry(optional=True))
+    largest_annulling_rad_step: float | None = field(metadata=entry(optional=True))
+    #: Drift under the spectrum for the worst phases
+    worst_deg_h: float | None = field(metadata=entry(optional=True))
+    #: Its root mean square for lines of random phases
+    random_deg_h: float | None = field(metadata=entry(optional=True))
+    worst_annulling_deg_h: float | None = field(metadata=entry(optional=True))
+    random_annulling_deg_h: float | None = field(metadata=entry(optional=True))
+
+
+@dataclass(frozen=True)
+class DriftRow:
+    """The drift on coning at a frequency, for each squared radian of the half-angle."""
+
+    frequency_rad_sample: float = field(metadata=entry("rad a sample", ".4g"))
+    drift_rad_step: float = field(metadata=entry("these", ".3e"))
+    #: With the coefficients that annul powers of the frequency
+    drift_annulling_rad_step: float = field(metadata=entry("annulling powers", ".3e"))
+
+
+@dataclass(frozen=True)
+class ShapedResult(Result):
+    """Coning coefficients for a band or a spectrum, and their drift; the coefficients are text, exact."""
+
+    rows_in = "drift"
+
+    shaped: ShapedDrift = field(metadata=INTERNAL)
+    name: str
+    title: str
+    source: str
+    #: Samples of a step
+    samples: int
+    #: Samples from before it
+    previous: int
+    objective: str
+    #: Number of powers of the frequency that the coefficients annul
+    powers: int
+    #: Highest degree of products of two powers of time in the rate for which a step is exact; 0 for none
+    products: int
+    band_rad_sample: float | None
+    gyro: dict[str, float] | None
+    coefficients: tuple[Fraction, ...]
+    figures: Mapping[str, float] = field(metadata=entry(spread=True, kind=ReachedDrift))
+    drift: list[DriftRow]
+
+    @staticmethod
+    def of(drift: ShapedDrift) -> ShapedResult:
+        """Return coefficients with what they reach."""
+        shape = drift.shape
+        gyro = None if shape.gyro is None else {key: float(one) for key, one in vars(shape.gyro).items()}
+        same = (
+            "name",
+            "title",
+            "source",
+            "samples",
+            "previous",
+            "objective",
+            "powers",
+            "products",
+            "coefficients",
+        )
+        return ShapedResult(
+            shaped=drift,
+            **{name: getattr(shape, name) for name in same},
+            band_rad_sample=None if shape.band is None else float(shape.band),
+            gyro=gyro,
+            figures=drift.figures(),
+            drift=[DriftRow(*row) for row in drift.rows],
+        )
+
+    def text(self) -> str:
+        """Return the coefficients, and what they reach."""
+        drift, shape = self.shaped, self.shaped.shape
+        names = sample_names(shape.samples, shape.previous)
+        rows = [
+            (f"{names[older]} x {names[newer]}", f"{float(c): .15g}")
+            for (older, newer), c in reversed(shape.pairs.items())
+        ]
+        return "\n".join(
+            [
+                f"{shape.name}: {shape.title}",
+                f"source: {shape.source}",
+                "",
+                *TextTable((Column(align="<"), Column(align="<")), rows).lines("  "),
+                "",
+                *figure_lines(drift),
+                "",
+                "drift on coning in rad a step, for each squared radian of the half-angle:",
+                *reader_table(self.drift, DriftRow).lines("  "),
+                "",
+                "the coefficients answer coning in their band alone; on other motion the step is of low order",
+                "--format toml --out FILE writes them; --coning FILE takes them wherever --method goes",
+            ]
+        )

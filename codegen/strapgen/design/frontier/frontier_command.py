@@ -93,14 +93,6 @@ def frontier(
     several = study.candidates(methods)
     runs = study.frontier(several, *rates, run.results, workers.jobs, cluster, motions)
     standings = study.in_order(track(runs, "running", len(several)), several)
-    from strapgen.design.frontier.frontier_plot import frontier_image
-    from strapgen.design.frontier.frontier_report import frontier_report
+    from strapgen.design.frontier.frontier_report import FrontierResult
 
-    hertz, seconds = float(run.sample_hz), float(run.duration)
-    title = (
-        f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what halves the drift of all that costs less"
-    )
-    output.report(
-        frontier_report(standings, hertz, seconds, motions),
-        lambda path: frontier_image(standings, hertz, title, path),
-    )
+    output.show(FrontierResult(standings, float(run.sample_hz), float(run.duration), motions))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapgen.design.frontier.frontier import Standing, pareto
 from strapgen.results import figures
+
+if TYPE_CHECKING:
+    from strapgen.design.frontier.frontier_report import FrontierResult
 
 #: The motions of the panels.
 PANELS = ("cone 1/10", "cone 1/20", "cone 15/20", "random 200", "slew 50 ms", "ramps 50 ms")
@@ -22,13 +25,12 @@ _GAIN = 0.5
 _KINDS = {"window": "windows", "coning": "coning coefficients", "": "fits of the rate, integrated"}
 
 
-def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, path: str | Path) -> bytes:
+def frontier_image(result: FrontierResult, path: str | Path) -> bytes:
     """Return the drift over the multiplications a second: a panel a motion, a point an algorithm.
 
     A line of steps joins the algorithms that halve the drift of all that cost less; only they have a label.
-
-    `sample_hz`: sampling rate in Hz.
     """
+    standings, sample_hz = result.standings, result.sample_hz
     panels = [label for label in PANELS if label in standings[0].drifts] or list(standings[0].drifts)
     columns = min(_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
@@ -47,7 +49,8 @@ def frontier_image(standings: Sequence[Standing], sample_hz: float, title: str, 
     figures.common_legend(figure, [grid[0, 0]], loc="outside lower center", ncols=len(_KINDS))
     for axes in grid[:, 0]:
         axes.set_ylabel("drift, deg/h")
-    figures.title(figure, title)
+    title = f"drift over {result.duration_s:g} s at {sample_hz:g} Hz"
+    figures.title(figure, f"{title}; a line joins what halves the drift of all that costs less")
     return figures.image(figure, path)
 
 

@@ -87,8 +87,7 @@ def design(
     from strapgen.design.brief import read_brief
     from strapgen.design.selection.answer import in_order, judgements
     from strapgen.design.selection.candidates import contenders
-    from strapgen.design.selection.selection_plot import selection_image
-    from strapgen.design.selection.selection_report import selection_report
+    from strapgen.design.selection.selection_report import SelectionResult
     from strapgen.design.selection.simulated import confirmed
 
     brief = read_brief(file)
@@ -97,11 +96,10 @@ def design(
     with waiting("running the answer"):
         ordered = confirmed(brief, file, in_order(one for row in rows for one in row))
     runs = None if simulate is None else _simulated(brief, file, ordered[:simulate], count)
-    report = selection_report(brief, ordered, runs)
+    result = SelectionResult(brief, ordered, runs, file.stem)
     if generate is not None:
-        _write(brief, file, ordered, generate, report.written("text"))
-    title = f"{file.stem}: what the software adds to the drift, and what it costs; hollow: rounding is not looked at"
-    output.report(report, lambda path: selection_image(brief, ordered, title, path))
+        _write(brief, file, ordered, generate, result.text())
+    output.show(result)
 
 
 def _simulated(

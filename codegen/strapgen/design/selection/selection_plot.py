@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from strapgen.design.brief import DesignBrief
 from strapgen.design.frontier.frontier import pareto
 from strapgen.design.selection.judgement import SOFTWARE, Judgement
 from strapgen.results import figures
+
+if TYPE_CHECKING:
+    from strapgen.design.selection.selection_report import SelectionResult
 
 #: Least drift that is drawn in deg/h, and the part by which a label on the front is better than all that cost less.
 _LEAST, _GAIN = 1e-9, 0.2
 
 
-def selection_image(brief: DesignBrief, ordered: Sequence[Judgement], title: str, path: str | Path) -> bytes:
+def selection_image(result: SelectionResult, path: str | Path) -> bytes:
     """Return a picture of judgements: what the software adds to the drift, over its operations a second."""
+    brief, ordered = result.brief, result.ordered
     figure, grid = figures.grid_of_axes(1, 1, (9.0, 5.4))
     axes = grid[0, 0]
     axes.set_xscale("log")
@@ -64,7 +67,8 @@ def selection_image(brief: DesignBrief, ordered: Sequence[Judgement], title: str
         axes, {name: whole_points[name] for name in front}, dict.fromkeys(front, "0.1")
     )
     figures.common_legend(figure, [axes], loc="outside lower center", ncols=3)
-    figures.title(figure, title)
+    words = "what the software adds to the drift, and what it costs; hollow: rounding is not looked at"
+    figures.title(figure, f"{result.name}: {words}")
     return figures.image(figure, path)
 
 

@@ -1,15 +1,17 @@
-"""Reports which algorithms meet a brief: every cause of drift, what each costs, and what binds the others."""
+"""Which algorithms meet a brief, as a result: causes of drift, what each costs, and what binds the others."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from strapgen.design.brief import DesignBrief
 from strapgen.design.selection.answer import verdicts
 from strapgen.design.selection.judgement import CAUSES, Judgement
 from strapgen.design.selection.simulated import RANDOM_RUNS, RandomDrift, Simulated
-from strapgen.results.report import Report
+from strapgen.results.records import entry, keyed_table
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 #: Format of a drift, and of a cost.
@@ -18,53 +20,51 @@ _DRIFT, _COUNT = ".2g", ".0f"
 _MOST_ACCEPTED, _MOST_REFUSED = 20, 12
 
 
-def selection_report(
-    brief: DesignBrief, ordered: Sequence[Judgement], simulated: Mapping[str, Simulated] | None = None
-) -> Report:
-    """Return the judgements of algorithms as a report."""
-    return Report(
-        lambda: _text(brief, ordered, simulated or {}),
-        lambda: [_as_dict(one) | _runs(one, simulated or {}) for one in ordered],
-        lambda: _flat(ordered),
-        lambda: _table(brief, ordered, refused=True),
-    )
+@dataclass(frozen=True)
+class JudgedAlgorithm:
+    """An algorithm with what it loses and costs, and whether it meets a brief."""
+
+    judgement: Judgement = field(metadata=entry(spread=True))
+    #: Drifts in time simulations by cause
+    simulated_deg_h: Simulated | None = field(metadata=entry(optional=True))
 
 
-def _as_dict(one: Judgement) -> dict[str, Any]:
-    """Return a judgement as JSON data, the promised keys first."""
-    first = {
-        "name": one.name,
-        "meets": one.meets,
-        "binding": one.binding,
-        "drift_deg_h": {cause: one.drift_deg_h[cause] for cause in CAUSES},
-        "operations_per_s": one.operations_per_s,
-    }
-    return first | {name: value for name, value in vars(one).items() if name not in first}
+@dataclass(frozen=True)
+class SelectionResult(Result):
+    """Which algorithms meet a brief: every cause of drift, what each costs, and what binds the others."""
 
+    row = JudgedAlgorithm
+    drawn_by = "strapgen.design.selection.selection_plot:selection_image"
 
-def _runs(one: Judgement, simulated: Mapping[str, Simulated]) -> dict[str, Any]:
-    """Return the drifts of a time simulation as JSON data, if there is one."""
-    if one.name not in simulated:
-        return {}
-    run = vars(simulated[one.name])
-    drifts = {
-        cause: drift._asdict() if isinstance(drift, RandomDrift) else drift for cause, drift in run.items()
-    }
-    return {"simulated_deg_h": drifts}
+    brief: DesignBrief
+    ordered: Sequence[Judgement]
+    simulated: Mapping[str, Simulated] | None
+    #: Name of the brief
+    name: str
 
+    def rows(self) -> list[JudgedAlgorithm]:
+        """Return the algorithms in their order."""
+        return [JudgedAlgorithm(one, (self.simulated or {}).get(one.name)) for one in self.ordered]
 
-def _flat(ordered: Sequence[Judgement]) -> TextTable:
-    """Return all figures, a row for each algorithm."""
-    names = ["name", "meets", "binding", "operations_per_s", "carry"]
-    more = ["velocity_m_s", "position_m", "instructions_per_s", "bytes"]
-    columns = [*names, *(f"{cause}_deg_h" for cause in CAUSES), *more, "reason"]
-    rows = []
-    for one in ordered:
-        row = vars(one) | {f"{cause}_deg_h": one.drift_deg_h[cause] for cause in CAUSES}
-        row |= {"meets": "yes" if one.meets else "no"}
-        rows.append([row[name] for name in columns])
-    texts = ("name", "meets", "binding", "carry", "reason")
-    return TextTable([Column(name, "<" if name in texts else ">", missing="") for name in columns], rows)
+    def table(self) -> TextTable:
+        """Return all figures, a row for each algorithm."""
+        names = ["name", "meets", "binding", "operations_per_s", "carry"]
+        more = ["velocity_m_s", "position_m", "instructions_per_s", "bytes"]
+        columns = [*names, *(f"{cause}_deg_h" for cause in CAUSES), *more, "reason"]
+        rows = []
+        for one in self.ordered:
+            row = vars(one) | {f"{cause}_deg_h": one.drift_deg_h[cause] for cause in CAUSES}
+            row |= {"meets": "yes" if one.meets else "no"}
+            rows.append({name: row[name] for name in columns})
+        return keyed_table(rows)
+
+    def reader(self) -> TextTable:
+        """Return what a reader compares."""
+        return _table(self.brief, self.ordered, refused=True)
+
+    def text(self) -> str:
+        """Return the answer for a reader."""
+        return _text(self.brief, self.ordered, self.simulated or {})
 
 
 def _table(brief: DesignBrief, ordered: Sequence[Judgement], refused: bool) -> TextTable:

@@ -258,10 +258,9 @@ def show(
     Example: strapgen window show window-7-7
     """
     output.check(window)
-    from strapgen.design.windows.window_plot import window_image
-    from strapgen.design.windows.window_report import window_report
+    from strapgen.design.windows.window_report import WindowResult
 
     family = window_of(window)
     with waiting("evaluating the filters"):
-        report = window_report(family)
-    output.report(report, lambda path: window_image(family, path))
+        result = WindowResult.of(family)
+    output.show(result)

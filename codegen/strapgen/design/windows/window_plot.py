@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,12 +12,16 @@ from strapgen.catalogue.methods.window import Window
 from strapgen.design.filters import responses
 from strapgen.results import figures
 
+if TYPE_CHECKING:
+    from strapgen.design.windows.window_report import WindowResult
+
 #: Frequencies of a curve, and the lowest error that is drawn.
 _POINTS, _LOWEST = 240, 1e-14
 
 
-def window_image(window: Window, path: str | Path) -> bytes:
+def window_image(result: WindowResult, path: str | Path) -> bytes:
     """Return the error of each filter against frequency, beside that of the polynomial through the same samples."""
+    window = result.window
     curves = {_label(window): window}
     now = [one for one in window.one_sided if one.ahead < window.ahead]
     curves |= {_label(one): one for one in (now[len(now) // 2 :: max(1, len(now) - len(now) // 2 - 1)])}

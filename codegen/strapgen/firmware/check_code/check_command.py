@@ -60,7 +60,7 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
     choice = method.choose(algorithm)
     from strapgen import pipeline
     from strapgen.firmware.check_code import conformance
-    from strapgen.firmware.check_code.conformance_report import finding_text, findings_report
+    from strapgen.firmware.check_code.conformance_report import FindingsResult, finding_text
 
     kernel = pipeline.derive(choice)
     live = (
@@ -74,7 +74,7 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
         if live:
             typer.echo(finding_text(finding))
     if not live:
-        output.report(findings_report(kernel.name, kernel.title, findings))
+        output.show(FindingsResult(kernel.name, kernel.title, findings))
     _fail(kernel.name, [finding.name for finding in findings if finding.holds is False])
 
 
@@ -82,10 +82,10 @@ def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     """Check a function of a file in C or C++."""
     step = foreign.step(file)
     from strapgen.firmware.check_code.check_foreign import check_foreign
-    from strapgen.firmware.check_code.conformance_report import outcome_report
+    from strapgen.firmware.check_code.conformance_report import ForeignResult
 
     outcome = check_foreign(step)
-    output.report(outcome_report(outcome, step.source.function))
+    output.show(ForeignResult(outcome, step.source.function))
     cause = f"; likely cause: {outcome.cause}" if outcome.cause else ""
     _fail(file, [finding.name for finding in outcome.findings if finding.holds is False], cause)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ from strapgen.firmware.check_code.runs import (
     lengths,
 )
 from strapgen.lab.motions.motions import motion
+from strapgen.results.records import entry, properties
 
 Array = NDArray[np.float64]
 
@@ -68,11 +69,30 @@ class SeenCoefficient:
 
 
 @dataclass(frozen=True)
+class MeasuredCheck:
+    """A check and what it measured."""
+
+    name: str
+    #: Whether the function passes; None where nothing is required, or nothing could be measured
+    holds: bool | None
+    value: float | None
+
+
+def measured(findings: Sequence[Finding]) -> list[MeasuredCheck]:
+    """Return findings without their words."""
+    return [MeasuredCheck(finding.name, finding.holds, finding.measured) for finding in findings]
+
+
+@dataclass(frozen=True)
 class ForeignOutcome:
     """What the check of a user's function has shown."""
 
+    computed = properties(holds=entry())
+
     file: str
-    findings: tuple[Finding, ...]
+    findings: tuple[Finding, ...] = field(
+        metadata=entry(key="checks", write=measured, kind=list[MeasuredCheck])
+    )
     #: Observed order
     order: float | None
     #: Magnitude of the drift on the cone in deg/h

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import mpmath
@@ -25,6 +25,7 @@ from strapgen.lab.converge.convergence import converge
 from strapgen.lab.motions.exact_attitudes import step_of_increments
 from strapgen.lab.motions.motions import GENERAL, motion
 from strapgen.lab.simulate.runs import attitude, drift_between, simulate
+from strapgen.results.records import Record
 from strapgen.run import exact
 from strapgen.run.backends import Backend, sources_to_build
 from strapgen.run.backends import backend as attitude_backend
@@ -42,7 +43,7 @@ _STEPS = 200
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Record):
     """The outcome of one check.
 
     Parameters
@@ -69,10 +70,6 @@ class Finding:
     def within(cls, name: str, text: str, measured: float, allowed: float) -> Finding:
         """Return the finding on a figure that may be as large as another."""
         return cls(name, measured <= allowed, text, measured, allowed)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the finding as plain JSON data."""
-        return asdict(self)
 
 
 def check(choice: Choice) -> Iterator[Finding]:

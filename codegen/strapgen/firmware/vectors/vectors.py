@@ -10,6 +10,7 @@ import math
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Operation, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
+from strapgen.results.result import Result
 from strapgen.run.exact import ExactEvaluator
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
@@ -42,6 +44,23 @@ _LIBRARY_ROOM = 4
 
 #: Most vectors of a table, which a compiler of a small processor still takes.
 _MOST = 10_000
+
+
+@dataclass(frozen=True)
+class VectorsResult(Result):
+    """Test vectors that were written."""
+
+    function: str
+    files: Sequence[Path]
+    #: Number of vectors
+    vectors: int
+    #: Those that a call must refuse
+    refused: int
+
+    def text(self) -> str:
+        """Return the numbers of vectors, and the files."""
+        head = f"{self.function}: {self.vectors} vectors, {self.refused} of them refused"
+        return "\n".join([head, *(f"  {path}" for path in self.files)])
 
 
 @dataclass(frozen=True)

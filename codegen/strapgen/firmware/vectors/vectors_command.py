@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import Algorithm, MethodOptions, option
-from strapgen.cli.output import Folder, Format, check_format, print_json
+from strapgen.cli.output import Folder, Format, check_format, show
 from strapgen.ir.exceptions import InputError
 
 
@@ -46,7 +44,7 @@ def vectors(
     """
     check_format(format)
     from strapgen.firmware.changed_files import refuse_changed
-    from strapgen.firmware.vectors.vectors import vectors_of_choice
+    from strapgen.firmware.vectors.vectors import VectorsResult, vectors_of_choice
     from strapgen.firmware.vectors.vectors_c import table_files
     from strapgen.storage.files import write_files
     from strapgen.targets import BUILT_IN
@@ -62,11 +60,4 @@ def vectors(
     refuse_changed(out or Path(), files)
     written = write_files(out or Path(), files)
     refused = sum(row.status != 0 for row in table.rows)
-    if format == "json":
-        paths = [str(path) for path in written]
-        function = table.sources.function.name
-        print_json({"function": function, "files": paths, "vectors": len(table.rows), "refused": refused})
-        return
-    typer.echo(f"{table.sources.function.name}: {len(table.rows)} vectors, {refused} of them refused")
-    for path in written:
-        typer.echo(f"  {path}")
+    show(VectorsResult(table.sources.function.name, written, len(table.rows), refused), format)

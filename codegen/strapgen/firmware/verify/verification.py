@@ -6,7 +6,7 @@ import difflib
 import math
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from strapgen import pipeline
 from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import CallVector
-from strapgen.ir.decimals import float_above
+from strapgen.ir.decimals import float_above, places_above
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.sources import Sources
+from strapgen.results.records import entry, properties
+from strapgen.results.result import Result
 from strapgen.run.backends import Backend
 from strapgen.run.c import CEvaluator
 from strapgen.run.exact import DIGITS, Interpreter, number
@@ -39,14 +41,16 @@ CALLS, STEPS = 300, 300
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Result):
     """What a generated file was found to be."""
+
+    computed = properties(in_step=entry(), holds=entry())
 
     file: Path
     #: What differs from the file that its command generates, a line of text each; empty if nothing does
     differences: tuple[str, ...]
     #: Calls that did not return what the reference returns: the integer model in fixed point
-    wrong: int
+    wrong: int = field(metadata=entry(key="wrong_calls"))
     #: Calls in all
     calls: int
     #: Largest distance from arithmetic of 40 digits, in units in the last place of the output; None if the file
@@ -71,6 +75,20 @@ class Verification:
     def holds(self) -> bool:
         """Whether the file is in step and computes what it promises."""
         return self.in_step and self.within
+
+    @property
+    def in_words(self) -> str:
+        """What the calls returned."""
+        if self.max_ulp is None:
+            return "not compiled, since it differs; --run-differing compiles and runs it as it stands"
+        right = f"{self.calls - self.wrong} of {self.calls} calls return what they must"
+        bound = "" if self.bound_ulp is None else f", certified {places_above(Fraction(self.bound_ulp))}"
+        return f"{right}; error {self.max_ulp:.4f} of the last place{bound}"
+
+    def text(self) -> str:
+        """Return the differences, and what the calls returned."""
+        state = f"{self.file}: {'in step' if self.in_step else 'out of step'} with its command"
+        return "\n".join([*self.differences, state, self.in_words])
 
 
 def paths_of(file: Path) -> tuple[Path, Path]:

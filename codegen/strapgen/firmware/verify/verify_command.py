@@ -55,7 +55,6 @@ def verify(
     """
     output.check(file, source.increments_csv, source.rates_csv)
     from strapgen.firmware.verify import verification
-    from strapgen.firmware.verify.verification_report import verification_report
     from strapgen.firmware.verify.whole_verification import whole_header
 
     header = whole_header(file)
@@ -71,7 +70,7 @@ def verify(
         choice = request.choice
         increments = source.read(choice.increments_per_step, choice.previous, choice.ahead).increments
     result = verification.verify(file, request, increments, run_differing=run_differing)
-    output.report(verification_report(result))
+    output.show(result)
     if not result.holds:
         raise typer.Exit(1)
 
@@ -89,7 +88,6 @@ def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, outp
     """Verify the C of a system, of two speeds or of a commit-late unit; exit with 1 if it fails."""
     from strapgen.cli.progress import waiting
     from strapgen.firmware.verify import header_command
-    from strapgen.firmware.verify.verification_report import whole_verification_report
     from strapgen.firmware.verify.whole_verification import verify_whole
     from strapgen.run.generated_files import command_of, text_of
 
@@ -104,6 +102,6 @@ def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, outp
             if command.startswith("strapgen generate ")
         }
         result = verify_whole(header, sources, stages, run_differing=run_differing)
-    output.report(whole_verification_report(result))
+    output.show(result)
     if not result.holds:
         raise typer.Exit(1)

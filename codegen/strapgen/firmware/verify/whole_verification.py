@@ -10,6 +10,8 @@ from pathlib import Path
 from strapgen.firmware.verify.verification import Verification, differing_lines, present_runs, verify
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.sources import Sources
+from strapgen.results.records import entry, properties
+from strapgen.results.result import Result
 from strapgen.run.generated_files import command_of, text_of
 from strapgen.run.generation import Request
 
@@ -19,8 +21,10 @@ _VERSION = re.compile(r'_VERSION "(.*)"')
 
 
 @dataclass(frozen=True)
-class WholeVerification:
+class WholeVerification(Result):
     """What the generated files of a whole were found to be."""
+
+    computed = properties(holds=entry())
 
     #: Header of the whole
     header: Path
@@ -35,6 +39,12 @@ class WholeVerification:
     def holds(self) -> bool:
         """Whether all files are in step, and every stage computes what it promises."""
         return not self.differences and all(stage.holds for stage in self.stages)
+
+    def text(self) -> str:
+        """Return the differences, and what the calls of each stage returned."""
+        state = "out of step" if self.differences else "in step"
+        lines = [*self.differences, f"{self.header}: {self.files} files, {state} with the command"]
+        return "\n".join([*lines, *(f"{stage.file.stem}: {stage.in_words}" for stage in self.stages)])
 
 
 def whole_header(place: Path) -> Path | None:

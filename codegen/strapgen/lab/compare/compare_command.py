@@ -110,8 +110,7 @@ def compare(
     source.check()
     _check_fixed(fixed, {*names, reference})
 
-    from strapgen.lab.compare.comparison_plot import comparison_image
-    from strapgen.lab.compare.comparison_report import comparison_report
+    from strapgen.lab.compare.comparison_report import ComparisonResult
 
     kernels = [
         _compared(
@@ -120,10 +119,7 @@ def compare(
         for choice in choices
     ]
     drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
-    output.report(
-        comparison_report(kernels, reference, drift),
-        lambda path: comparison_image(kernels, reference, path),
-    )
+    output.show(ComparisonResult(kernels, reference, drift))
     _fail_above(kernels, fail_above, f"further from {reference} than {fail_above} rad")
 
 

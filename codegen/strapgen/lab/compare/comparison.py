@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
 from strapgen.lab.attitude_limits import require_finite
 from strapgen.lab.cost.code_size import code_size
 from strapgen.lab.simulate.runs import attitude, drift_between
+from strapgen.results.records import INTERNAL, Record, entry
+from strapgen.results.table import ANGLE
 from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, Backend, sources_to_build
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.compiler import compile_together
@@ -47,8 +49,12 @@ class AngleHistory:
     bounds_rad: tuple[tuple[int, float], ...]
 
 
+def _in_words(operations: Mapping[str, int]) -> str:
+    return ", ".join(f"{number} {kind}" for kind, number in operations.items() if number)
+
+
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Record):
     """A back end beside a reference.
 
     Parameters
@@ -71,18 +77,20 @@ class Comparison:
         Number of operations of a step by kind.
     history : AngleHistory, optional
         The angle along the run, for a plot; no part of the JSON data.
+    kernel : str, optional
     """
 
-    backend: str
-    max_abs_rad: float
-    rms_rad: float
-    max_ulp: float
-    bound_rad: float | None
-    drift_deg: float
-    ns_per_step: float
-    bytes: int | None
-    operations: dict[str, int]
-    history: AngleHistory | None = field(default=None, repr=False, compare=False)
+    backend: str = field(metadata=entry("back end", align="<"))
+    max_abs_rad: float = field(metadata=entry("largest", ANGLE))
+    rms_rad: float = field(metadata=entry("rms", ANGLE))
+    max_ulp: float = field(metadata=entry("ulp", ".3g"))
+    bound_rad: float | None = field(metadata=entry("certified", ANGLE))
+    drift_deg: float = field(metadata=entry("drift", ".4g"))
+    ns_per_step: float = field(metadata=entry("ns/step", ".1f"))
+    bytes: int | None = field(metadata=entry("bytes"))
+    operations: dict[str, int] = field(metadata=entry("operations", align="<", cell=_in_words, split=True))
+    history: AngleHistory | None = field(default=None, repr=False, compare=False, metadata=INTERNAL)
+    kernel: str = field(default="", metadata=entry("kernel", align="<"))
 
     __repr__ = short_repr
 
@@ -90,12 +98,6 @@ class Comparison:
         bound = "" if self.bound_rad is None else f", certified {self.bound_rad:.3g} rad"
         angle = f"angle from the reference up to {self.max_abs_rad:.3g} rad{bound}"
         return f"{self.backend}: {angle}\ndrift {self.drift_deg:.4g} deg, {self.ns_per_step:.1f} ns a step"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain JSON data."""
-        data = asdict(replace(self, history=None))
-        del data["history"]
-        return data
 
 
 class Comparisons(list[Comparison]):
@@ -187,12 +189,13 @@ def compare(
     states: Array = standard.propagate(d).astype(np.float64)
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
-    return Comparisons(
+    rows = (
         _compared(name, load(name), d, states, matrices, truth)
         if isinstance(name, str)
         else _compared(name.name, name, d, states, matrices, truth)
         for name in backends
     )
+    return Comparisons(replace(row, kernel=choice.kernel) for row in rows)
 
 
 def _compared(

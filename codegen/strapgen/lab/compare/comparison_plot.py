@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from strapgen.lab.compare.comparison import Comparison
-    from strapgen.lab.compare.comparison_report import ComparedKernel
+    from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
 
 #: Most points of a curve; of a longer run, each point is the largest angle of a part.
 _MOST_POINTS = 720
@@ -25,11 +24,12 @@ _WIDTH = 78
 _LARGEST_RAD = 4.0
 
 
-def comparison_image(kernels: Sequence[ComparedKernel], reference: str, path: str | Path) -> bytes:
+def comparison_image(result: ComparisonResult, path: str | Path) -> bytes:
     """Return the angle of back ends from a reference over time: a panel a kernel, a line a back end.
 
     Dotted, in the colour of its line, is the certified bound after as many steps.
     """
+    kernels, reference = result.kernels, result.reference
     columns = min(2, len(kernels))
     rows = -(-len(kernels) // columns)
     figure, grid = figures.grid_of_axes(rows, columns, (1.4 + 6.6 * columns, 0.7 + 4.4 * rows), sharey=True)

@@ -124,13 +124,11 @@ def converge(
     words, cases = ladder.words(), ladder.cases(choices, backend)
 
     from strapgen.lab.converge import convergence
-    from strapgen.lab.converge.convergence_plot import convergence_image
-    from strapgen.lab.converge.convergence_report import convergence_report
+    from strapgen.lab.converge.convergence_report import ConvergenceResult
 
     runs = track(convergence.converge_all(cases, workers.jobs, cluster), "running", len(cases))
     orders = [outcome for _, outcome in sorted(runs, key=lambda run: run[0])]
-    title = f"{words}; {', '.join(backend)}"
-    output.report(convergence_report(orders, title), lambda path: convergence_image(orders, title, path))
+    output.show(ConvergenceResult(orders, f"{words}; {', '.join(backend)}"))
     if fail_beyond is not None and (
         far := [order.kernel for order in orders if not _within(order, fail_beyond)]
     ):

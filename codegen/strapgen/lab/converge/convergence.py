@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +27,7 @@ from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.simulate.runs import largest_increment, simulate
 from strapgen.lab.study.clusters import Bundle, Cluster, moved
 from strapgen.lab.study.resumable import side_by_side
+from strapgen.results.records import INTERNAL, Record, entry
 from strapgen.run import exact
 from strapgen.run.backends import BACKENDS
 from strapgen.run.backends import backend as attitude_backend
@@ -52,7 +53,26 @@ class Rung:
 
 
 @dataclass(frozen=True)
-class Convergence:
+class PredictedOrders:
+    """Orders in theory; None where a user's algorithm states none."""
+
+    #: That of the method on any differential equation
+    method_order: int | None
+    #: That of the method on attitude kinematics
+    attitude_order: int | None
+    #: That of the rates which the increments tell
+    extraction_order: int | None
+    #: That of the step
+    predicted_order: int | None
+
+    @staticmethod
+    def of(order: Order) -> PredictedOrders:
+        """Return the orders of a step."""
+        return PredictedOrders(order.method, order.attitude, order.extraction, order.step)
+
+
+@dataclass(frozen=True)
+class Convergence(Record):
     """The errors of an algorithm on a ladder of steps.
 
     Parameters
@@ -67,14 +87,17 @@ class Convergence:
         rungs show it.
     arguments : str
         Name and options of the kernel on the command line; they tell kernels of one name apart.
+    label : str, optional
+        Name beside others, see `labels`.
     """
 
     kernel: str
     backend: str
-    order: Order | None
+    order: Order | None = field(metadata=entry(spread=True, write=PredictedOrders.of, kind=PredictedOrders))
     rungs: tuple[Rung, ...]
-    observed: float | None
-    arguments: str = ""
+    observed: float | None = field(metadata=entry(key="observed_order"))
+    arguments: str = field(default="", metadata=INTERNAL)
+    label: str | None = field(default=None, metadata=entry(optional=True))
 
     __repr__ = short_repr
     _repr_html_ = notebook_html
@@ -103,20 +126,6 @@ class Convergence:
     def predicted(self) -> int | None:
         """Order of the step in theory."""
         return None if self.order is None else self.order.step
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the outcome as plain JSON data."""
-        orders = {} if self.order is None else asdict(self.order)
-        return {
-            "kernel": self.kernel,
-            "backend": self.backend,
-            "method_order": orders.get("method"),
-            "attitude_order": orders.get("attitude"),
-            "extraction_order": orders.get("extraction"),
-            "predicted_order": orders.get("step"),
-            "observed_order": self.observed,
-            "rungs": [asdict(rung) for rung in self.rungs],
-        }
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +12,12 @@ from strapgen.results import figures
 
 if TYPE_CHECKING:
     from strapgen.lab.converge.convergence import Convergence
+    from strapgen.lab.converge.convergence_report import ConvergenceResult
 
 
-def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | Path) -> bytes:
+def convergence_image(result: ConvergenceResult, path: str | Path) -> bytes:
     """Return error against step, a line an algorithm, beside a line of the slope that theory says."""
+    outcomes = result.outcomes
     figure, grid = figures.grid_of_axes(1, 1, (9.5, 5.6))
     axes = grid[0, 0]
     colours = figures.colours(len(outcomes), figures.LIGHTEST)
@@ -33,7 +34,7 @@ def convergence_image(outcomes: Sequence[Convergence], title: str, path: str | P
         axes, [label for label in map(_label, outcomes, labels(outcomes), colours) if label is not None]
     )
     axes.set_title("slope of the filled points; dashed: theory", loc="left", fontsize=9, color="0.35")
-    figures.title(figure, title)
+    figures.title(figure, result.title)
     return figures.image(figure, path)
 
 

@@ -1,42 +1,69 @@
-"""Reports observed orders in every format."""
+"""Observed orders as a result."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from strapgen.lab.converge.convergence import Convergence, Rung, labels
-from strapgen.results.report import Report
+from strapgen.results.records import entry, reader_table
+from strapgen.results.result import Result
 from strapgen.results.table import ERROR, SECONDS, Column, TextTable
 
-#: Algorithms side by side in a report.
+#: Algorithms side by side in a text.
 _MOST_COLUMNS = 4
-_COLUMNS = (
-    Column("kernel", "<"),
-    Column("backend", "<"),
-    Column("step_s", spec=SECONDS),
-    Column("error_rad", spec=ERROR),
-    Column("slope", spec=".2f"),
-    Column("used"),
-    Column("observed_order", spec=".3f"),
-    Column("predicted_order"),
-    Column("label", "<"),
-)
 
 
-def convergence_text(outcomes: Sequence[Convergence], title: str) -> str:
-    """Return outcomes as a report: the error and the local slope at every step, the observed and predicted orders."""
-    lines = [title, "largest error in rad; in brackets the slope from the step before; * fitted"]
-    names = labels(outcomes)
-    for first in range(0, len(outcomes), _MOST_COLUMNS):
-        some = slice(first, first + _MOST_COLUMNS)
-        lines += ["", *_table(outcomes[some], names[some]).lines()]
-    named = list(zip(names, outcomes, strict=True))
-    notes = [f"{name}: {one.order}" for name, one in named if one.order is not None and one.order.limited]
-    notes += [f"{name}: {one.hidden}" for name, one in named if one.hidden]
-    return "\n".join([*lines, *([""] if notes else []), *notes])
+@dataclass(frozen=True)
+class LadderRow:
+    """One step of one algorithm in a table."""
+
+    kernel: str = field(metadata=entry("kernel", align="<"))
+    backend: str = field(metadata=entry("backend", align="<"))
+    step_s: float = field(metadata=entry("step_s", SECONDS))
+    error_rad: float | None = field(metadata=entry("error_rad", ERROR))
+    slope: float | None = field(metadata=entry("slope", ".2f"))
+    used: bool = field(metadata=entry("used"))
+    observed_order: float | None = field(metadata=entry("observed_order", ".3f"))
+    predicted_order: int | None = field(metadata=entry("predicted_order"))
+    label: str = field(metadata=entry("label", align="<"))
 
 
-def _table(outcomes: Sequence[Convergence], names: Sequence[str]) -> TextTable:
+@dataclass(frozen=True)
+class ConvergenceResult(Result):
+    """Errors on a ladder of steps, with observed and predicted orders: a row for each algorithm and back end."""
+
+    row = Convergence
+    drawn_by = "strapgen.lab.converge.convergence_plot:convergence_image"
+
+    outcomes: Sequence[Convergence]
+    #: The runs in words
+    title: str
+
+    def rows(self) -> Sequence[Convergence]:
+        """Return the outcomes with their labels."""
+        return [
+            replace(one, label=name) for one, name in zip(self.outcomes, labels(self.outcomes), strict=True)
+        ]
+
+    def table(self) -> TextTable:
+        """Return a row for every step of every algorithm."""
+        return ladder_table(*self.outcomes)
+
+    def text(self) -> str:
+        """Return the error and the local slope at every step, the observed and predicted orders."""
+        outcomes, names = self.outcomes, labels(self.outcomes)
+        lines = [self.title, "largest error in rad; in brackets the slope from the step before; * fitted"]
+        for first in range(0, len(outcomes), _MOST_COLUMNS):
+            some = slice(first, first + _MOST_COLUMNS)
+            lines += ["", *_side_by_side(outcomes[some], names[some]).lines()]
+        named = list(zip(names, outcomes, strict=True))
+        notes = [f"{name}: {one.order}" for name, one in named if one.order is not None and one.order.limited]
+        notes += [f"{name}: {one.hidden}" for name, one in named if one.hidden]
+        return "\n".join([*lines, *([""] if notes else []), *notes])
+
+
+def _side_by_side(outcomes: Sequence[Convergence], names: Sequence[str]) -> TextTable:
     """Return a row for every step, then the orders; cells end where the mark of a fitted error stands."""
     rows: list[list[object]] = [
         [rung.step_s, *(_cell(one.rungs[k]) for one in outcomes)] for k, rung in enumerate(outcomes[0].rungs)
@@ -55,25 +82,14 @@ def _cell(rung: Rung) -> str:
     return f"{rung.error_rad:{ERROR}}{slope}{'*' if rung.used else ' '}"
 
 
-def convergence_report(outcomes: Sequence[Convergence], title: str) -> Report:
-    """Return outcomes as a report, whose table has a row for every step of every algorithm."""
-    return Report(
-        lambda: convergence_text(outcomes, title),
-        lambda: [
-            {**one.as_dict(), "label": name} for name, one in zip(labels(outcomes), outcomes, strict=True)
-        ],
-        lambda: ladder_table(*outcomes),
-    )
-
-
 def ladder_table(*outcomes: Convergence) -> TextTable:
     """Return a table with a row for every step of every algorithm."""
     rows = [
-        (
+        LadderRow(
             *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
             *(one.observed, one.predicted, name),
         )
         for name, one in zip(labels(outcomes), outcomes, strict=True)
         for rung in one.rungs
     ]
-    return TextTable(_COLUMNS, rows)
+    return reader_table(rows, LadderRow)

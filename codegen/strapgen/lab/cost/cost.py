@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.lab.cost import emulation
 from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.results.records import entry
 from strapgen.storage import drafts
 from strapgen.targets import TARGETS
 
@@ -34,19 +35,19 @@ _PART = 3
 class Cost:
     """What a kernel costs on a processor."""
 
-    kernel: str
-    cpu: str
+    kernel: str = field(metadata=entry("kernel", align="<"))
+    cpu: str = field(metadata=entry("cpu", align="<"))
     #: Instructions of the object code
-    instructions: int
+    instructions: int = field(metadata=entry("instructions"))
     #: Instructions from the entry of the function to its return, for input inside its range; None without
     #: emulator
-    executed: int | None
+    executed: int | None = field(metadata=entry("executed"))
     #: Those of the instructions that multiply
-    multiplications: int
-    code_bytes: int
-    constant_bytes: int
+    multiplications: int = field(metadata=entry("multiplications"))
+    code_bytes: int = field(metadata=entry("code, B"))
+    constant_bytes: int = field(metadata=entry("constants, B"))
     #: Stack of the function and of the deepest of the file's own functions that it calls, in bytes
-    stack_bytes: int
+    stack_bytes: int = field(metadata=entry("stack, B"))
     #: Compiler and version
     compiler: str
 

@@ -82,14 +82,14 @@ def cost(
     from strapgen import pipeline
     from strapgen.ir import checks
     from strapgen.lab.cost import cost as costs
-    from strapgen.lab.cost.cost_report import catalogue_report, cost_report
+    from strapgen.lab.cost.cost_report import CostResult
     from strapgen.targets import TARGETS
 
     processors = costs.processors(cross, cpu or ())
     if all_:
         with waiting("measuring"):
             rows = [*costs.catalogue_costs(processors)]
-        output.report(catalogue_report(rows))
+        output.show(CostResult(rows, of_catalogue=True))
         return
     target = target or "c-fixed"
     checks.choice("target", target, [name for name, entry in TARGETS.items() if entry.compiled])
@@ -101,4 +101,4 @@ def cost(
             raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
         sources = pipeline.compile(choice, target, settings)
         rows += [costs.cost(sources, name) for name in processors]
-    output.report(cost_report(rows))
+    output.show(CostResult(rows))

@@ -1,25 +1,15 @@
-"""Lays out what kernels cost on microcontrollers."""
+"""What kernels cost on microcontrollers as a result."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from strapgen.lab.cost.cost import Cost
-from strapgen.results.report import Report
-from strapgen.results.table import Column, TextTable
+from strapgen.results.records import reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import TextTable
 
-_HEADINGS = {
-    "kernel": "kernel",
-    "cpu": "cpu",
-    "instructions": "instructions",
-    "executed": "executed",
-    "multiplications": "multiplications",
-    "code_bytes": "code, B",
-    "constant_bytes": "constants, B",
-    "stack_bytes": "stack, B",
-}
 #: What stands above the table of the standard catalogue.
 _HEAD = """# What the standard catalogue costs
 
@@ -32,47 +22,34 @@ function and of the deepest function of its file that it calls.
 """
 
 
-def cost_report(costs: Sequence[Cost]) -> Report:
-    """Return what kernels cost as a report."""
-    return Report(lambda: _text(costs), lambda: _data(costs), lambda: _table(costs))
-
-
-def catalogue_report(costs: Sequence[Cost]) -> Report:
-    """Return what the standard catalogue costs as a report, in Markdown as a page."""
-    table = _table(costs)
-    page = _Page(table.columns, table.rows, _compilers(costs))
-    return Report(lambda: _text(costs), lambda: _data(costs), lambda: table, lambda: page)
-
-
 @dataclass(frozen=True)
-class _Page(TextTable):
-    """A table that stands in a page of its own in Markdown."""
+class CostResult(Result):
+    """What kernels cost on microcontrollers: a row for each kernel and processor."""
 
-    compilers: str = ""
+    rows_in = "costs"
+    row = Cost
 
-    def as_markdown(self) -> str:
-        """Return the page."""
-        return f"{_HEAD}\n{super().as_markdown()}\n\n{self.compilers}"
+    costs: Sequence[Cost]
+    #: Whether they are all of the standard catalogue, which is a page in Markdown
+    of_catalogue: bool = False
 
+    def table(self) -> TextTable:
+        """Return the numbers without the compiler."""
+        return reader_table(self.costs, Cost)
 
-def _data(costs: Sequence[Cost]) -> list[dict[str, Any]]:
-    return [asdict(cost) for cost in costs]
+    def text(self) -> str:
+        """Return the table, and the compilers."""
+        return (
+            f"{self.table().as_text()}\n\n"
+            "executed: instructions of one call, for input inside its range\n"
+            f"{self._compilers()}"
+        )
 
+    def written(self, format: str) -> str:
+        """Return the result in a format; the catalogue is a page in Markdown."""
+        text = super().written(format)
+        page = self.of_catalogue and format == "markdown"
+        return f"{_HEAD}\n{text}\n\n{self._compilers()}" if page else text
 
-def _table(costs: Sequence[Cost]) -> TextTable:
-    columns = [
-        Column(heading, "<" if name in ("kernel", "cpu") else ">") for name, heading in _HEADINGS.items()
-    ]
-    return TextTable(columns, [[asdict(cost)[name] for name in _HEADINGS] for cost in costs])
-
-
-def _text(costs: Sequence[Cost]) -> str:
-    return (
-        f"{_table(costs).as_text()}\n\n"
-        "executed: instructions of one call, for input inside its range\n"
-        f"{_compilers(costs)}"
-    )
-
-
-def _compilers(costs: Sequence[Cost]) -> str:
-    return "\n".join(dict.fromkeys(f"compiled by {cost.compiler} -O2" for cost in costs))
+    def _compilers(self) -> str:
+        return "\n".join(dict.fromkeys(f"compiled by {cost.compiler} -O2" for cost in self.costs))

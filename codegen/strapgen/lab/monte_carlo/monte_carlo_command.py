@@ -112,7 +112,7 @@ def study_monte_carlo(
         raise InputError(f"--out and --results are both {run.results}; two files are needed")
     cluster, sweep = workers.workers(), run.sweep(method.choose(algorithm))
     from strapgen.lab.monte_carlo.random_runs import MeanSquare, cases, predicted, random_runs
-    from strapgen.lab.monte_carlo.random_runs_report import RandomStudy, random_report
+    from strapgen.lab.monte_carlo.random_runs_report import RandomRunsResult
     from strapgen.run.backends import backend
 
     backend(sweep.algorithm, backend=sweep.backend)  # generated and compiled before the time counts
@@ -121,5 +121,5 @@ def study_monte_carlo(
     parts = list(track(random_runs(sweep, run.results, workers.jobs, cluster), "running", len(cases(sweep))))
     seconds = None if resumed else time.monotonic() - begin
     mean = predicted(sweep.algorithm, sweep.errors, sweep.steps)
-    study = RandomStudy(sweep, MeanSquare.of(parts), mean, float(run.sample_hz), seconds, run.of)
-    output.report(random_report(study))
+    figures = (MeanSquare.of(parts), mean, float(run.sample_hz), seconds, run.of)
+    output.show(RandomRunsResult.of(sweep, *figures))

@@ -1,80 +1,112 @@
-"""Reports and draws the errors of an attitude that sensors cause, beside their prediction."""
+"""The errors of an attitude that sensors cause, beside their prediction, as a result and drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from strapgen.lab.sensor_error_study.sensor_error_study import SensorScatter
+from strapgen.lab.sensor_error_study.sensor_error_study import Array, SensorScatter
 from strapgen.results import figures
-from strapgen.results.report import Report
+from strapgen.results.records import entry, reader_table
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 _AXES = "xyz"
-_KEYS = (
-    *("cause", "runs", "axis", "mean_deg", "mean_margin_deg", "predicted_mean_deg"),
-    *("deviation_deg", "low_deg", "high_deg", "predicted_deg"),
-)
-_COLUMNS = (
-    Column("", "<"),
-    Column("axis"),
-    *(Column(header, spec=".4g", group="mean, deg", gap=2) for header in ("runs", "+-", "predicted")),
-    *(
-        Column(header, spec=".4g", group="standard deviation, deg", gap=2)
-        for header in ("runs", "from", "to", "predicted")
-    ),
-)
 
 
-def sensor_report(rows: Sequence[SensorScatter], settings: dict[str, Any]) -> Report:
-    """Return a study of sensor errors as a report: the errors of the attitude at the end of the runs."""
-    table: list[list[Any]] = [
-        [row.cause, row.runs, axis, *(float(np.degrees(value)) for value in _numbers(row, place))]
-        for row in rows
-        for place, axis in enumerate(_AXES)
-    ]
+@dataclass(frozen=True)
+class SensorErrorRow:
+    """The error of the attitude on one axis at the end of the runs, positive if ahead of perfect sensors."""
 
-    def text() -> str:
-        shown = [
-            [
-                f"{line[0]}, {line[1]} runs"
-                if line[2] == "x" and line[1] > 1
-                else line[0] * (line[2] == "x"),
-                *line[2:],
-            ]
-            for line in table
+    #: Which errors the sensors have: "all", or one kind alone
+    cause: str
+    #: 1 where all are the same
+    runs: int
+    axis: str = field(metadata=entry("axis"))
+    mean_deg: float = field(metadata=entry("runs", ".4g", group="mean, deg"))
+    #: Half the width of the interval of 95 % of the mean
+    mean_margin_deg: float = field(metadata=entry("+-", ".4g", group="mean, deg"))
+    #: Mean in closed form, to first order
+    predicted_mean_deg: float = field(metadata=entry("predicted", ".4g", group="mean, deg"))
+    #: Standard deviation over the runs
+    deviation_deg: float = field(metadata=entry("runs", ".4g", group="standard deviation, deg"))
+    #: Lower end of its interval of 95 %
+    low_deg: float = field(metadata=entry("from", ".4g", group="standard deviation, deg"))
+    #: Upper end of that interval
+    high_deg: float = field(metadata=entry("to", ".4g", group="standard deviation, deg"))
+    #: Standard deviation in closed form, to first order
+    predicted_deg: float = field(metadata=entry("predicted", ".4g", group="standard deviation, deg"))
+
+
+@dataclass(frozen=True)
+class SensorErrorResult(Result):
+    """The errors of the attitude that sensors cause, over many runs and in closed form."""
+
+    drawn_by = f"{__name__}:sensor_image"
+    indented = False
+
+    #: The study, with what the errors are along the runs
+    scatter: Sequence[SensorScatter] = field(
+        metadata=entry(key="rows", write=lambda rows: _rows(rows), kind=list[SensorErrorRow])
+    )
+    #: File of the sensor errors
+    errors: str
+    algorithm: str
+    method: str | None
+    backend: str
+    motion: str
+    step_s: str = field(metadata=entry(unit="s"))
+
+    def rows(self) -> Sequence[SensorErrorRow]:
+        """Return a row for each cause and axis."""
+        return _rows(self.scatter)
+
+    def text(self) -> str:
+        """Return the table with its head."""
+        rows = self.rows()
+        causes = [
+            f"{row.cause}, {row.runs} runs"
+            if row.axis == "x" and row.runs > 1
+            else row.cause * (row.axis == "x")
+            for row in rows
         ]
-        head = ", ".join(f"{key} {value}" for key, value in settings.items())
+        table = reader_table(rows, SensorErrorRow)
+        cells = [[cause, *row] for cause, row in zip(causes, table.rows, strict=True)]
+        facts = {name: one for name, one in self.as_dict().items() if name != "rows"}
         return "\n".join(
             [
-                head,
-                f"errors of the attitude after {rows[0].time[-1]:g} s in reference axes, positive if ahead of a run "
-                "with perfect sensors;",
+                ", ".join(f"{key} {value}" for key, value in facts.items()),
+                f"errors of the attitude after {self.scatter[0].time[-1]:g} s in reference axes, positive if ahead of "
+                "a run with perfect sensors;",
                 "+-, from and to are intervals of 95 %; predicted to first order, in closed form",
                 "",
-                *TextTable(_COLUMNS, shown).lines(),
+                *TextTable([Column("", "<"), *table.columns], cells).lines(),
             ]
         )
 
-    def data() -> dict[str, Any]:
-        return settings | {"rows": [dict(zip(_KEYS, line, strict=True)) for line in table]}
 
-    return Report(
-        text, data, lambda: TextTable([Column(key, spec=".6g") for key in _KEYS], table), indented=False
-    )
-
-
-def _numbers(row: SensorScatter, place: int) -> list[float]:
-    """Return the numbers of an axis at the end of the runs in rad."""
-    parts = (row.mean, row.mean_margin, row.predicted_mean, row.deviation, row.low, row.high, row.predicted)
-    return [float(part[-1, place]) for part in parts]
+def _rows(scatter: Sequence[SensorScatter]) -> list[SensorErrorRow]:
+    return [
+        SensorErrorRow(
+            one.cause, one.runs, axis, *(float(np.degrees(part[-1, place])) for part in _parts(one))
+        )
+        for one in scatter
+        for place, axis in enumerate(_AXES)
+    ]
 
 
-def sensor_image(rows: Sequence[SensorScatter], path: str | Path) -> bytes:
+def _parts(one: SensorScatter) -> tuple[Array, ...]:
+    """Return the parts of a row in rad, (N, 3) each."""
+    means = (one.mean, one.mean_margin, one.predicted_mean)
+    return *means, one.deviation, one.low, one.high, one.predicted
+
+
+def sensor_image(result: SensorErrorResult, path: str | Path) -> bytes:
     """Return the standard deviations over time with their intervals, and the predicted ones as lines."""
+    rows = result.scatter
     whole, parts = rows[0], [row for row in rows[1:] if row.predicted.any() or row.deviation.any()]
     figure, grid = figures.grid_of_axes(1, 3, (11.0, 4.2), sharey=True)
     colours = figures.several_colours(1 + len(parts))

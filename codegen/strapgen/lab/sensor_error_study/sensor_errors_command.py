@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -77,16 +77,15 @@ def study_sensor_errors(
     assert errors is not None, "the command names a file"
     errors = errors if seed is None else replace(errors, seed=seed)
 
-    from strapgen.lab.sensor_error_study.sensor_error_report import sensor_image, sensor_report
+    from strapgen.lab.sensor_error_study.sensor_error_report import SensorErrorResult
     from strapgen.lab.sensor_error_study.sensor_error_study import FEWEST_RUNS
 
     checks.count("runs", runs, smallest=FEWEST_RUNS, largest=_MOST_RUNS)
     study = _study(choice, backend, source, errors, fixed)
     causes = len([*errors.causes])
     rows = list(track(study.rows(runs), "running", 1 + causes if causes > 1 else 1))
-    facts: dict[str, Any] = {"errors": file, "algorithm": choice.name, "method": choice.method_name}
-    facts |= {"backend": backend, "motion": source.described(source.motion or ""), "step_s": str(source.step)}
-    output.report(sensor_report(rows, facts), lambda path: sensor_image(rows, path))
+    motion, step = source.described(source.motion or ""), str(source.step)
+    output.show(SensorErrorResult(rows, file, choice.name, choice.method_name, backend, motion, step))
 
 
 def _study(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,22 +9,11 @@ import numpy as np
 
 from strapgen.lab.recordings.recording import History
 from strapgen.lab.simulate.runs import Run
-from strapgen.lab.simulate.runs_report import AXES, SKEW_PLANES
+from strapgen.lab.simulate.runs_report import AXES, SKEW_PLANES, history_elements
 from strapgen.results import figures
-from strapgen.storage.files import write_file
 
 if TYPE_CHECKING:
-    pass
-
-
-def plot_run(run: Run, title: str, path: str | Path) -> Path:
-    """Plot the nine errors of a run to a file; see `run_image`."""
-    return write_file(path, run_image(run, title, path))
-
-
-def plot_history(history: History, elements: Sequence[str], title: str, path: str | Path) -> Path:
-    """Plot an attitude history to a file; see `history_image`."""
-    return write_file(path, history_image(history, elements, title, path))
+    from strapgen.lab.simulate.runs_report import HistoryResult, RunResult
 
 
 def run_figure(run: Run, title: str) -> Any:
@@ -48,19 +36,19 @@ def run_figure(run: Run, title: str) -> Any:
     return figure
 
 
-def run_image(run: Run, title: str, path: str | Path) -> bytes:
+def run_image(result: RunResult, path: str | Path) -> bytes:
     """Return the nine errors of a run against time: scale, skew and drift, three axes each."""
-    return figures.image(run_figure(run, title), path)
+    return figures.image(run_figure(result.run, result.title or result.plot_title), path)
 
 
-def history_image(history: History, elements: Sequence[str], title: str, path: str | Path) -> bytes:
-    """Return the elements of an attitude history against time; parameters and errors are those of `run_image`."""
-    return figures.image(history_figure(history, elements, title), path)
+def history_image(result: HistoryResult, path: str | Path) -> bytes:
+    """Return the elements of an attitude history against time."""
+    return figures.image(history_figure(result.history, result.title or result.plot_title), path)
 
 
-def history_figure(history: History, elements: Sequence[str], title: str) -> Any:
+def history_figure(history: History, title: str) -> Any:
     """Return the figure of `history_image`."""
-    states = history.states.reshape(len(history.time), -1)
+    states, elements = history.states.reshape(len(history.time), -1), history_elements(history)
     columns = 3 if len(elements) == 9 else 1
     rows = -(-len(elements) // columns)
     figure, grid = figures.grid_of_axes(rows, columns, (10, 1.9 * rows + 0.6), sharey=True)

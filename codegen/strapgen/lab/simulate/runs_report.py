@@ -1,16 +1,18 @@
-"""Reports runs and recordings in every format."""
+"""Runs and recordings as results."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from strapgen.lab.recordings.recording import History
-from strapgen.lab.simulate.runs import Run
-from strapgen.results.report import Report
+from strapgen.lab.simulate.runs import Array, Run
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 if TYPE_CHECKING:
@@ -61,55 +63,125 @@ def step_facts(backend: Backend, choice: Choice) -> dict[str, Any]:
     return facts | {"backend": backend.name}
 
 
-def run_data(run: Run, settings: dict[str, Any]) -> dict[str, Any]:
-    """Return a run as plain JSON data after the settings that it was made with."""
-    return settings | {
-        "time_s": run.time.tolist(),
-        "scale": run.scale.tolist(),
-        "skew_deg": np.degrees(run.skew).tolist(),
-        "drift_deg": np.degrees(run.drift).tolist(),
-        "mean_drift_deg": float(np.degrees(run.mean_drift)),
-    }
+@dataclass(frozen=True)
+class RunSettings:
+    """What a run was made with, as far as it applies."""
+
+    algorithm: str | None = field(metadata=entry(optional=True))
+    method: str | None = field(metadata=entry(optional=True))
+    #: Nodes in a step, 0 to 1, at which the algorithm takes rates
+    rates_at: tuple[float, ...] | None = field(metadata=entry(optional=True))
+    #: Increments that a step takes
+    increments: int | None = field(metadata=entry(optional=True))
+    #: Increments from before a step that it takes too
+    previous: int | None = field(metadata=entry(optional=True))
+    #: Increments from after a step that it takes too
+    ahead: int | None = field(metadata=entry(optional=True))
+    #: Name or file of a described system
+    system: str | None = field(metadata=entry(optional=True))
+    backend: str | None = field(metadata=entry(optional=True))
+    #: Samples of a described system in a second
+    sample_hz: float | None = field(metadata=entry(optional=True))
+    motion: str | None = field(metadata=entry(optional=True))
+    #: File of the recording
+    source: str | None = field(metadata=entry(optional=True))
+    step_s: float | None = field(metadata=entry(optional=True))
+    duration_s: float | None = field(metadata=entry(optional=True))
+    #: Roll, pitch and heading at the start
+    initial_deg: str | None = field(metadata=entry(optional=True, unit="deg"))
+    specific_force_m_s2: tuple[float, ...] | None = field(metadata=entry(optional=True))
+    #: File of the sensor errors
+    errors: str | None = field(metadata=entry(optional=True))
 
 
 @dataclass(frozen=True)
-class RunLayout:
-    """How a run is reported."""
+class RunErrors:
+    """The errors of a run at its records."""
 
+    time_s: Array
+    #: On the axes x, y, z at each record
+    scale: Array
+    #: In the planes y-z, z-x, x-y at each record
+    skew_deg: Array
+    #: On the axes x, y, z at each record
+    drift_deg: Array
+    #: Root of the sum of the squares of the largest drifts on the axes
+    mean_drift_deg: float
+
+    @staticmethod
+    def of(run: Run) -> RunErrors:
+        """Return the errors of a run in degrees."""
+        mean = math.degrees(run.mean_drift)
+        return RunErrors(run.time, run.scale, np.degrees(run.skew), np.degrees(run.drift), mean)
+
+
+@dataclass(frozen=True)
+class RunMatrices:
+    """The direction cosine matrices of a run at its records."""
+
+    computed: Array
+    true: Array
+    #: Computed less true
+    difference: Array
+    #: Computed times transposed true, less the identity
+    error: Array
+
+    @staticmethod
+    def of(run: Run) -> RunMatrices:
+        """Return the matrices of a run."""
+        return RunMatrices(run.computed, run.true, run.computed - run.true, run.error)
+
+
+@dataclass(frozen=True)
+class RunResult(Result):
+    """The nine errors of a run on a motion at its records."""
+
+    drawn_by = "strapgen.lab.simulate.runs_plot:run_image"
+    indented = False
+
+    settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))
+    run: Run = field(metadata=entry(spread=True, write=RunErrors.of, kind=RunErrors))
+    title: str | None = field(default=None, metadata=entry(optional=True))
+    #: The run if its matrices are written too
+    matrices: Run | None = field(
+        default=None, metadata=entry(spread=True, optional=True, write=RunMatrices.of, kind=RunMatrices)
+    )
     #: The motion with its parameters in words, for the text
-    motion: str
-    title: str | None = None
-    #: Whether all matrices follow in JSON
-    matrices: bool = False
+    motion: str | None = field(default=None, metadata=INTERNAL)
     #: Records from one print of the matrices to the next in the text; by default those at the end are printed
-    every: int | None = None
+    every: int | None = field(default=None, metadata=INTERNAL)
+    #: Title of a plot where the user states none
+    plot_title: str = field(default="", metadata=INTERNAL)
 
+    def rows(self) -> Any:
+        """Return the records of the run, as their times."""
+        return self.run.time
 
-def run_report(run: Run, settings: dict[str, Any], layout: RunLayout) -> Report:
-    """Return a run as a report."""
+    def table(self) -> TextTable:
+        """Return the nine errors and all matrices at each record."""
+        return run_table(self.run)
 
-    def text() -> str:
-        lines = [] if layout.title is None else [layout.title, ""]
-        return "\n".join([*lines, run_text(run, settings | {"motion": layout.motion}, layout.every)])
+    def reader(self) -> TextTable:
+        """Return the nine errors at each record."""
+        return TextTable(_ERROR_COLUMNS, _error_rows(self.run, range(len(self.run.time))))
 
-    def data() -> dict[str, Any]:
-        title = {} if layout.title is None else {"title": layout.title}
-        return title | run_data(run, settings) | (matrices_data(run) if layout.matrices else {})
-
-    def markdown() -> TextTable:
-        return TextTable(_ERROR_COLUMNS, _error_rows(run, range(len(run.time))))
-
-    return Report(text, data, lambda: run_table(run), markdown, indented=False)
-
-
-def matrices_data(run: Run) -> dict[str, Any]:
-    """Return the matrices of a run as plain JSON data."""
-    return {
-        "computed": run.computed.tolist(),
-        "true": run.true.tolist(),
-        "difference": (run.computed - run.true).tolist(),
-        "error": run.error.tolist(),
-    }
+    def text(self) -> str:
+        """Return the nine errors in time, the matrices at the end or every so often, the mean drift."""
+        run, shown = self.run, thinned(len(self.run.time))
+        lines = [] if self.title is None else [self.title, ""]
+        stated = {} if self.motion is None else {"motion": self.motion}
+        lines += [settings_text({**self.settings, **stated}), ""]
+        lines += TextTable(_ERROR_COLUMNS, _error_rows(run, shown)).lines()
+        if len(shown) < len(run.time):
+            lines.append(
+                f"({len(shown)} of {len(run.time)} records; --format csv prints all, --record S thins them)"
+            )
+        largest = ", ".join(
+            f"{axis} {value:.6g}" for axis, value in zip(AXES, np.degrees(run.drift_by_axis), strict=True)
+        )
+        lines += ["", *(line for record in _printed(run, self.every) for line in _matrix_lines(run, record))]
+        lines += [f"largest drift, deg: {largest}", f"mean drift, deg: {np.degrees(run.mean_drift):.6g}"]
+        return "\n".join(lines)
 
 
 def run_table(run: Run) -> TextTable:
@@ -143,32 +215,6 @@ def history_elements(history: History) -> tuple[str, ...]:
     )
 
 
-def run_text(run: Run, settings: dict[str, Any], every: int | None = None) -> str:
-    """Return a run as a report: the nine errors in time, the matrices at the end or every so often, the mean drift."""
-    shown = thinned(len(run.time))
-    lines = [
-        settings_text(settings),
-        "",
-        *TextTable(_ERROR_COLUMNS, _error_rows(run, shown)).lines(),
-    ]
-    if len(shown) < len(run.time):
-        lines.append(
-            f"({len(shown)} of {len(run.time)} records; --format csv prints all, --record S thins them)"
-        )
-    largest = ", ".join(
-        f"{axis} {value:.6g}" for axis, value in zip(AXES, np.degrees(run.drift_by_axis), strict=True)
-    )
-    return "\n".join(
-        [
-            *lines,
-            "",
-            *(line for record in _printed(run, every) for line in _matrix_lines(run, record)),
-            f"largest drift, deg: {largest}",
-            f"mean drift, deg: {np.degrees(run.mean_drift):.6g}",
-        ]
-    )
-
-
 def _error_rows(run: Run, records: Iterable[int]) -> list[tuple[float, ...]]:
     """Return the time and the nine errors of some records."""
     parts = np.hstack([run.scale, np.degrees(run.skew), np.degrees(run.drift)])
@@ -189,51 +235,74 @@ def _matrix_lines(run: Run, record: int) -> list[str]:
     return [f"at {run.time[record]:g} s", *table, ""]
 
 
+def history_table(history: History) -> TextTable:
+    """Return an attitude history as a table."""
+    rows = np.column_stack([history.time, history.states.reshape(len(history.time), -1)]).tolist()
+    return table_of(["time_s", *history_elements(history)], rows)
+
+
 def settings_text(settings: dict[str, Any]) -> str:
     """Return settings that have values as text."""
     return ", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)
 
 
-def history_table(history: History, elements: Sequence[str]) -> TextTable:
-    """Return an attitude history as a table."""
-    rows = np.column_stack([history.time, history.states.reshape(len(history.time), -1)]).tolist()
-    return table_of(["time_s", *elements], rows)
+@dataclass(frozen=True)
+class AttitudeRecords:
+    """The attitude along a recording."""
+
+    step_s: float
+    duration_s: float
+    #: Increments at the end that make no whole step
+    unused_increments: int
+    #: Names of the elements of the attitude
+    elements: tuple[str, ...]
+    time_s: Array
+    #: The elements at each time
+    attitude: Array
+
+    @staticmethod
+    def of(history: History) -> AttitudeRecords:
+        """Return the records of a history."""
+        time, states = history.time, history.states.reshape(len(history.time), -1)
+        length = float(time[-1] - time[0])
+        return AttitudeRecords(history.step, length, history.unused, history_elements(history), time, states)
 
 
-def history_report(history: History, elements: Sequence[str], settings: dict[str, Any]) -> Report:
-    """Return an attitude history as a report."""
-    return Report(
-        lambda: history_text(history, elements, settings),
-        lambda: history_data(history, elements, settings),
-        lambda: history_table(history, elements),
-        indented=False,
-    )
+@dataclass(frozen=True)
+class HistoryResult(Result):
+    """The attitude along a recording."""
 
+    drawn_by = "strapgen.lab.simulate.runs_plot:history_image"
+    indented = False
 
-def history_data(history: History, elements: Sequence[str], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return an attitude history as plain JSON data after the settings that it was made with."""
-    return settings | {
-        "step_s": history.step,
-        "duration_s": float(history.time[-1] - history.time[0]),
-        "unused_increments": history.unused,
-        "elements": list(elements),
-        "time_s": history.time.tolist(),
-        "attitude": history.states.reshape(len(history.time), -1).tolist(),
-    }
+    settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))
+    history: History = field(metadata=entry(spread=True, write=AttitudeRecords.of, kind=AttitudeRecords))
+    title: str | None = field(default=None, metadata=entry(optional=True))
+    #: Title of a plot where the user states none
+    plot_title: str = field(default="", metadata=INTERNAL)
 
+    def rows(self) -> Any:
+        """Return the records of the history, as their times."""
+        return self.history.time
 
-def history_text(history: History, elements: Sequence[str], settings: dict[str, Any]) -> str:
-    """Return an attitude history as a report."""
-    shown = thinned(len(history.time))
-    states = history.states.reshape(len(history.time), -1)
-    columns = [TIME_COLUMN, *(Column(element, spec=".9f", least=12, gap=1) for element in elements)]
-    rows = [(history.time[k], *states[k]) for k in shown]
-    lines = [settings_text(settings), "", *TextTable(columns, rows).lines()]
-    if len(shown) < len(history.time):
-        lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
-    if history.unused:
-        lines.append(f"{history.unused} increments at the end make no whole step and were not used")
-    return "\n".join(lines)
+    def table(self) -> TextTable:
+        """Return the attitude at each time."""
+        return history_table(self.history)
+
+    def text(self) -> str:
+        """Return the attitude at most of the times that a reader looks at."""
+        history, shown = self.history, thinned(len(self.history.time))
+        states = history.states.reshape(len(history.time), -1)
+        names = history_elements(history)
+        columns = [TIME_COLUMN, *(Column(element, spec=".9f", least=12, gap=1) for element in names)]
+        rows = [(history.time[k], *states[k]) for k in shown]
+        title = {} if self.title is None else {"title": self.title}
+        lines = [settings_text(title | {**self.settings}), "", *TextTable(columns, rows).lines()]
+        if len(shown) < len(history.time):
+            lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
+        if history.unused:
+            lines.append(f"{history.unused} increments at the end make no whole step and were not used")
+        return "\n".join(lines)
 
 
 def places(signal: Signal) -> list[str]:

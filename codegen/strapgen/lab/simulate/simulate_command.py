@@ -108,8 +108,7 @@ def _on_motion(
     """Simulate, and deliver the run."""
     from strapgen.cli.progress import waiting
     from strapgen.lab.simulate import runs
-    from strapgen.lab.simulate.runs_plot import run_image
-    from strapgen.lab.simulate.runs_report import RunLayout, run_report, step_facts
+    from strapgen.lab.simulate.runs_report import RunResult, step_facts
 
     assert source.step and source.duration, "the source is checked"
     pulse, step, duration = source.pulse, source.step, source.duration
@@ -145,8 +144,8 @@ def _on_motion(
     facts |= {} if intervals.initial is None else {"initial_deg": written(intervals.initial)}
     facts |= source.facts
     title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
-    shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
-    output.report(run_report(run, facts, shown), lambda path: run_image(run, output.title or title, path))
+    matrices, words = run if output.matrices else None, source.described(profile.name)
+    output.show(RunResult(facts, run, output.title, matrices, words, every, title))
 
 
 def _on_recording(
@@ -155,8 +154,7 @@ def _on_recording(
     """Propagate recorded data, and deliver the attitude."""
     from strapgen.cli.progress import waiting
     from strapgen.lab.recordings import recording
-    from strapgen.lab.simulate.runs_plot import history_image
-    from strapgen.lab.simulate.runs_report import history_report, step_facts
+    from strapgen.lab.simulate.runs_report import HistoryResult, step_facts
 
     pulse = source.pulse
     data = source.recording()
@@ -176,11 +174,6 @@ def _on_recording(
     say_unused(source.file, history.unused, choice.increments_per_step)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = step_facts(backend, choice) | {"source": str(source.file)} | source.facts
-    replace(output, format=output.format or "csv").report(
-        history_report(
-            history,
-            backend.elements,
-            ({"title": output.title} if output.title else {}) | facts,
-        ),
-        lambda path: history_image(history, backend.elements, output.title or title, path),
+    replace(output, format=output.format or "csv").show(
+        HistoryResult(facts, replace(history, elements=backend.elements), output.title, title)
     )

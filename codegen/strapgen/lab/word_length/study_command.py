@@ -135,8 +135,6 @@ def word_length(
         outcomes = {
             done.case: done for done in track(run(planned, workers.jobs, cluster), "running", len(planned))
         }
-    from strapgen.lab.word_length.word_length_plot import word_length_image
-    from strapgen.lab.word_length.word_length_report import word_length_report
+    from strapgen.lab.word_length.word_length_report import WordLengthResult
 
-    rows = [outcomes[case] for case in planned]
-    output.report(word_length_report(rows), lambda path: word_length_image(rows, path))
+    output.show(WordLengthResult([outcomes[case] for case in planned]))

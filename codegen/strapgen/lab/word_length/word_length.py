@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
@@ -26,6 +26,7 @@ from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.simulate.runs import attitude, drift_between
 from strapgen.lab.study.clusters import Bundle, Cluster, moved
 from strapgen.lab.study.resumable import side_by_side
+from strapgen.results.records import Record, entry, properties
 from strapgen.run.backends import backend
 from strapgen.run.increments import pulses
 from strapgen.storage import cache
@@ -72,7 +73,7 @@ class Case:
     duration: str
     pulse_arcsec: str
     motion: str
-    settings: tuple[tuple[str, str], ...]
+    settings: tuple[tuple[str, str], ...] = field(metadata=entry(write=dict, kind=dict[str, str]))
 
     __repr__ = short_repr
 
@@ -87,7 +88,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Record):
     """The result of a case; an angle is the largest of the run, in degrees.
 
     Parameters
@@ -109,7 +110,9 @@ class Outcome:
         independent; None without pulses. See `quantization_noise`.
     """
 
-    case: Case
+    computed = properties(dominates=entry())
+
+    case: Case = field(metadata=entry(spread=True))
     drift_deg: float | None
     rounding_deg: float | None
     quantization_deg: float
@@ -130,12 +133,6 @@ class Outcome:
             "truncation": self.truncation_deg,
         }
         return max(parts, key=lambda name: parts[name])
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return case and outcome as one flat object of plain JSON data."""
-        data = asdict(self.case) | {"settings": dict(self.case.settings)}
-        rest = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "case"}
-        return data | rest | {"dominates": self.dominates}
 
 
 @dataclass(frozen=True)

@@ -5,22 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapgen.lab.word_length.word_length import Outcome
 from strapgen.lab.word_length.word_length_report import by_method_step_and_pulse, settings_text
 from strapgen.results import figures
 
+if TYPE_CHECKING:
+    from strapgen.lab.word_length.word_length_report import WordLengthResult
+
 #: Which rounding errors each carry feeds back, in the words of the legend.
 _FEEDBACK = {"none": "no error feedback", "state": "feedback of the state", "full": "full feedback"}
 
 
-def word_length_image(outcomes: Sequence[Outcome], path: str | Path) -> bytes:
+def word_length_image(result: WordLengthResult, path: str | Path) -> bytes:
     """Return drift against word length: a panel for each method, step and pulse, a line for each rounding and carry.
 
     Dotted, in the colour of its line, the certified bound of the rounding, on top of what else moves the drift; dashed
     the floor of the method, and where gyro pulses set a higher one, that.
     """
+    outcomes = result.outcomes
     panels = by_method_step_and_pulse(outcomes)
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)

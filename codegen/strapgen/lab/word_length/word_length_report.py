@@ -1,12 +1,13 @@
-"""Reports the word-length study."""
+"""The word-length study as a result."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from strapgen.lab.word_length.word_length import Outcome, noise_of
-from strapgen.results.report import Report, flat_table
+from strapgen.results.result import Result
 from strapgen.results.table import ANGLE, Column, TextTable
 
 _COLUMNS = (
@@ -39,14 +40,22 @@ def by_method_step_and_pulse(outcomes: Sequence[Outcome]) -> dict[tuple[str, str
     return groups
 
 
-def word_length_report(outcomes: Sequence[Outcome]) -> Report:
-    """Return outcomes as a report."""
-    rows = [outcome.as_dict() for outcome in outcomes]
-    return Report(lambda: word_length_text(outcomes), lambda: rows, lambda: flat_table(rows))
+@dataclass(frozen=True)
+class WordLengthResult(Result):
+    """Drift against word length, with its parts: a row for each run."""
+
+    rows_in = "outcomes"
+    row = Outcome
+    drawn_by = "strapgen.lab.word_length.word_length_plot:word_length_image"
+
+    outcomes: Sequence[Outcome]
+
+    def text(self) -> str:
+        """Return a table for each method, step and pulse, with a row for each word and carry."""
+        return _text(self.outcomes)
 
 
-def word_length_text(outcomes: Sequence[Outcome]) -> str:
-    """Return outcomes as tables for a reader: one for each method, step and pulse, a row for each word and carry."""
+def _text(outcomes: Sequence[Outcome]) -> str:
     lines: list[str] = []
     for (method, step, pulse), group in by_method_step_and_pulse(outcomes).items():
         first = group[0]

@@ -71,10 +71,7 @@ def study_attitude_form(
 
     from strapgen.lab.cost import cost
     from strapgen.navigation.attitude_form import attitude_form as forms
-    from strapgen.navigation.attitude_form.attitude_form_report import (
-        attitude_form_image,
-        attitude_form_report,
-    )
+    from strapgen.navigation.attitude_form.attitude_form_report import FormResult
 
     rates = forms.PartRates(float(update_hz), float(navigation_hz), float(orthonormalize_hz))
     which = forms.pairs(without or ())
@@ -84,4 +81,4 @@ def study_attitude_form(
     settings = fixed.settings(1) if cpu else None
     costs = forms.part_costs(which, rates, cpu or "", settings)
     study = forms.FormStudy(rates, tuple(track(costs, "counting", len(which))), loss, cpu or "")
-    output.report(attitude_form_report(study), lambda path: attitude_form_image(study, path))
+    output.show(FormResult.of(study))

@@ -1,16 +1,19 @@
-"""Reports what each form of the attitude costs, as text, data, table and picture."""
+"""What each form of the attitude costs, as a result and drawn."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from strapgen.navigation.attitude_form.attitude_form import FORMS, PARTS, FormStudy, PartCost, VelocityLoss
 from strapgen.navigation.two_speed import transformation_error
 from strapgen.results import figures
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, plain_record
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.targets.lines import fill
 
@@ -20,13 +23,110 @@ _CONCLUSION = (
 )
 
 
-def attitude_form_report(study: FormStudy) -> Report:
-    """Return the study as a report."""
-    return Report(lambda: "\n".join(_lines(study)) + "\n", lambda: _data(study), lambda: _flat(study))
+@dataclass(frozen=True)
+class PartRow:
+    """What a part of a form costs."""
+
+    form: str
+    part: str
+    #: None where the form does without the part
+    kernel: str | None
+    hz: float
+    #: Operations of a call in floating point
+    operations: int
+    operations_per_s: float
+    #: Instructions of a call in fixed point; None where none were counted
+    instructions: int | None
+    instructions_per_s: float | None
+    #: Operations of a call by kind
+    kinds: Mapping[str, int]
+
+    @staticmethod
+    def of(part: PartCost) -> PartRow:
+        """Return a part with what it costs in a second."""
+        executed = None if part.executed is None else part.executed * part.hz
+        counts = (part.count, part.count * part.hz, part.executed, executed)
+        return PartRow(part.form, part.part, part.kernel or None, part.hz, *counts, part.operations)
 
 
-def attitude_form_image(study: FormStudy, path: str | Path) -> bytes:
+@dataclass(frozen=True)
+class FormTotal:
+    """What a form costs in a second."""
+
+    form: str
+    title: str
+    operations_per_s: float
+    instructions_per_s: float | None
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """What the first-order attitude in a slow cycle costs in velocity."""
+
+    largest_rate_rad_s: float
+    #: Angle of a slow cycle at that rate
+    angle_rad: float
+    #: Error along the acceleration as a part of the velocity increment
+    along: float
+    #: Error across it
+    across: float
+    #: Coefficients of the errors by power of the angle
+    series_along: Mapping[int, Fraction]
+    series_across: Mapping[int, Fraction]
+    #: A stated error
+    error: float
+    #: The slow rate that it takes
+    slowest_hz: float
+
+    @staticmethod
+    def of(loss: VelocityLoss) -> Truncation:
+        """Return a loss with the first terms of its series."""
+        series = (transformation_error.along_series(4), transformation_error.across_series(4))
+        errors = (loss.along, loss.across, *series, loss.error, loss.slowest_hz)
+        return Truncation(loss.largest_rate, loss.angle, *errors)
+
+
+@dataclass(frozen=True)
+class FormResult(Result):
+    """What each form of the attitude costs in a navigator."""
+
+    drawn_by = f"{__name__}:attitude_form_image"
+
+    study: FormStudy = field(metadata=INTERNAL)
+    #: Processor on which instructions were counted
+    cpu: str | None
+    #: By what part of the smallest total the largest exceeds it
+    spread: float
+    totals: list[FormTotal]
+    parts: list[PartRow]
+    truncation: Truncation
+
+    @staticmethod
+    def of(study: FormStudy) -> FormResult:
+        """Return the costs of a study."""
+        totals = [
+            FormTotal(form, title, study.per_second(form), study.executed_per_second(form))
+            for form, (title, _) in FORMS.items()
+        ]
+        parts = list(map(PartRow.of, study.parts))
+        return FormResult(
+            study, study.cpu or None, study.spread, totals, parts, Truncation.of(study.truncation)
+        )
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the parts without the kinds of their operations."""
+        return [
+            {key: one for key, one in plain_record(part).items() if key != "kinds"} for part in self.parts
+        ]
+
+    def text(self) -> str:
+        """Return the operations of each part and form, and what the first-order attitude costs."""
+        return "\n".join(_lines(self.study))
+
+
+def attitude_form_image(result: FormResult, path: str | Path) -> bytes:
     """Return the operations of each form in a second, a bar whose pieces are the parts."""
+    study = result.study
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 3.6))
     axes = grid[0, 0]
     shown = list(dict.fromkeys(part.part for part in study.parts))
@@ -45,56 +145,6 @@ def attitude_form_image(study: FormStudy, path: str | Path) -> bytes:
     figures.common_legend(figure, [axes], loc="outside right center")
     figures.title(figure, f"Forms of the attitude at {study.rates.update:g} Hz")
     return figures.image(figure, path)
-
-
-def _row(part: PartCost) -> dict[str, Any]:
-    """Return a part as plain data."""
-    return {
-        "form": part.form,
-        "part": part.part,
-        "kernel": part.kernel or None,
-        "hz": part.hz,
-        "operations": part.count,
-        "operations_per_s": part.count * part.hz,
-        "instructions": part.executed,
-        "instructions_per_s": None if part.executed is None else part.executed * part.hz,
-    }
-
-
-def _data(study: FormStudy) -> dict[str, Any]:
-    loss = study.truncation
-    return {
-        "cpu": study.cpu or None,
-        "spread": study.spread,
-        "totals": [
-            {
-                "form": form,
-                "title": title,
-                "operations_per_s": study.per_second(form),
-                "instructions_per_s": study.executed_per_second(form),
-            }
-            for form, (title, _) in FORMS.items()
-        ],
-        "parts": [_row(part) | {"kinds": dict(part.operations)} for part in study.parts],
-        "truncation": {
-            "largest_rate_rad_s": loss.largest_rate,
-            "angle_rad": loss.angle,
-            "along": loss.along,
-            "across": loss.across,
-            "series_along": {str(power): str(c) for power, c in transformation_error.along_series(4).items()},
-            "series_across": {
-                str(power): str(c) for power, c in transformation_error.across_series(4).items()
-            },
-            "error": loss.error,
-            "slowest_hz": loss.slowest_hz,
-        },
-    }
-
-
-def _flat(study: FormStudy) -> TextTable:
-    rows = [_row(part) for part in study.parts]
-    columns = [Column(name, "<" if name in ("form", "part", "kernel") else ">") for name in rows[0]]
-    return TextTable(columns, [list(row.values()) for row in rows])
 
 
 def _table(study: FormStudy) -> TextTable:

@@ -50,7 +50,7 @@ def study_calibration(
     output.check(file)
     from strapgen.navigation.calibration.calibration import QUANTITIES, calibrated
     from strapgen.navigation.calibration.calibration_file import read
-    from strapgen.navigation.calibration.calibration_report import calibration_image, calibration_report
+    from strapgen.navigation.calibration.calibration_report import CalibrationResult
 
     content = read(file)
     steps = (calibrated(content.scheme, quantity) for quantity in QUANTITIES)
@@ -66,7 +66,4 @@ def study_calibration(
             turning = [math.radians(value) for value in rate_deg_s or (0, 0, 0)]
             covariance = one.error_covariance(turning, [*map(float, acceleration_g or (0, 0, 0))])
             remaining[one.quantity] = covariance * content.sigma[one.quantity] ** 2
-    output.report(
-        calibration_report(content, several, estimates, remaining),
-        lambda path: calibration_image(content, several, path),
-    )
+    output.show(CalibrationResult.of(content, several, estimates, remaining))

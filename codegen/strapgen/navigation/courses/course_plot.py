@@ -11,12 +11,13 @@ from strapgen.lab.simulate.runs_report import ANGLES, AXES
 from strapgen.results import figures
 
 if TYPE_CHECKING:
+    from strapgen.navigation.courses.course_report import CourseResult
     from strapgen.navigation.courses.courses import Course
 
 
-def course_image(course: Course, title: str, path: str | Path) -> bytes:
-    """Return attitude and velocity changes along a recording against time; otherwise as `run_image`."""
-    return figures.image(course_figure(course, title), path)
+def course_image(result: CourseResult, path: str | Path) -> bytes:
+    """Return attitude and velocity changes along a recording against time."""
+    return figures.image(course_figure(result.course, result.plot_title), path)
 
 
 def course_figure(course: Course, title: str) -> Any:

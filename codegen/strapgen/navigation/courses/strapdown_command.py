@@ -90,10 +90,7 @@ def _course(
 
 
 def _deliver(covered: Course, facts: dict[str, str], title: str, output: CourseOutput) -> None:
-    from strapgen.navigation.courses.course_plot import course_image
-    from strapgen.navigation.courses.course_report import course_report
+    from strapgen.navigation.courses.course_report import CourseResult
 
     format = output.format or ("text" if output.file is None else "csv")
-    replace(output, format=format).report(
-        course_report(covered, facts), lambda path: course_image(covered, title, path)
-    )
+    replace(output, format=format).show(CourseResult(facts, covered, title))

@@ -61,7 +61,7 @@ def study_loops(
     """
     output.check(file)
     from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
-    from strapgen.navigation.loops.loops_report import LoopStudy, loops_image, loops_report
+    from strapgen.navigation.loops.loops_report import LoopsResult
     from strapgen.navigation.loops.loops_study import LOOPS, LoopErrors, cycles_of_modes, designs, run_loops
 
     errors = filled(LoopErrors, settings)
@@ -70,5 +70,4 @@ def study_loops(
     cycles_of_modes(schedule, modes)
     gains = designs(schedule)
     courses = tuple(track(run_loops(schedule, modes, errors, backend), "running", len(LOOPS)))
-    study = LoopStudy(schedule, modes, errors, gains, courses)
-    output.report(loops_report(study), lambda path: loops_image(study, path))
+    output.show(LoopsResult(schedule, modes, errors, gains, courses))

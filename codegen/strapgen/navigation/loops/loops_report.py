@@ -1,55 +1,121 @@
-"""Reports and draws the loops of an attitude and heading reference through their schedule."""
+"""The loops of an attitude and heading reference through their schedule, as a result and drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from strapgen.navigation.loops.loop_schedule import LoopMode, LoopSchedule
 from strapgen.navigation.loops.loops_study import UNITS, LoopCourse, LoopDesign, LoopErrors, factors
 from strapgen.results import figures
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, entry, properties
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 _GAIN, _STATE = ".9g", ".7g"
-_KEYS = ("loop", "mode", "time_s", "case", "quantity", "unit", "run", "matrix_exponential", "difference")
 
 
 @dataclass(frozen=True)
-class LoopStudy:
-    """A schedule, the gains of its modes, and the courses of its loops."""
+class LoopState:
+    """A state of a case at the end of a mode."""
 
-    schedule: LoopSchedule
+    loop: str
+    mode: str
+    time_s: float
+    #: What disturbs the loop
+    case: str
+    quantity: str
+    unit: str
+    #: By the kernel
+    run: float
+    matrix_exponential: float
+    #: The former less the latter
+    difference: float
+
+
+@dataclass(frozen=True)
+class LoopGains:
+    """The gains of a loop in a mode."""
+
+    mode: str
+    loop: str
+    reference: str
+    #: Time constant
+    tau_s: float | None
+    slowest_pole_s: float | None
+    gains: list[float]
+    #: The same exactly
+    exact: tuple[Fraction, ...] = field(metadata=entry(kind=list[str]))
+
+    @staticmethod
+    def of(design: LoopDesign) -> LoopGains:
+        """Return the gains of a design."""
+        tau = design.setting.time_constant_s
+        return LoopGains(
+            mode=design.mode,
+            loop=design.loop,
+            reference=design.setting.reference,
+            tau_s=None if tau is None else float(tau),
+            slowest_pole_s=design.slowest_s,
+            gains=[float(value) for value in design.gains],
+            exact=tuple(design.gains),
+        )
+
+
+@dataclass(frozen=True)
+class LoopsResult(Result):
+    """The loops of an attitude and heading reference through their schedule."""
+
+    rows_in = "states"
+    computed = properties(title=entry(), cycle_s=entry(), gains=entry(), states=entry(key="rows"))
+    drawn_by = f"{__name__}:loops_image"
+
+    schedule: LoopSchedule = field(metadata=INTERNAL)
     #: Those that were run
-    modes: tuple[LoopMode, ...]
+    modes: tuple[LoopMode, ...] = field(metadata=INTERNAL)
+    #: What disturbs the loops
     errors: LoopErrors
-    designs: Sequence[LoopDesign]
-    courses: Sequence[LoopCourse]
+    designs: Sequence[LoopDesign] = field(metadata=INTERNAL)
+    courses: Sequence[LoopCourse] = field(metadata=INTERNAL)
 
-    def rows(self) -> Iterator[tuple[Any, ...]]:
-        """Yield every state of every case at the end of every mode, in the order of the columns."""
+    @property
+    def title(self) -> str:
+        """Title of the schedule."""
+        return self.schedule.title
+
+    @property
+    def cycle_s(self) -> float:
+        """Time of a cycle."""
+        return float(self.schedule.cycle_s)
+
+    @property
+    def gains(self) -> list[LoopGains]:
+        """The gains of all modes."""
+        return list(map(LoopGains.of, self.designs))
+
+    @property
+    def states(self) -> list[LoopState]:
+        """Every state of every case at the end of every mode."""
+        return list(self._states())
+
+    def _states(self) -> Iterator[LoopState]:
         for course in self.courses:
             run, exact = (array * factors(course.loop) for array in (course.run, course.exact))
             for mode, end in zip(self.modes, course.ends, strict=True):
                 for k, case in enumerate(course.cases):
                     for number, (quantity, (unit, _)) in enumerate(UNITS[course.loop].items()):
                         one, other = float(run[end, k, number]), float(exact[end, k, number])
-                        time = float(course.times[end])
-                        yield course.loop, mode.name, time, case, quantity, unit, one, other, one - other
+                        facts = (course.loop, mode.name, float(course.times[end]), case, quantity, unit)
+                        yield LoopState(*facts, one, other, one - other)
+
+    def text(self) -> str:
+        """Return the gains, and the states of each loop."""
+        return "\n".join(_lines(self))
 
 
-def loops_report(study: LoopStudy) -> Report:
-    """Return the study as a report."""
-    return Report(
-        lambda: "\n".join(_lines(study)) + "\n",
-        lambda: _data(study),
-        lambda: TextTable([Column(key, spec=".9g") for key in _KEYS], list(study.rows())),
-    )
-
-
-def _lines(study: LoopStudy) -> Iterator[str]:
+def _lines(study: LoopsResult) -> Iterator[str]:
     schedule = study.schedule
     yield f"{schedule.title or 'schedule'}: cycle {float(schedule.cycle_s):g} s"
     yield ""
@@ -61,7 +127,7 @@ def _lines(study: LoopStudy) -> Iterator[str]:
         yield from _states(study, course).lines()
 
 
-def _gains(study: LoopStudy) -> TextTable:
+def _gains(study: LoopsResult) -> TextTable:
     """Return the gains of all modes."""
     columns = [Column(name, "<") for name in ("mode", "loop", "reference")]
     columns += [Column("tau, s", spec="g"), Column("slowest pole, s", spec=".6g")]
@@ -76,7 +142,7 @@ def _gains(study: LoopStudy) -> TextTable:
     return TextTable(columns, rows)
 
 
-def _states(study: LoopStudy, course: LoopCourse) -> TextTable:
+def _states(study: LoopsResult, course: LoopCourse) -> TextTable:
     """Return the states of a loop, a line for each mode and case."""
     columns = [Column("mode", "<"), Column("time, s", spec="g"), Column("case", "<")]
     for quantity, (unit, _) in UNITS[course.loop].items():
@@ -92,36 +158,10 @@ def _states(study: LoopStudy, course: LoopCourse) -> TextTable:
     return TextTable(columns, rows)
 
 
-def _data(study: LoopStudy) -> dict[str, Any]:
-    return {
-        "title": study.schedule.title,
-        "cycle_s": float(study.schedule.cycle_s),
-        "errors": asdict(study.errors),
-        "gains": [
-            {
-                "mode": design.mode,
-                "loop": design.loop,
-                "reference": design.setting.reference,
-                "tau_s": _float(design.setting.time_constant_s),
-                "slowest_pole_s": design.slowest_s,
-                "gains": [float(value) for value in design.gains],
-                "exact": [str(value) for value in design.gains],
-            }
-            for design in study.designs
-        ],
-        "rows": [dict(zip(_KEYS, row, strict=True)) for row in study.rows()],
-    }
-
-
-def _float(value: Any) -> float | None:
-    """Return a number, or None for none."""
-    return None if value is None else float(value)
-
-
-def loops_image(study: LoopStudy, path: str | Path) -> bytes:
+def loops_image(result: LoopsResult, path: str | Path) -> bytes:
     """Return the courses of the loops over time: the kernel as a line, the matrix exponential dashed."""
-    figure, grid = figures.grid_of_axes(len(study.courses), 2, (11.0, 2.9 * len(study.courses)))
-    for row, course in zip(grid, study.courses, strict=True):
+    figure, grid = figures.grid_of_axes(len(result.courses), 2, (11.0, 2.9 * len(result.courses)))
+    for row, course in zip(grid, result.courses, strict=True):
         quantities = list(UNITS[course.loop].items())
         which = [number for number, (name, _) in enumerate(quantities) if name not in ("velocity", "climb")]
         for axes, number in zip(row, which, strict=True):
@@ -140,5 +180,5 @@ def loops_image(study: LoopStudy, path: str | Path) -> bytes:
         row[0].legend(fontsize=8, frameon=False)
     for axes in grid[-1]:
         axes.set_xlabel("time, s")
-    figures.title(figure, f"{study.schedule.title or 'schedule'}; dashed: matrix exponential")
+    figures.title(figure, f"{result.schedule.title or 'schedule'}; dashed: matrix exponential")
     return figures.image(figure, path)

@@ -54,11 +54,10 @@ def study_output_filter(
     output.check()
     from strapgen.navigation.outputs import output_filter_study as experiment
     from strapgen.navigation.outputs.output_filter import OutputFilter
-    from strapgen.navigation.outputs.output_filter_report import output_filter_image, output_filter_report
+    from strapgen.navigation.outputs.output_filter_report import FilterResult
 
     edge, size = OutputFilter(float(cutoff_hz), float(sample_hz)), float(largest)
     tones = experiment.check_frequencies(edge, [*map(float, frequencies)])
     which = experiment.runs([*backend])
     measured = track(experiment.measure(which, edge, size, tones), "measuring", len(which))
-    study = experiment.FilterStudy(edge, size, tones, tuple(measured))
-    output.report(output_filter_report(study), lambda path: output_filter_image(study, path))
+    output.show(FilterResult.of(experiment.FilterStudy(edge, size, tones, tuple(measured))))

@@ -1,32 +1,120 @@
-"""Reports the responses of an output's filter, as text, data, table and picture."""
+"""The responses of an output's filter, as a result and drawn."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from strapgen.navigation.outputs.output_filter import decibels
 from strapgen.navigation.outputs.output_filter_study import FilterStudy, Measured
 from strapgen.results import figures
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 _DB = ".5f"
 _CARRIES = {"": "", "none": ", no feedback", "all": ", feedback"}
 
 
-def output_filter_report(study: FilterStudy) -> Report:
-    """Return the study as a report."""
-    return Report(lambda: "\n".join(_lines(study)) + "\n", lambda: _data(study), lambda: _responses(study))
+def _finite(number: float) -> float | None:
+    """Return a number, or None for one that JSON does not have."""
+    return number if math.isfinite(number) else None
 
 
-def output_filter_image(study: FilterStudy, path: str | Path) -> bytes:
+@dataclass(frozen=True)
+class KnownResponse:
+    """The gains of the filter at a frequency; None for none."""
+
+    hz: float
+    analog_db: float | None
+    digital_db: float | None
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """What a back end makes of the filter."""
+
+    backend: str
+    #: Error feedback; None in floating point
+    carry: str | None
+    #: At each frequency; None for a gain of nothing
+    gains_db: list[float | None]
+    phases_rad: list[float]
+    #: Largest error of a constant input, once settled
+    constant: float
+    #: Largest output after the input has become zero, once settled
+    rest: float
+    #: Certified bound of the error in a run of any length; None in floating point
+    bound: float | None
+    #: What a bit of the output is worth; None in floating point
+    unit: float | None
+
+    @staticmethod
+    def of(one: Measured) -> MeasuredResponse:
+        """Return gains and phases."""
+        gains = [_finite(decibels(response)) for response in one.responses]
+        phases = [math.atan2(response.imag, response.real) for response in one.responses]
+        settled = (one.constant, one.rest, one.bound, one.unit)
+        return MeasuredResponse(one.backend, one.carry or None, gains, phases, *settled)
+
+
+@dataclass(frozen=True)
+class FilterResult(Result):
+    """The responses of an output's filter: analog, digital and measured."""
+
+    drawn_by = f"{__name__}:output_filter_image"
+
+    study: FilterStudy = field(metadata=INTERNAL)
+    cutoff_hz: float
+    sample_hz: float
+    #: Coefficients of the kernel by name
+    coefficients: Mapping[str, float]
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    #: Delay of slow changes
+    analog_delay_s: float
+    digital_delay_s: float
+    #: Largest magnitudes of the states
+    state_ranges: list[float]
+    responses: list[KnownResponse]
+    measured: list[MeasuredResponse]
+
+    @staticmethod
+    def of(study: FilterStudy) -> FilterResult:
+        """Return the responses of a study."""
+        edge = study.output_filter
+        same = ("cutoff_hz", "sample_hz", "coefficients", "numerator", "denominator", "analog_delay_s")
+        return FilterResult(
+            study=study,
+            **{name: getattr(edge, name) for name in (*same, "digital_delay_s")},
+            state_ranges=[study.largest * part for part in edge.state_ranges],
+            responses=[
+                KnownResponse(f, _finite(decibels(edge.analog(f))), _finite(decibels(edge.digital(f))))
+                for f in study.frequencies
+            ],
+            measured=list(map(MeasuredResponse.of, study.measured)),
+        )
+
+    def rows(self) -> Sequence[float]:
+        """Return the frequencies."""
+        return self.study.frequencies
+
+    def table(self) -> TextTable:
+        """Return the gain at each frequency in dB."""
+        return _responses(self.study)
+
+    def text(self) -> str:
+        """Return coefficients, responses, and what is left once settled."""
+        return "\n".join(_lines(self.study))
+
+
+def output_filter_image(result: FilterResult, path: str | Path) -> bytes:
     """Return the responses over frequency: analog and digital as lines, measured ones as points."""
-    edge = study.output_filter
+    study, edge = result.study, result.study.output_filter
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 4.4))
     axes = grid[0, 0]
     low = min(edge.cutoff_hz, *study.frequencies) / 3
@@ -95,43 +183,3 @@ def _lines(study: FilterStudy) -> Iterator[str]:
     yield from ["", *_responses(study).lines(), ""]
     yield "errors of a constant input and of none, once settled, and the bound of a run of any length"
     yield from ["", *_settled(study).lines()]
-
-
-def _data(study: FilterStudy) -> dict[str, Any]:
-    edge = study.output_filter
-    return {
-        "cutoff_hz": edge.cutoff_hz,
-        "sample_hz": edge.sample_hz,
-        "coefficients": edge.coefficients,
-        "numerator": list(edge.numerator),
-        "denominator": list(edge.denominator),
-        "analog_delay_s": edge.analog_delay_s,
-        "digital_delay_s": edge.digital_delay_s,
-        "state_ranges": [study.largest * part for part in edge.state_ranges],
-        "responses": [
-            {
-                "hz": f,
-                "analog_db": _finite(decibels(edge.analog(f))),
-                "digital_db": _finite(decibels(edge.digital(f))),
-            }
-            for f in study.frequencies
-        ],
-        "measured": [
-            {
-                "backend": m.backend,
-                "carry": m.carry or None,
-                "gains_db": [_finite(decibels(response)) for response in m.responses],
-                "phases_rad": [math.atan2(response.imag, response.real) for response in m.responses],
-                "constant": m.constant,
-                "rest": m.rest,
-                "bound": m.bound,
-                "unit": m.unit,
-            }
-            for m in study.measured
-        ],
-    }
-
-
-def _finite(number: float) -> float | None:
-    """Return a number, or None for one that JSON does not have."""
-    return number if math.isfinite(number) else None

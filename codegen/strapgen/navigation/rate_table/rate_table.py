@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +52,6 @@ class Row:
     drift_deg: float | None
     #: Largest pitch of the computed attitude, in degrees
     pitch_deg: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the row as plain JSON data."""
-        return asdict(self)
 
 
 def angles(motion: str, times: Array) -> Array:

@@ -52,11 +52,9 @@ def rate_table(
     """
     output.check()
     from strapgen.navigation.rate_table import rate_table as experiment
-    from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
-    from strapgen.navigation.rate_table.rate_table_report import rate_table_report
+    from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 
     names, places = algorithm or experiment.ALGORITHMS, backend or experiment.DEFAULT_BACKENDS
     count = len(list(experiment.cases(names, places, method)))
     runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1), method)
-    rows, times = list(track(runs, "running", count)), (str(duration), str(sample))
-    output.report(rate_table_report(rows, *times), lambda path: rate_table_image(rows, *times, path))
+    output.show(RateTableResult(list(track(runs, "running", count)), str(duration), str(sample)))

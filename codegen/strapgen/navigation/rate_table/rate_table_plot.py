@@ -5,21 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapgen.navigation.rate_table.rate_table import RATE_DEG_S, TWO_SPEED, Row
 from strapgen.results import figures
+
+if TYPE_CHECKING:
+    from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 
 _MARKERS = "osD^vP*X"
 #: An angle that is marked: one second of arc.
 _ARCSECOND_DEG = 1 / 3600
 
 
-def rate_table_image(rows: Sequence[Row], duration: str, sample: str, path: str | Path) -> bytes:
-    """Return the largest drift of every algorithm: a panel for each motion, a line an algorithm, a mark a back end.
-
-    `duration, sample`: duration of the test, and time between gyro samples, in s.
-    """
+def rate_table_image(result: RateTableResult, path: str | Path) -> bytes:
+    """Return the largest drift of every algorithm: a panel for each motion, a line an algorithm, a mark a back end."""
+    rows, duration, sample = result.drifts, result.duration, result.sample
     motions = list(dict.fromkeys(row.motion for row in rows))
     algorithms = list(dict.fromkeys(row.algorithm for row in rows))
     backends = list(dict.fromkeys(row.backend for row in rows))

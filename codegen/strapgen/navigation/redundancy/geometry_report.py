@@ -1,14 +1,17 @@
-"""Reports a geometry of redundant sensors: parity equations, triads with their noise, and failures that they tell."""
+"""A geometry of redundant sensors as a result: parity equations, triads with their noise, failures that they tell."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from strapgen.catalogue.coefficients import Number
 from strapgen.navigation.redundancy.failure_tables import FailureTable
 from strapgen.navigation.redundancy.parity_equations import SensorSet, equation_label, gain_text
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 _TRIADS = (
@@ -21,12 +24,116 @@ _TRIADS = (
 )
 
 
-def geometry_report(sensors: SensorSet, tables: Sequence[FailureTable], files: Sequence[str] = ()) -> Report:
-    """Return a geometry as a report."""
-    return Report(
-        lambda: "\n".join([*_lines(sensors, tables), *(f"  {name}" for name in files)]) + "\n",
-        lambda: {**_data(sensors, tables), "files": list(files)},
+def _texts(rows: Sequence[Sequence[Number]]) -> list[list[str]]:
+    return [list(map(str, row)) for row in rows]
+
+
+@dataclass(frozen=True)
+class TriadData:
+    """Three sensors as a triad; numbers of the field of the axes are text, exact."""
+
+    sensors: tuple[int, ...]
+    determinant: Number = field(metadata=entry(kind=str))
+    #: Condition of its axes
+    condition: float
+    inverse: Sequence[Sequence[Number]] = field(metadata=entry(kind=list[list[str]]))
+    #: Squared noise in x, y and z by that of a sensor
+    squared_noise: Sequence[Number] = field(metadata=entry(kind=list[str]))
+
+
+@dataclass(frozen=True)
+class StatusVerdict:
+    """What a status of the equations says."""
+
+    #: A 1 for each equation that fails, and a 0 for the others
+    status: str
+    #: The failed sensor
+    failed: int | None
+    #: The triad that is selected
+    triad: int | None
+    points: int
+
+
+@dataclass(frozen=True)
+class TableData:
+    """The verdicts with some sensors removed."""
+
+    removed: tuple[int, ...]
+    equations: tuple[int, ...]
+    verdicts: list[StatusVerdict]
+
+    @staticmethod
+    def of(table: FailureTable) -> TableData:
+        """Return a table."""
+        verdicts = [
+            StatusVerdict(status_text(status), one.failed, one.triad, one.points)
+            for status, one in table.verdicts.items()
+        ]
+        return TableData(tuple(table.removed), tuple(table.equations), verdicts)
+
+
+@dataclass(frozen=True)
+class GeometryResult(Result):
+    """What redundant sensors tell of their failures; numbers of the field of the axes are text, exact."""
+
+    sensor_set: SensorSet = field(metadata=INTERNAL)
+    failure_tables: Sequence[FailureTable] = field(metadata=INTERNAL)
+    name: str
+    sensor: str
+    range: str
+    axes: Sequence[Sequence[Number]] = field(metadata=entry(write=_texts, kind=list[list[str]]))
+    lengths: Sequence[Number] = field(
+        metadata=entry(write=lambda lengths: list(map(str, lengths)), kind=list[str])
     )
+    #: Parity equations
+    equations: Sequence[Sequence[Number]] = field(metadata=entry(kind=list[list[int | str]]))
+    triads: list[TriadData]
+    #: The solution of all sensors by least squares
+    least_squares: Sequence[Sequence[Number]] = field(metadata=entry(write=_texts, kind=list[list[str]]))
+    #: Number of failures that are isolated, whichever sensors fail
+    fail_operate: int
+    #: Whether one more is detected
+    next_is_detected: bool
+    tables: list[TableData]
+    #: Files that were written
+    files: Sequence[Path]
+
+    @staticmethod
+    def of(sensors: SensorSet, tables: Sequence[FailureTable], files: Sequence[Path] = ()) -> GeometryResult:
+        """Return the geometry of a set of sensors, and what its tables say."""
+        geometry = sensors.geometry
+        triads = [
+            TriadData(
+                tuple(triad.sensors),
+                triad.determinant,
+                condition,
+                [list(map(str, row)) for row in triad.inverse],
+                list(map(str, triad.squared_gains)),
+            )
+            for triad, condition in zip(geometry.triads, conditions(sensors), strict=True)
+        ]
+        return GeometryResult(
+            sensor_set=sensors,
+            failure_tables=tables,
+            name=sensors.name,
+            sensor=sensors.sensor,
+            range=str(sensors.range),
+            axes=geometry.axes,
+            lengths=geometry.lengths,
+            equations=geometry.equations,
+            triads=triads,
+            least_squares=geometry.least_squares,
+            fail_operate=geometry.fail_operate,
+            next_is_detected=geometry.fail_safe,
+            tables=list(map(TableData.of, tables)),
+            files=files,
+        )
+
+    def text(self) -> str:
+        """Return equations, triads and failures for a reader."""
+        return "\n".join(
+            [*_lines(self.sensor_set, self.failure_tables), *(f"  {path}" for path in self.files)]
+        )
 
 
 def conditions(sensors: SensorSet) -> list[float]:
@@ -90,48 +197,6 @@ def _failures(sensors: SensorSet) -> str:
     )
     more = "is detected" if geometry.fail_safe else "may go undetected"
     return f"{operate} isolated, whichever sensors fail; one more {more}"
-
-
-def _data(sensors: SensorSet, tables: Sequence[FailureTable]) -> dict[str, Any]:
-    geometry = sensors.geometry
-    return {
-        "name": sensors.name,
-        "sensor": sensors.sensor,
-        "range": str(sensors.range),
-        "axes": [list(map(str, axis)) for axis in geometry.axes],
-        "lengths": list(map(str, geometry.lengths)),
-        "equations": [[x if isinstance(x, int) else str(x) for x in row] for row in geometry.equations],
-        "triads": [
-            {
-                "sensors": list(triad.sensors),
-                "determinant": str(triad.determinant),
-                "condition": condition,
-                "inverse": [list(map(str, row)) for row in triad.inverse],
-                "squared_noise": list(map(str, triad.squared_gains)),
-            }
-            for triad, condition in zip(geometry.triads, conditions(sensors), strict=True)
-        ],
-        "least_squares": [list(map(str, row)) for row in geometry.least_squares],
-        "fail_operate": geometry.fail_operate,
-        "next_is_detected": geometry.fail_safe,
-        "tables": [_table_data(table) for table in tables],
-    }
-
-
-def _table_data(table: FailureTable) -> dict[str, Any]:
-    return {
-        "removed": list(table.removed),
-        "equations": list(table.equations),
-        "verdicts": [
-            {
-                "status": status_text(status),
-                "failed": verdict.failed,
-                "triad": verdict.triad,
-                "points": verdict.points,
-            }
-            for status, verdict in table.verdicts.items()
-        ],
-    }
 
 
 def status_text(status: Sequence[bool]) -> str:

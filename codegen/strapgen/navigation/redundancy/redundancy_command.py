@@ -10,7 +10,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
-from strapgen.cli.output import Format, NewFolder, check_format
+from strapgen.cli.output import Format, NewFolder, check_format, show
 from strapgen.cli.progress import track, waiting
 from strapgen.cli.rules import Needs, rules
 from strapgen.cli.source_options import SourceOptions
@@ -57,7 +57,7 @@ def redundancy(
     check_format(format)
     from strapgen.navigation.redundancy.failure_tables import failure_tables
     from strapgen.navigation.redundancy.geometry_file import read
-    from strapgen.navigation.redundancy.geometry_report import geometry_report, tables_csv
+    from strapgen.navigation.redundancy.geometry_report import GeometryResult, tables_csv
 
     settings = fixed.settings(1)
     sensors = read(file)
@@ -68,7 +68,7 @@ def redundancy(
         files = _sources(sensors, target, settings)
         files[f"{sensors.name}_tables.csv"] = tables_csv(sensors, tables)
         written = SourceOptions(out=out, force=output.force).write(files)
-    typer.echo(geometry_report(sensors, tables, list(map(str, written))).written(format).rstrip("\n"))
+    show(GeometryResult.of(sensors, tables, written), format)
 
 
 def _sources(sensors: SensorSet, target: str, settings: Settings | None) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from itertools import product
 from typing import Any
 
@@ -16,6 +16,7 @@ from strapgen.navigation.redundancy import failure_selection, parity_equations
 from strapgen.navigation.redundancy.failure_tables import FailureTable, failure_table
 from strapgen.navigation.redundancy.geometry import SensorGeometry
 from strapgen.navigation.redundancy.parity_equations import SensorSet
+from strapgen.results.records import entry, properties
 from strapgen.run.backends import of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.kernel_sources import sources_of_program
@@ -50,10 +51,10 @@ class SensorErrors:
     trip_rate: float = 3.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not np.isfinite(value) or value < 0 or (field.name == "cycle_s" and value == 0):
-                raise InputError(f"{field.name} is {value}; a finite number above 0 is needed")
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if not np.isfinite(value) or value < 0 or (one.name == "cycle_s" and value == 0):
+                raise InputError(f"{one.name} is {value}; a finite number above 0 is needed")
 
     @property
     def steady(self) -> float:
@@ -75,21 +76,30 @@ class SensorErrors:
 class Outcomes:
     """Counts of trials with sensors removed before, and one that fails by a size."""
 
+    computed = properties(
+        undetected=entry("undetected", group="equations"),
+        false_alarms=entry("false_alarms", group="equations"),
+    )
+
     #: Sensors that failed before and are excluded
-    removed: int
+    removed: int = field(metadata=entry("removed"))
     #: Size of the failure in trip levels; 0 for none
-    size: float
-    #: All; those in which an equation fails; the failing sensor isolated; another one isolated; a triad
-    #: selected without the failing sensor, if one fails
+    size: float = field(metadata=entry("size", ".3g"))
     trials: int
-    detected: int
-    isolated: int
-    wrong: int
-    selected: int
+    #: Trials in which an equation fails
+    detected: int = field(metadata=entry("detected", group="equations"))
+    #: The failing sensor is isolated, by the rule of the kernel
+    isolated: int = field(metadata=entry("isolated", group="rule"))
+    #: Another one is isolated
+    wrong: int = field(metadata=entry("wrong", group="rule"))
+    #: A triad is selected without the failing sensor, if one fails
+    selected: int = field(metadata=entry("selected", group="rule"))
     #: The same by the tables
-    table_isolated: int
-    table_wrong: int
-    table_selected: int
+    table_isolated: int = field(metadata=entry("isolated", group="tables"))
+    #: The same by the tables
+    table_wrong: int = field(metadata=entry("wrong", group="tables"))
+    #: The same by the tables
+    table_selected: int = field(metadata=entry("selected", group="tables"))
 
     @property
     def undetected(self) -> int:

@@ -71,12 +71,10 @@ def study_redundancy(
     from strapgen.navigation.redundancy.geometry_file import read
     from strapgen.navigation.redundancy.parity_equations import HEXAD_SET
     from strapgen.navigation.redundancy.redundancy_study import SensorErrors, redundancy_study, study_steps
-    from strapgen.navigation.redundancy.redundancy_study_report import redundancy_image, redundancy_report
+    from strapgen.navigation.redundancy.redundancy_study_report import RedundancyResult
 
     errors = filled(SensorErrors, settings)
     sensors = HEXAD_SET if file is None else read(file)
     steps = redundancy_study(sensors, errors, trials, seed, backend)
     rows = list(track(steps, "running", len(study_steps(sensors.geometry))))
-    output.report(
-        redundancy_report(sensors, errors, rows), lambda path: redundancy_image(sensors, rows, path)
-    )
+    output.show(RedundancyResult(sensors, errors, rows))

@@ -42,7 +42,7 @@ def compared_system(
     from strapgen.cli.progress import waiting
     from strapgen.lab.compare.file_counts import counted
     from strapgen.navigation.systems.system_comparison import compare_system
-    from strapgen.navigation.systems.system_comparison_report import system_comparison_report
+    from strapgen.navigation.systems.system_comparison_report import SystemComparisonResult
 
     names, reference = backends
     description, inputs, title = _inputs(name, source)
@@ -54,7 +54,7 @@ def compared_system(
         settings = counted(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
         of_files = {str(path): runner for path, (runner, _) in runners.items()}
         rows = compare_system(description, names, reference, inputs, settings, of_files)
-    output.report(system_comparison_report(rows, f"{name}: {title}", reference))
+    output.show(SystemComparisonResult(rows, f"{name}: {title}", reference))
     broken = [f"{row.output} on {row.backend}" for row in rows if row.share is not None and row.share > 1]
     if broken:
         typer.echo(f"strapgen: outside the certified bound: {', '.join(broken)}", err=True)

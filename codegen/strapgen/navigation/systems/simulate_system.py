@@ -42,8 +42,7 @@ def simulated_system(
     if output.print_every is not None:
         raise InputError("--print does not go with a described system; --record and --format csv do")
     from strapgen.cli.progress import waiting
-    from strapgen.lab.simulate.runs_plot import run_image
-    from strapgen.lab.simulate.runs_report import RunLayout, run_report
+    from strapgen.lab.simulate.runs_report import RunResult
     from strapgen.navigation.systems.system_runs import simulate_system
 
     description = described_at(name, source)
@@ -59,16 +58,15 @@ def simulated_system(
     }
     facts |= source.facts
     title = f"{name}, {backend}: {source.described(profile.name, ' motion')}"
-    shown = RunLayout(source.described(profile.name), output.title, output.matrices, None)
-    output.report(run_report(run, facts, shown), lambda path: run_image(run, output.title or title, path))
+    matrices, words = run if output.matrices else None, source.described(profile.name)
+    output.show(RunResult(facts, run, output.title, matrices, words, plot_title=title))
 
 
 def _on_recording(
     name: str, backend: str, source: SampleSource, fixed: FixedOptions, output: RunOutput
 ) -> None:
     """Run along recorded gyro data, and deliver the attitude."""
-    from strapgen.lab.simulate.runs_plot import history_image
-    from strapgen.lab.simulate.runs_report import history_report
+    from strapgen.lab.simulate.runs_report import HistoryResult
     from strapgen.navigation.systems.system_runs import attitude_output, system_history
 
     data = recorded(source)
@@ -77,9 +75,8 @@ def _on_recording(
     history = system_history(runner, data)
     facts = facts_of(runner, name) | {"source": str(source.file)} | source.facts
     title = f"{name}, {backend}: attitude along {source.file.name}"
-    replace(output, format=output.format or "csv").report(
-        history_report(history, elements, facts),
-        lambda path: history_image(history, elements, title, path),
+    replace(output, format=output.format or "csv").show(
+        HistoryResult(facts, replace(history, elements=elements), plot_title=title)
     )
 
 

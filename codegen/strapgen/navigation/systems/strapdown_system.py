@@ -36,7 +36,7 @@ def system_along(
     output.check(name, increments)
     from strapgen.cli.progress import waiting
     from strapgen.lab.recordings import recording
-    from strapgen.navigation.systems.system_course_report import system_course_report
+    from strapgen.navigation.systems.system_course_report import SystemCourseResult
     from strapgen.navigation.systems.system_runs import begun, system_course
 
     data = with_errors(recording.read_inertial(increments), read_errors(errors))
@@ -49,4 +49,4 @@ def system_along(
     facts = facts_of(runner, name) | {"source": str(increments)}
     facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
-    replace(output, format=format).report(system_course_report(course, facts))
+    replace(output, format=format).show(SystemCourseResult(facts, course))

@@ -72,11 +72,11 @@ def study_system(
 
     from strapgen.analysis.vibration.spectrum import read_spectrum
     from strapgen.navigation.systems.system_study import study
-    from strapgen.navigation.systems.system_study_report import system_study_report
+    from strapgen.navigation.systems.system_study_report import SystemStudyResult
     from strapgen.navigation.systems.turning_vehicle import TurningVehicle
     from strapgen.navigation.systems.wiring import described
 
     turning, latitude = math.radians(turn_rate_deg_s), math.radians(latitude_deg)
     vehicle = TurningVehicle(latitude, turning, None if spectrum is None else read_spectrum(spectrum))
     result = study(described(file, sample_hz), vehicle, duration, backend, fixed.settings(1), cpu or "")
-    output.report(system_study_report(result))
+    output.show(SystemStudyResult.of(result))

@@ -13,7 +13,7 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
-from strapgen.cli.output import Format, NewFolder, WithRuns, check_format, print_json
+from strapgen.cli.output import Format, NewFolder, WithRuns, check_format, show
 from strapgen.cli.rules import Excludes, Needs, rules
 from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.values import Positive
@@ -126,7 +126,7 @@ def system(
         )
     from strapgen.navigation.systems.drawing.drawing import drawing
     from strapgen.navigation.systems.system_bounds import bounds
-    from strapgen.navigation.systems.system_report import system_data, system_report
+    from strapgen.navigation.systems.system_report import SystemResult
     from strapgen.storage.files import write_files
 
     errors = bounds(fit)
@@ -139,12 +139,7 @@ def system(
     picture = {} if draw is None else {draw.name: drawing(fit)}
     written = place.write(files) if out is not None else []
     written += [] if draw is None else write_files(draw.parent, picture)
-    if format == "json":
-        print_json({**system_data(fit, needs, errors), "files": [str(path) for path in written]})
-        return
-    if written:
-        typer.echo("\n".join([f"{sources.kernel} for {target}", *(f"  {path}" for path in written), ""]))
-    typer.echo(system_report(fit, needs, errors).text())
+    show(SystemResult.of(fit, needs, errors, written), format)
 
 
 def _compiled(target: str) -> bool:

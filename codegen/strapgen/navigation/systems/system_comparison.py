@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from strapgen.navigation.systems.system_agreement import PassAgreement, agreemen
 from strapgen.navigation.systems.system_backends import SystemRun, system_runner
 from strapgen.navigation.systems.system_runner import carried
 from strapgen.navigation.systems.wiring import Description
+from strapgen.results.records import entry
 from strapgen.run.backends import BACKENDS
 
 
@@ -22,23 +23,19 @@ from strapgen.run.backends import BACKENDS
 class OutputComparison:
     """An output of a system on a back end beside a reference."""
 
-    backend: str
-    output: str
-    unit: str
+    backend: str = field(metadata=entry("", align="<"))
+    output: str = field(metadata=entry("output", align="<"))
+    unit: str = field(metadata=entry("unit", align="<"))
     #: Largest difference of an element over the run, in the unit
-    run: float
+    run: float = field(metadata=entry("run", ".3g"))
     #: Largest difference of an element after one pass from equal memories; None for a back end that runs no C
-    one_pass: float | None
+    one_pass: float | None = field(metadata=entry("one pass", ".3g"))
     #: Certified bound of that difference; None where there is none
-    bound: float | None
+    bound: float | None = field(metadata=entry("certified", ".3g"))
     #: Largest difference of one pass as a part of its bound
     share: float | None
     #: Why there is no bound
     reason: str
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain JSON data."""
-        return asdict(self)
 
 
 class RunsSamples(Protocol):

@@ -1,55 +1,44 @@
-"""Reports a comparison of back ends that run a described system."""
+"""The comparison of back ends that run a described system, as a result."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import dataclass
 
 from strapgen.navigation.systems.system_comparison import OutputComparison
-from strapgen.results.report import Report
-from strapgen.results.table import Column, TextTable
-
-_SYSTEM_COLUMNS = (
-    Column("", "<"),
-    Column("output", "<"),
-    Column("unit", "<"),
-    Column("run", spec=".3g"),
-    Column("one pass", spec=".3g"),
-    Column("certified", spec=".3g"),
-)
+from strapgen.results.records import reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import TextTable
 
 
-def system_comparison_report(rows: Sequence[OutputComparison], title: str, reference: str) -> Report:
-    """Return the outputs of a described system on several back ends as a report.
+@dataclass(frozen=True)
+class SystemComparisonResult(Result):
+    """The outputs of a described system on several back ends: a row for each output and back end."""
 
-    `title`: the system and its run in words.
-    """
+    rows_in = "outputs"
+    row = OutputComparison
 
-    def table() -> TextTable:
-        names = [field.name for field in fields(OutputComparison)]
-        return TextTable(
-            [Column(name) for name in names], [[getattr(row, name) for name in names] for row in rows]
-        )
+    outputs: Sequence[OutputComparison]
+    #: The system and its run in words
+    title: str
+    reference: str
 
-    def shown() -> TextTable:
-        return TextTable(
-            _SYSTEM_COLUMNS,
-            [[row.backend, row.output, row.unit, row.run, row.one_pass, row.bound] for row in rows],
-        )
+    def reader(self) -> TextTable:
+        """Return the outputs for a reader."""
+        return reader_table(self.outputs, OutputComparison)
 
-    def text() -> str:
+    def text(self) -> str:
+        """Return the table, and why bounds are missing."""
         lines = [
-            title,
-            f"largest difference of an element from {reference}: over the run, where differences add up, and after",
-            "one pass from equal memories, beside the certified bound of a pass",
+            self.title,
+            f"largest difference of an element from {self.reference}: over the run, where differences add up, and",
+            "after one pass from equal memories, beside the certified bound of a pass",
             "",
-            *shown().lines(),
+            *self.reader().lines(),
         ]
         reasons = dict.fromkeys(
             f"no bound of {row.output}: {row.reason}"
-            for row in rows
+            for row in self.outputs
             if row.one_pass is not None and row.reason
         )
         return "\n".join([*lines, *reasons])
-
-    return Report(text, lambda: [row.as_dict() for row in rows], table, shown)

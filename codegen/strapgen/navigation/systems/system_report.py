@@ -1,10 +1,11 @@
-"""Reports a described system: its stages, its values with units, frames, formats and bounds, and its budget."""
+"""A described system as a result: stages, values with units, frames, formats and bounds, and the budget."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 from strapgen.ir.decimals import above, float_above
@@ -13,49 +14,184 @@ from strapgen.ir.signals import Signal
 from strapgen.navigation.systems.budget import Budget, lines
 from strapgen.navigation.systems.fitting import Fitted
 from strapgen.navigation.systems.system_bounds import SystemBounds
-from strapgen.results.report import Report
-from strapgen.results.table import ERROR, Column, TextTable
-
-_STAGES = (
-    Column("stage", "<"),
-    Column("every"),
-    Column("Hz", spec=".6g"),
-    Column("kernel", "<"),
-    Column("word", missing=""),
-    Column("operations"),
-    Column("instructions", missing=""),
-)
-_VALUES = (
-    Column("value", "<"),
-    Column("every"),
-    Column("unit", "<"),
-    Column("frame", "<"),
-    Column("shape", "<"),
-    Column("format", "<", missing=""),
-    Column("range", "<", spec=".6g", missing=""),
-    Column("error of a pass", spec=ERROR, missing=""),
-)
+from strapgen.results.records import INTERNAL, entry, reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import ERROR, TextTable
 
 
-def system_report(fit: Fitted, needs: Budget, errors: SystemBounds) -> Report:
-    """Return a described system as a report."""
-    return Report(lambda: _text(fit, needs, errors), lambda: system_data(fit, needs, errors))
+@dataclass(frozen=True)
+class StageRow:
+    """A stage of a system."""
+
+    name: str = field(metadata=entry("stage", align="<"))
+    #: Cycles of the fastest rate from one call to the next
+    every: int = field(metadata=entry("every"))
+    hz: float = field(metadata=entry("Hz", ".6g"))
+    kernel: str = field(metadata=entry("kernel", align="<"))
+    #: Bits of a word in fixed point
+    word: int | None = field(metadata=entry("word"))
+    #: Error feedback in fixed point
+    carry: str | None
+    #: What each input is wired to
+    wires: dict[str, str]
+    #: Operations of a call by kind
+    operations: dict[str, int] = field(metadata=entry("operations", cell=lambda counts: sum(counts.values())))
+    #: Number of constants
+    constants: Any
+    #: Instructions of a call
+    executed: int | None = field(metadata=entry("instructions"))
+    code_bytes: int | None
+    stack_bytes: int | None
 
 
-def system_data(fit: Fitted, needs: Budget, errors: SystemBounds) -> dict[str, Any]:
-    """Return a described system as plain JSON data."""
-    system = fit.description.system
-    return {
-        "name": system.name,
-        "title": system.title,
-        "target": fit.target,
-        "sample_hz": float(system.sample_hz),
-        "stages": list(_stages(fit, needs)),
-        "inputs": [_input(fit, signal) for signal in system.inputs],
-        "values": list(_cells(fit, errors)),
-        "outputs": list(system.outputs),
-        "budget": _budget(needs),
-    }
+@dataclass(frozen=True)
+class InputRow:
+    """An input of a system."""
+
+    name: str = field(metadata=entry("value", align="<"))
+    every: int = field(metadata=entry("every"))
+    unit: str = field(metadata=entry("unit", align="<"))
+    frame: str = field(metadata=entry("frame", align="<"))
+    shape: tuple[int, ...] = field(
+        metadata=entry("shape", align="<", cell=lambda shape: " x ".join(map(str, shape)))
+    )
+    #: In fixed point, or the bits of the counts
+    format: str | None = field(metadata=entry("format", align="<"))
+    #: Largest magnitude of an element
+    range: float | None = field(metadata=entry("range", ".6g", align="<"))
+
+
+@dataclass(frozen=True)
+class ValueRow(InputRow):
+    """A value that is stored between calls."""
+
+    #: Number of samples that are kept
+    samples: int
+    initial: list[float]
+    #: Certified error of a pass
+    error: float | None = field(metadata=entry("error of a pass", ERROR))
+    #: Why there is no bound
+    no_bound: str | None
+
+
+@dataclass(frozen=True)
+class RateRow:
+    """What a rate needs."""
+
+    every: int
+    hz: float
+    #: Of a call of all stages by kind
+    operations: dict[str, int]
+    operations_per_second: float
+    instructions_per_second: float | None
+
+
+@dataclass(frozen=True)
+class BudgetData:
+    """What a system needs."""
+
+    rates: list[RateRow]
+    operations_per_second: float
+    cpu: str | None
+    instructions_per_second: float | None
+    #: Memory between calls, which is the sum of values, error feedback, counters and padding
+    memory_bytes: int
+    cell_bytes: int
+    feedback_bytes: int
+    counter_bytes: int
+    padding_bytes: int
+    constant_bytes: int
+
+    @staticmethod
+    def of(needs: Budget) -> BudgetData:
+        """Return a budget."""
+        rates = [
+            RateRow(
+                rate.every,
+                float(rate.hz),
+                rate.operations,
+                float(rate.per_second),
+                _float(rate.executed_per_second),
+            )
+            for rate in needs.rates
+            if rate.stages
+        ]
+        sizes = ("memory", "cell", "feedback", "counter", "padding", "constant")
+        return BudgetData(
+            rates=rates,
+            operations_per_second=float(needs.per_second),
+            cpu=needs.cpu or None,
+            instructions_per_second=_float(needs.executed_per_second),
+            **{f"{size}_bytes": getattr(needs, f"{size}_bytes") for size in sizes},
+        )
+
+
+@dataclass(frozen=True)
+class SystemResult(Result):
+    """A described system: its stages, its values with units, frames, formats and bounds, and its budget."""
+
+    needs: Budget = field(metadata=INTERNAL)
+    bounds: SystemBounds = field(metadata=INTERNAL)
+    name: str
+    title: str
+    target: str
+    sample_hz: float
+    #: From the fastest
+    stages: list[StageRow]
+    inputs: list[InputRow]
+    values: list[ValueRow]
+    outputs: tuple[str, ...]
+    budget: BudgetData
+    files: Sequence[Path]
+
+    @staticmethod
+    def of(fit: Fitted, needs: Budget, bounds: SystemBounds, files: Sequence[Path] = ()) -> SystemResult:
+        """Return a system with what it needs, and the files that were written."""
+        system = fit.description.system
+        return SystemResult(
+            needs=needs,
+            bounds=bounds,
+            name=system.name,
+            title=system.title,
+            target=fit.target,
+            sample_hz=float(system.sample_hz),
+            stages=list(_stages(fit, needs)),
+            inputs=[InputRow(signal.name, 1, *_about(fit, signal.name, signal)) for signal in system.inputs],
+            values=list(_values(fit, bounds)),
+            outputs=tuple(system.outputs),
+            budget=BudgetData.of(needs),
+            files=files,
+        )
+
+    def text(self) -> str:
+        """Return the files, stages, values and the budget."""
+        written = [f"{self.name} for {self.target}", *(f"  {path}" for path in self.files), ""]
+        values = [*reader_table(self.inputs, InputRow).rows, *reader_table(self.values, InputRow).rows]
+        errors = [None] * len(self.inputs) + [value.error for value in self.values]
+        shown = [[*row, error] for row, error in zip(values, errors, strict=True)]
+        columns = reader_table((), ValueRow).columns
+        return "\n".join(
+            [
+                *(written if self.files else []),
+                f"{self.title} ({self.name}, {self.target}, {self.sample_hz:.6g} Hz)",
+                "",
+                *_used(reader_table(self.stages, StageRow)).lines(),
+                "",
+                *_used(TextTable(columns, shown)).lines(),
+                "",
+                f"outputs: {', '.join(self.outputs)}",
+                *(f"no bound for {name}: {reason}" for name, reason in self.bounds.reasons.items()),
+                "",
+                *lines(self.needs),
+            ]
+        )
+
+
+def _used(table: TextTable) -> TextTable:
+    """Return a table without the columns in which no row has a value; what is missing in the others is left empty."""
+    used = [k for k in range(len(table.columns)) if any(row[k] is not None for row in table.rows)]
+    columns = [replace(table.columns[k], missing="") for k in used]
+    return TextTable(columns, [[row[k] for k in used] for row in table.rows])
 
 
 def bound_lines(fit: Fitted, errors: SystemBounds) -> list[str]:
@@ -82,59 +218,57 @@ def _unit(fit: Fitted, name: str) -> str:
     return "" if unit == "1" else unit
 
 
-def _stages(fit: Fitted, needs: Budget) -> Iterator[dict[str, Any]]:
+def _stages(fit: Fitted, needs: Budget) -> Iterator[StageRow]:
     """Return the stages, from the fastest."""
     words = {stage.name: stage for stage in fit.description.system.stages}
     for rate in needs.rates:
         for stage in rate.stages:
             interface = fit.sources[stage.name].fixed
-            yield {
-                "name": stage.name,
-                "kernel": stage.kernel,
-                "every": rate.every,
-                "hz": float(rate.hz),
-                "word": None if interface is None else interface.settings.word,
-                "carry": None if interface is None else interface.settings.carry,
-                "wires": {wire.input: wire.source for wire in words[stage.name].wires},
-                "operations": dict(stage.operations),
-                "constants": stage.constants,
-                "executed": stage.executed,
-                "code_bytes": stage.code_bytes,
-                "stack_bytes": stage.stack_bytes,
-            }
+            yield StageRow(
+                name=stage.name,
+                kernel=stage.kernel,
+                every=rate.every,
+                hz=float(rate.hz),
+                word=None if interface is None else interface.settings.word,
+                carry=None if interface is None else interface.settings.carry,
+                wires={wire.input: wire.source for wire in words[stage.name].wires},
+                operations=dict(stage.operations),
+                constants=stage.constants,
+                executed=stage.executed,
+                code_bytes=stage.code_bytes,
+                stack_bytes=stage.stack_bytes,
+            )
 
 
-def _input(fit: Fitted, signal: Signal) -> dict[str, Any]:
-    """Return an input of the system."""
-    return {"name": signal.name, "every": 1, **_about(fit, signal.name, signal)}
-
-
-def _cells(fit: Fitted, errors: SystemBounds) -> Iterator[dict[str, Any]]:
+def _values(fit: Fitted, errors: SystemBounds) -> Iterator[ValueRow]:
     """Return what is stored between calls."""
     system = fit.description.system
     for cell in system.cells:
         bounds = errors.errors.get(cell.name)
-        yield {
-            "name": cell.name,
-            "every": system.every(cell.name),
-            **_about(fit, cell.name, cell.signal),
-            "samples": cell.samples,
-            "initial": [float(value) for value in cell.initial],
-            "error": None if bounds is None else float_above(max(bounds, default=Fraction(0))),
-            "no_bound": errors.reasons.get(cell.name),
-        }
+        yield ValueRow(
+            cell.name,
+            system.every(cell.name),
+            *_about(fit, cell.name, cell.signal),
+            samples=cell.samples,
+            initial=[float(value) for value in cell.initial],
+            error=None if bounds is None else float_above(max(bounds, default=Fraction(0))),
+            no_bound=errors.reasons.get(cell.name),
+        )
 
 
-def _about(fit: Fitted, name: str, signal: Signal) -> dict[str, Any]:
+def _about(
+    fit: Fitted, name: str, signal: Signal
+) -> tuple[str, str, tuple[int, ...], str | None, float | None]:
+    """Return unit, frame, shape, format and range of a value."""
     argument = fit.arguments.get(name)
     largest = signal.bound if argument is None else argument.unit * max(argument.high, -argument.low)
-    return {
-        "unit": signal.unit,
-        "frame": signal.frame,
-        "shape": list(signal.shape),
-        "format": None if argument is None else _format(argument),
-        "range": None if largest is None else float_above(Fraction(largest)),
-    }
+    return (
+        signal.unit,
+        signal.frame,
+        tuple(signal.shape),
+        None if argument is None else _format(argument),
+        None if largest is None else float_above(Fraction(largest)),
+    )
 
 
 def _format(argument: Argument) -> str:
@@ -142,75 +276,5 @@ def _format(argument: Argument) -> str:
     return str(argument.format) if argument.sensor is None else f"{argument.format.word}-bit counts"
 
 
-def _budget(needs: Budget) -> dict[str, Any]:
-    """Return a budget as plain JSON data."""
-    rates = [
-        {
-            "every": rate.every,
-            "hz": float(rate.hz),
-            "operations": rate.operations,
-            "operations_per_second": float(rate.per_second),
-            "instructions_per_second": _float(rate.executed_per_second),
-        }
-        for rate in needs.rates
-        if rate.stages
-    ]
-    sizes = {name: value for name, value in asdict(needs).items() if name.endswith("_bytes")}
-    return {
-        "rates": rates,
-        "operations_per_second": float(needs.per_second),
-        "cpu": needs.cpu or None,
-        "instructions_per_second": _float(needs.executed_per_second),
-        "memory_bytes": needs.memory_bytes,
-        **sizes,
-    }
-
-
 def _float(number: Any) -> float | None:
     return None if number is None else float(number)
-
-
-def _text(fit: Fitted, needs: Budget, errors: SystemBounds) -> str:
-    """Return the system for a reader."""
-    data = system_data(fit, needs, errors)
-    stages = [
-        [
-            *(stage[key] for key in ("name", "every", "hz", "kernel", "word")),
-            sum(stage["operations"].values()),
-            stage["executed"],
-        ]
-        for stage in data["stages"]
-    ]
-    values = [
-        [
-            *(value[key] for key in ("name", "every", "unit", "frame")),
-            " x ".join(map(str, value["shape"])),
-            *(value.get(key) for key in ("format", "range", "error")),
-        ]
-        for value in [*data["inputs"], *data["values"]]
-    ]
-    return "\n".join(
-        [
-            f"{data['title']} ({data['name']}, {data['target']}, {data['sample_hz']:.6g} Hz)",
-            "",
-            *TextTable(_used(_STAGES, stages), _trimmed(_STAGES, stages)).lines(),
-            "",
-            *TextTable(_used(_VALUES, values), _trimmed(_VALUES, values)).lines(),
-            "",
-            f"outputs: {', '.join(data['outputs'])}",
-            *(f"no bound for {name}: {reason}" for name, reason in errors.reasons.items()),
-            "",
-            *lines(needs),
-        ]
-    )
-
-
-def _used(columns: tuple[Column, ...], rows: list[list[Any]]) -> list[Column]:
-    """Return the columns in which some row has a value."""
-    return [column for k, column in enumerate(columns) if any(row[k] is not None for row in rows)]
-
-
-def _trimmed(columns: tuple[Column, ...], rows: list[list[Any]]) -> list[list[Any]]:
-    """Return rows without the values of columns that are empty."""
-    used = {id(column) for column in _used(columns, rows)}
-    return [[value for column, value in zip(columns, row, strict=True) if id(column) in used] for row in rows]

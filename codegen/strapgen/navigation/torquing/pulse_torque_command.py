@@ -36,10 +36,10 @@ def study_pulse_torque(
     """
     output.check()
     from strapgen.navigation.torquing.torquing import TorqueLoop
-    from strapgen.navigation.torquing.torquing_report import torquing_image, torquing_report
+    from strapgen.navigation.torquing.torquing_report import TorquingResult
     from strapgen.navigation.torquing.torquing_study import PRINTED, torquing_rows
 
     loop = filled(TorqueLoop, settings)
     loop.require_stable()
     rows = list(track(torquing_rows(loop), "running", len(PRINTED)))
-    output.report(torquing_report(loop, rows), lambda path: torquing_image(loop, path))
+    output.show(TorquingResult(loop, rows))

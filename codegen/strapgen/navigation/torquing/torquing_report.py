@@ -1,9 +1,9 @@
-"""Reports and draws the responses of a pulse torquing loop."""
+"""The responses of a pulse torquing loop, as a result and drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,8 @@ import numpy as np
 from strapgen.navigation.torquing.torquing import TorqueLoop
 from strapgen.navigation.torquing.torquing_study import MEANINGS, STEP, TorquingRow
 from strapgen.results import figures
-from strapgen.results.report import Report
+from strapgen.results.records import entry, properties
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
 _FIGURES = ("printed", "linear", "quantised")
@@ -19,46 +20,51 @@ _FIGURES = ("printed", "linear", "quantised")
 HERTZ = (10, 40, 80, 120)
 
 
-def torquing_report(loop: TorqueLoop, rows: Sequence[TorquingRow]) -> Report:
-    """Return the study as a report."""
-    poles = loop.poles
-    gains = dict(zip(HERTZ, map(float, loop.response(HERTZ)), strict=True))
+@dataclass(frozen=True)
+class TorquingResult(Result):
+    """The responses of a pulse torquing loop."""
 
-    def text() -> str:
+    rows_in = "figures"
+    computed = properties(largest_pole=entry(), gains=entry())
+    drawn_by = f"{__name__}:torquing_image"
+
+    loop: TorqueLoop
+    figures: Sequence[TorquingRow] = field(metadata=entry(key="rows"))
+
+    @property
+    def largest_pole(self) -> float:
+        """Magnitude of the largest pole of the linear loop."""
+        return float(abs(self.loop.poles[0]))
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """Gain from rate to commanded rate by frequency, linear."""
+        gains = zip(HERTZ, self.loop.response(HERTZ), strict=True)
+        return {f"{hertz} Hz": float(gain) for hertz, gain in gains}
+
+    def text(self) -> str:
+        """Return the figures beside the printed ones, and the gains."""
         table = TextTable(
             [Column("", "<"), *(Column(name, spec=".5g") for name in _FIGURES)],
-            [[MEANINGS[row.quantity], *(getattr(row, name) for name in _FIGURES)] for row in rows],
+            [[MEANINGS[row.quantity], *(getattr(row, name) for name in _FIGURES)] for row in self.figures],
         )
-        shown = ", ".join(f"{gain:.4f} at {hertz} Hz" for hertz, gain in gains.items())
+        shown = ", ".join(f"{gain:.4f} at {hertz}" for hertz, gain in self.gains.items())
         return "\n".join(
             [
                 *table.lines(),
                 "",
                 f"gain from rate to commanded rate, linear: {shown}",
-                f"largest pole of the linear loop: {abs(poles[0]):.7f}; pulse {loop.pulse_arcsec:g} arcsec, "
-                f"{loop.steady_gain:.6g} pulses a cycle for a quantum",
+                f"largest pole of the linear loop: {self.largest_pole:.7f}; pulse {self.loop.pulse_arcsec:g} arcsec, "
+                f"{self.loop.steady_gain:.6g} pulses a cycle for a quantum",
                 "quantised: angle in whole quanta, command in whole pulses up to the largest; its offset is that at "
                 "99 % of the largest rate",
             ]
         )
 
-    return Report(
-        text,
-        lambda: {
-            "loop": asdict(loop),
-            "largest_pole": float(abs(poles[0])),
-            "gains": {f"{hertz} Hz": gain for hertz, gain in gains.items()},
-            "rows": [asdict(row) for row in rows],
-        },
-        lambda: TextTable(
-            [Column("quantity", "<"), *(Column(name, spec=".9g", missing="") for name in _FIGURES)],
-            [[row.quantity, *(getattr(row, name) for name in _FIGURES)] for row in rows],
-        ),
-    )
 
-
-def torquing_image(loop: TorqueLoop, path: str | Path) -> bytes:
+def torquing_image(result: TorquingResult, path: str | Path) -> bytes:
     """Return the step of the float angle and the gain over frequency."""
+    loop = result.loop
     figure, (step, response) = figures.pyplot().subplots(1, 2, figsize=(10.4, 4.2), layout="constrained")
     cycles = round(0.05 * loop.cycle_hz)
     time = np.arange(cycles) * loop.cycle * 1e3

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
-
-import typer
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import CTarget, Sculling, TwoSpeedAlgorithm
-from strapgen.cli.output import Format, check_format, print_json
+from strapgen.cli.output import Format, check_format, show
 from strapgen.cli.source_options import SourceOptions
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
+    from strapgen.navigation.two_speed.two_speed_result import TwoSpeedResult
 
 
 @grouped
@@ -65,9 +64,6 @@ def two_speed(
         return
     written = output.write(files)
     loops = two_speed_sources.loops(*task)
-    if format == "json":
-        print_json(_data(sources, loops, written))
-        return
     from strapgen.cli import generated_text
 
     lines = generated_text.head(sources, target, written)
@@ -76,28 +72,24 @@ def two_speed(
             *generated_text.head(loop, target),
             *(f"  {line}" for line in generated_text.contract(loop)),
         ]
-    typer.echo("\n".join(lines))
+    show(_result(sources, loops, written, "\n".join(lines)), format)
 
 
-def _data(sources: Sources, loops: Sequence[Sources], written: Sequence[Path]) -> dict[str, Any]:
-    """Return what was generated as plain JSON data, with what `generate` says of each loop."""
+def _result(sources: Sources, loops: Sequence[Sources], written: Sequence[Path], said: str) -> TwoSpeedResult:
+    """Return what was generated, with what `generate` says of each loop."""
     from strapgen.catalogue import Choice
-    from strapgen.run.generation import generated_data
+    from strapgen.cli.generated_result import GeneratedSources
+    from strapgen.navigation.two_speed.two_speed_result import TwoSpeedResult
 
     places = {path.name: str(path) for path in written}
-    return {
-        "kernel": sources.kernel,
-        "target": sources.target,
-        "loops": [loop.kernel for loop in loops],
-        "files": [*places.values()],
-        "operations": sources.operations,
-        "functions": [
-            generated_data(
-                Choice(loop.kernel), loop, sources.target, [places[name] for name in loop.step_files]
-            )
-            for loop in loops
-        ],
-    }
+    functions = [
+        GeneratedSources.of(
+            Choice(loop.kernel), loop, sources.target, [places[name] for name in loop.step_files]
+        )
+        for loop in loops
+    ]
+    names, files = [loop.kernel for loop in loops], [*places.values()]
+    return TwoSpeedResult(sources.kernel, sources.target, names, files, sources.operations, functions, said)
 
 
 class TwoSpeedRequest(NamedTuple):

@@ -114,10 +114,7 @@ def study_velocity_position(
     from strapgen.lab.motions.specific_forces import force
     from strapgen.lab.motions.users_motions import any_motion
     from strapgen.navigation.velocity_position import velocity_position_study as experiment
-    from strapgen.navigation.velocity_position.velocity_position_report import (
-        translation_image,
-        translation_report,
-    )
+    from strapgen.navigation.velocity_position.velocity_position_report import TranslationResult
     from strapgen.run.backends import BACKENDS
 
     if carry != "none" and not BACKENDS[backend].fixed:
@@ -133,7 +130,4 @@ def study_velocity_position(
         carry,
     )
     standings = list(track(experiment.study(several, course), "running", len(several)))
-    output.report(
-        translation_report(standings, course, flight.described()),
-        lambda path: translation_image(standings, flight.described(), path),
-    )
+    output.show(TranslationResult(standings, course, flight.described()))

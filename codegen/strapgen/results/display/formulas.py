@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import sympy as sp
 
 from strapgen.ir.program import Program
+from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, Stage
 from strapgen.lowering.canonical.vector_form import vector_form
 from strapgen.results.display.expressions import named_equations
 from strapgen.results.display.stages import stages_latex
 from strapgen.results.display.vectors import vectors_latex
-from strapgen.results.report import Report
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.targets.contract import operations_text
 from strapgen.targets.printer import ExactPrinter
@@ -73,40 +75,91 @@ def _counts(program: Program) -> list[tuple[str, int]]:
     return list({**program.operations, "temporaries": program.temporaries}.items())
 
 
-def formulas_report(kernel: Kernel, program: Program, show: str) -> Report:
-    """Return as a report the formulas, "text" or "latex", or a table of the "program" or its "operations"."""
-    texts: dict[str, Callable[[], str]] = {
-        "text": lambda: as_text(kernel, program.notes),
-        "latex": lambda: as_latex(kernel),
-        "program": lambda: program_as_text(program),
-        "operations": lambda: operations_as_text(kernel, program),
-    }
+@dataclass(frozen=True)
+class StageData:
+    """A stage of a kernel: expressions by element are text that SymPy can read."""
 
-    def data() -> dict[str, Any]:
-        shown: dict[str, Any] = {}
-        if show in ("latex", "program"):
-            shown[show] = as_latex(kernel) if show == "latex" else program_as_data(program)
-        return as_data(kernel, program) | shown
+    signal: Signal = field(metadata=entry(spread=True))
+    expressions: dict[str, str]
 
-    def table() -> TextTable:
-        if show == "program":
-            return TextTable(_PROGRAM_COLUMNS, list(program_as_data(program).items()))
-        return TextTable(_OPERATION_COLUMNS, _counts(program))
-
-    if show in ("program", "operations"):
-        return Report(texts[show], data, table)
-    return Report(texts[show], data, latex=texts["latex"])
+    @staticmethod
+    def of(stage: Stage) -> StageData:
+        """Return a stage as text."""
+        texts = map(sp.sstr, stage.expressions)
+        return StageData(stage.signal, dict(zip(stage.signal.elements, texts, strict=True)))
 
 
-def unknown_formulas_report(kernel: Kernel, show: str) -> Report:
-    """Return the formulas of a kernel with unknowns, which has no program, as text or LaTeX."""
-    texts = {"text": lambda: as_text(kernel), "latex": lambda: as_latex(kernel)}
+@dataclass(frozen=True)
+class KernelResult(Result):
+    """The formulas, the program and the operations of a kernel; expressions are text that SymPy can read."""
 
-    def data() -> dict[str, Any]:
-        shown = {"latex": as_latex(kernel)} if show == "latex" else {}
-        return kernel_as_data(kernel) | {"unknowns": list(kernel.unknowns)} | shown
+    of_kernel: Kernel = field(metadata=INTERNAL)
+    of_program: Program | None = field(metadata=INTERNAL)
+    #: "text", "latex", "program" or "operations"
+    shown: str = field(metadata=INTERNAL)
+    kernel: str
+    title: str
+    source: str
+    notes: tuple[str, ...]
+    inputs: tuple[Signal, ...]
+    stages: list[StageData]
+    outputs: list[StageData]
+    #: Operations of the program by kind
+    operations: Mapping[str, int] | None = field(metadata=entry(optional=True))
+    #: Number of values on the way
+    temporaries: int | None = field(metadata=entry(optional=True))
+    #: Coefficients that are not known
+    unknowns: tuple[str, ...] | None = field(metadata=entry(optional=True))
+    #: The formulas as an align environment
+    latex_text: str | None = field(metadata=entry(key="latex", optional=True))
+    #: Straight-line code by the names that it assigns, with exact constants
+    program: dict[str, str] | None = field(metadata=entry(optional=True))
 
-    return Report(texts[show], data, latex=texts["latex"])
+    @staticmethod
+    def of(kernel: Kernel, program: Program | None, shown: str = "text") -> KernelResult:
+        """Return a kernel; one with unknowns has no program."""
+        return KernelResult(
+            of_kernel=kernel,
+            of_program=program,
+            shown=shown,
+            kernel=kernel.name,
+            title=kernel.title,
+            source=kernel.source,
+            notes=tuple(kernel.notes),
+            inputs=tuple(kernel.inputs),
+            stages=list(map(StageData.of, kernel.stages)),
+            outputs=list(map(StageData.of, kernel.outputs)),
+            operations=None if program is None else program.operations,
+            temporaries=None if program is None else program.temporaries,
+            unknowns=tuple(kernel.unknowns) if program is None else None,
+            latex_text=as_latex(kernel) if shown == "latex" else None,
+            program=program_as_data(program) if program is not None and shown == "program" else None,
+        )
+
+    def text(self) -> str:
+        """Return what is shown: the formulas, their LaTeX, the program or its operations."""
+        if self.shown == "latex":
+            return as_latex(self.of_kernel)
+        if self.of_program is None or self.shown == "text":
+            return as_text(self.of_kernel, None if self.of_program is None else self.of_program.notes)
+        if self.shown == "program":
+            return program_as_text(self.of_program)
+        return operations_as_text(self.of_kernel, self.of_program)
+
+    def rows(self) -> Sequence[tuple[str, str | int]] | None:
+        """Return the program or its operations."""
+        if self.program is not None:
+            return list(self.program.items())
+        return None if self.of_program is None or self.shown != "operations" else _counts(self.of_program)
+
+    def table(self) -> TextTable:
+        """Return the program or its operations as a table."""
+        columns = _OPERATION_COLUMNS if self.program is None else _PROGRAM_COLUMNS
+        return TextTable(columns, self.rows() or [])
+
+    def latex(self) -> str | None:
+        """Return the formulas, or the table."""
+        return as_latex(self.of_kernel) if self.rows() is None else self.table().as_latex()
 
 
 def program_as_data(program: Program) -> dict[str, str]:
@@ -172,28 +225,3 @@ def _latex_name(element: str) -> str:
         return f"{numbered[1]}_{{{numbered[2]}{label}}}"
     words = head.replace("_", "\\_")
     return f"{words}_{{{label}}}" if len(head) == 1 else f"\\mathit{{{words}}}_{{{label}}}"
-
-
-def as_data(kernel: Kernel, program: Program) -> dict[str, Any]:
-    """Return a kernel as plain JSON data with the operations of its program."""
-    return kernel_as_data(kernel) | {"operations": program.operations, "temporaries": program.temporaries}
-
-
-def kernel_as_data(kernel: Kernel) -> dict[str, Any]:
-    """Return a kernel as plain JSON data; expressions are strings that SymPy parses."""
-
-    def stage_data(stage: Stage) -> dict[str, Any]:
-        expressions = map(sp.sstr, stage.expressions)
-        return stage.signal.as_dict() | {
-            "expressions": dict(zip(stage.signal.elements, expressions, strict=True))
-        }
-
-    return {
-        "kernel": kernel.name,
-        "title": kernel.title,
-        "source": kernel.source,
-        "notes": list(kernel.notes),
-        "inputs": [signal.as_dict() for signal in kernel.inputs],
-        "stages": [stage_data(stage) for stage in kernel.stages],
-        "outputs": [stage_data(stage) for stage in kernel.outputs],
-    }

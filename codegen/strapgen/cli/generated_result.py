@@ -1,0 +1,132 @@
+"""Generated sources as results: what `generate` writes, and whether files are in step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
+
+if TYPE_CHECKING:
+    from strapgen.catalogue import Choice
+    from strapgen.ir.sources import Sources
+
+
+@dataclass(frozen=True)
+class FloatBounds:
+    """Bounds of the code in floating point, rounded to the safe side."""
+
+    #: Largest magnitude of each input for which they hold
+    inputs: dict[str, float]
+    #: Ranges of values on the way for which they hold
+    conditions: dict[str, list[float]]
+    #: Functions of the library that are trusted
+    functions: list[str]
+    #: Error of each element of each output; None where none is known
+    errors: dict[str, list[float]] | None
+    #: What a step adds to the error of a run, and by what part the error grows
+    run: dict[str, float] | None
+    #: Why there is no bound
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class FixedBounds:
+    """Formats, ranges and bounds of the code in fixed point, rounded to the safe side."""
+
+    #: The settings as `strapgen.Settings` reads them
+    settings: dict[str, Any]
+    formats: dict[str, str]
+    #: Lower and upper end of each value
+    ranges: dict[str, list[float]]
+    #: Largest error of each output
+    error_bound: dict[str, float]
+    error_bound_by_element: dict[str, float]
+    #: Operations of the integer code by kind
+    integer_operations: dict[str, int]
+    #: How errors add up in a run; None where no bound is known
+    accumulation: dict[str, float] | None
+    #: How the angle of the error adds up in a run; None where no bound is known
+    angle_accumulation: dict[str, Any] | None
+
+
+@dataclass(frozen=True)
+class GeneratedSources:
+    """What was generated of a kernel for a target."""
+
+    kernel: str
+    target: str
+    #: Where they were written
+    files: Sequence[str]
+    #: Operations of a call by kind
+    operations: Mapping[str, int]
+    #: Number of values on the way
+    temporaries: int
+    #: In floating point
+    error_bounds: Mapping[str, Any] | None = field(metadata=entry(optional=True, kind=FloatBounds))
+    #: In fixed point
+    fixed: Mapping[str, Any] | None = field(metadata=entry(spread=True, optional=True, kind=FixedBounds))
+
+    @staticmethod
+    def of(choice: Choice, sources: Sources, target: str, files: Sequence[str]) -> GeneratedSources:
+        """Return what was generated for a target, by the name that was asked for."""
+        from strapgen import pipeline
+
+        kinds = ("add", "multiply", "divide", "sqrt")
+        fixed, rounding = sources.fixed, sources.rounding
+        return GeneratedSources(
+            kernel=sources.kernel,
+            target=target,
+            files=files,
+            operations={kind: sources.operations[kind] for kind in kinds},
+            temporaries=sources.temporaries,
+            error_bounds=None if rounding is None else rounding.as_data(),
+            fixed=None if fixed is None else pipeline.fixed_program(choice, fixed.settings).as_data(),
+        )
+
+
+@dataclass(frozen=True)
+class GenerateResult(Result):
+    """What was generated of a kernel, for one target or several."""
+
+    each = GeneratedSources
+
+    generated: Sequence[GeneratedSources]
+    said: str = ""
+
+    def results(self) -> Sequence[GeneratedSources]:
+        """Return what was generated for each target."""
+        return self.generated
+
+    def text(self) -> str:
+        """Return operations, files and contracts."""
+        return self.said
+
+
+@dataclass(frozen=True)
+class StepCheck(Result):
+    """Whether files are what their command generates."""
+
+    #: True if nothing differs
+    in_step: bool
+    #: What differs
+    difference: str
+
+    def text(self) -> str:
+        """Return what differs."""
+        return self.difference
+
+
+@dataclass(frozen=True)
+class CatalogueResult(Result):
+    """The files of the standard catalogue that were written."""
+
+    files: Sequence[Path]
+    said: str = field(metadata=INTERNAL)
+
+    def text(self) -> str:
+        """Return the number of files."""
+        return self.said
