@@ -227,7 +227,7 @@ BAD = {
     "tableau ./file": "./file is not TOML (",
     "tableau .toml": ".toml cannot be read (No such file or directory)",
     "tableau heun.toml": "heun.toml: order 3: sum b_i c_i^2 = 1/2, 1/3 is needed (off by 1/6)",
-    "tableau implicit.toml": "implicit.toml: matrix row 1 has 1 entry: not explicit, 0 are needed",
+    "tableau implicit.toml": "implicit.toml: matrix[1] has 1 entry: not explicit, 0 are needed",
     # coning, and vectors of a step
     "coning": "Missing option '--samples'",
     "coning --samples 0": "samples is 0; a whole number from 1 to 8 is needed",
@@ -316,7 +316,7 @@ BAD = {
     "derive euler --tableau .": ". cannot be read (Is a directory)",
     "derive euler --tableau file": "file is not TOML (",
     "derive euler --tableau heun.toml": "heun.toml: order 3: sum b_i c_i^2 = 1/2, 1/3 is needed (off by 1/6)",
-    "derive euler --tableau implicit.toml": "implicit.toml: matrix row 1 has 1 entry: not explicit, 0 are needed",
+    "derive euler --tableau implicit.toml": "implicit.toml: matrix[1] has 1 entry: not explicit, 0 are needed",
     "derive euler --tableau row.toml": "row.toml: matrix row 2 sums to 1/2; its node is 1",
     "generate dcm --tableau heun.toml --increments 4 --target c --out out": "heun.toml: order 3: sum b_i c_i^2 = 1/2",
     "generate dcm --tableau comment.toml --target c": "comment.toml: source holds */, which has a meaning in generated",
@@ -485,7 +485,7 @@ BAD = {
     f"simulate euler {CONSTANT} --scheme dcm-orthonormalize": "'dcm-orthonormalize' is not known; allowed: euler-",
     f"simulate dcm {CONSTANT} --scheme optimal": "'optimal' is not known (did you mean dcm-orthonormalize-optimal?)",
     # simulate: parameters of the motion
-    f"simulate euler --motion constant --set w_deg_s=1 {TIMES}": "'w_deg_s' is not known; allowed: x_deg_s",
+    f"simulate euler --motion constant --set w_deg_s=1 {TIMES}": "'w_deg_s' is not known (did you mean x_deg_s",
     f"simulate euler --motion constant {TIMES}": "motion constant needs parameters; allowed: x_deg_s",
     f"simulate euler {CONING} a_deg_s=1 b_deg_s=1": "motion coning lacks g_deg_s or g_rad_s",
     f"simulate euler {CONING} a_deg_s=1 g_deg_s=1": "motion coning lacks b_deg_s or b_rad_s",
@@ -704,7 +704,7 @@ def test_python_s_warnings_of_a_coefficient_are_not_shown(entry, folder, capsys)
         warnings.simplefilter("always")
         main(["tableau", "method.toml"])
     assert not caught
-    assert stop.value.code == 2 and f"entry 1 is '{entry}'" in capsys.readouterr().err
+    assert stop.value.code == 2 and f"weights[1] is '{entry}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from strapgen.catalogue.methods import windows
+from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
 from strapgen.design.windows import window_command as window
@@ -78,7 +79,7 @@ def test_options_reach_the_file(run):
     assert (window.previous, window.ahead, window.conditions, window.degree) == (3, 2, 2, 2)
     # 2 pi 20/100, rounded to 1e-6.
     assert window.band == Fraction("1.256637")
-    assert window.gyro == (40, Fraction("0.7071"), 100)
+    assert window.gyro == GyroResponse(Fraction(40), Fraction("0.7071"), Fraction(100))
     assert (window.noise, window.one_sided[0].noise) == (Fraction(1, 10**4), Fraction(1, 10**3))
     assert (window.rotation, window.terms, window.objective) == ("exact", 20, "mean square")
     assert "wrote w.toml" in warned

@@ -60,7 +60,7 @@ def study_loops(
     Example: strapgen study loops --set tilt_deg=2 --plot out/loops.png
     """
     output.check(file)
-    from strapgen.navigation.loops.loop_schedule_file import BUILT_IN, read
+    from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
     from strapgen.navigation.loops.loops_report import LoopStudy, loops_image, loops_report
     from strapgen.navigation.loops.loops_study import LOOPS, LoopErrors, cycles_of_modes, designs, run_loops
 
