@@ -45,8 +45,10 @@ class Option(NamedTuple):
         return not self.spelling.startswith("-")
 
     def value(self, word: Any) -> Any:
-        """Return the typed value of a word; None stands for none."""
-        return word if word is None or self.read is None else self.read(self.spelling, word)
+        """Return the typed value of a word; None stands for none, as no words do."""
+        if word is None or word == []:
+            return None
+        return word if self.read is None else self.read(self.spelling, word)
 
 
 class Group(NamedTuple):
