@@ -185,7 +185,7 @@ FAULTS = {
         "tableaux/heun3.toml",
         "order = 3",
         "derive euler --method heun3",
-        "heun3.toml: key name is missing",
+        "heun3.toml: name is missing",
     ),
     "command": ("twist.py", "1 / 0", "derive twist-y", "twist.py, line 1: ZeroDivisionError"),
     "motion": (
