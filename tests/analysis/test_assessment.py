@@ -161,7 +161,7 @@ def test_the_representation_does_not_matter(options):
 
 def oscillation(choice, frequency, step, steps, theta, phase, number=float, sine=math.sin, pi=math.pi):
     """Return what steps take of (65): samples of the angle, differentiated or subtracted."""
-    count, previous = catalogue.increments(choice), catalogue.previous(choice)
+    count, previous = choice.increments, choice.previous
     width = step / count
     turn = 2 * pi * frequency
     rows = []
