@@ -12,7 +12,7 @@ import sympy as sp
 
 from strapgen import (
     TABLEAUX,
-    Companions,
+    AttitudeStep,
     Kernel,
     KernelBuilder,
     Samples,
@@ -72,7 +72,7 @@ def algorithm(method: Tableau = TABLEAUX["rk4"], increments: int = 2, previous: 
         f"rodrigues-{method.name}-{increments}{kept}",
         f"Modified Rodrigues parameters: step by {method.title}",
         f"{SOURCE}; {method.title}: {method.source}",
-        companions=Companions(
+        attitude_step=AttitudeStep(
             product=None,  # not linear in the state: there is no transition
             orthonormalize=None,  # nothing to restore
             attitude="dcm-from-rodrigues",
@@ -80,5 +80,5 @@ def algorithm(method: Tableau = TABLEAUX["rk4"], increments: int = 2, previous: 
             previous=previous,
         ),
         order=samples.order(method.order),
-        own=(attitude(),),
+        bundled_kernels=(attitude(),),
     )

@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from strapgen import EULER, Companions, KernelBuilder, Signal, algebra, turns_signal
+from strapgen import EULER, AttitudeStep, KernelBuilder, Signal, algebra, turns_signal
 
 NODES = (Fraction(0), Fraction(1, 2), Fraction(1))
 
@@ -25,7 +25,7 @@ def algorithm():
         "Euler parameters from the rate at the ends and in the middle of the step",
         "W. Magnus, Comm. Pure Appl. Math. 7 (1954) 649-673, equation (3.28)",
         transition=EULER.transition.name,
-        companions=Companions(
+        attitude_step=AttitudeStep(
             "euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1), isometry=True, nodes=NODES
         ),
     )

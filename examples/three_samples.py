@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from strapgen import EULER, Companions, KernelBuilder, Signal, algebra, increments_signal
+from strapgen import EULER, AttitudeStep, KernelBuilder, Signal, algebra, increments_signal
 
 
 def algorithm():
@@ -24,7 +24,7 @@ def algorithm():
         "Euler parameters from three increments",
         "R. B. Miller, J. Guid. Control Dyn. 6 (1983) 287-291",
         transition=EULER.transition.name,
-        companions=Companions(
+        attitude_step=AttitudeStep(
             "euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1), isometry=True
         ),
     )

@@ -247,11 +247,11 @@ def lowest_difference(found: Sequence[Series], true: Sequence[Series]) -> int | 
 
 def local_error(kernel: Kernel, rate: Rate, top: int) -> int | None:
     """Return the lowest power of the step in the error of one step from increments, up to a power; None if none."""
-    previous = kernel.companions.previous
+    previous = kernel.attitude_step.previous
     samples = kernel.inputs[1]
     values = dict(
         zip(samples.elements, increments(rate, samples.shape[0] - previous, previous, top), strict=True)
     )
-    algorithm = kernel.companions.product.removesuffix("-product")
+    algorithm = kernel.attitude_step.product.removesuffix("-product")
     found = evaluated(kernel, values, kernel.transition)
     return lowest_difference(found, true_rotation(algorithm, rate, top))

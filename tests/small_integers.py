@@ -69,7 +69,7 @@ def context(
         )
     quantities.items |= {item.name: item for item in items}
     plan = FormatPlan((), values, forced or {}, frozenset({*words, *(forced or {})}))
-    program = SimpleNamespace(kernel="small", outputs=(), inputs=(), companions=None, transition=None)
+    program = SimpleNamespace(kernel="small", outputs=(), inputs=(), attitude_step=None, transition=None)
     return Quantization(program, Settings(**{"word": 8} | settings), quantities, plan, {}, feedback or {})
 
 

@@ -24,7 +24,7 @@ def transition(algorithm: str, method: str, axes: str, increments: int = 2) -> s
     """Return the step of the identity at the angle x about each of the axes, in equal increments."""
     step = derived.kernel(choose(algorithm, method, increments))
     state, d = step.inputs
-    values = dict(zip(state.elements, map(RING, step.companions.identity), strict=True))
+    values = dict(zip(state.elements, map(RING, step.attitude_step.identity), strict=True))
     values |= {element: x / increments if element[-1] in axes else RING(0) for element in d.elements}
     result = [RING(element).as_expr(X) for element in step.expand(values)["next"]]
     return sp.Matrix(*(state.shape if len(state.shape) == 2 else (4, 1)), result)
@@ -191,7 +191,7 @@ def turn_at_a_constant_rate(algorithm: str, method: str, increments: int, previo
     step = derived.kernel(choose(algorithm, method, increments, previous=previous))
     state, d = step.inputs
     ring, *angles = sp.ring("x y z", sp.QQ)
-    values = dict(zip(state.elements, map(ring, step.companions.identity), strict=True))
+    values = dict(zip(state.elements, map(ring, step.attitude_step.identity), strict=True))
     share = [angle * sp.QQ(1, increments) for angle in angles]
     values |= dict(zip(d.elements, share * (increments + previous), strict=True))
     return [ring(element) for element in step.expand(values)["next"]]
@@ -280,7 +280,7 @@ def test_at_a_constant_rate_a_centred_step_is_two_half_exponentials_cut_off_and_
         state, d = step.inputs
         for _ in range(3):
             angles = [sp.Rational(random.randint(-(10**6), 10**6), 10**6) for _ in "xyz"]
-            values = dict(zip(state.elements, step.companions.identity, strict=True))
+            values = dict(zip(state.elements, step.attitude_step.identity, strict=True))
             share = [angle / increments for angle in angles]
             values |= dict(zip(d.elements, share * (increments + previous), strict=True))
             expected = halves_cut_off_and_normalized(algorithm, order, angles)
@@ -301,7 +301,7 @@ def test_a_centred_step_loses_the_angle_of_two_half_steps_at_a_constant_rate(alg
     assert leading(loss)[1] == order + 1 + order % 2
     angle = sp.Rational(1, 10)
     kernel = derived.kernel(choose(algorithm, method, 3))
-    values = dict(zip(kernel.inputs[0].elements, kernel.companions.identity, strict=True))
+    values = dict(zip(kernel.inputs[0].elements, kernel.attitude_step.identity, strict=True))
     values |= {name: angle / 3 if name[-1] == "y" else sp.Integer(0) for name in kernel.inputs[1].elements}
     turn = kernel.expand(values)["next"]
     computed = 2 * sp.atan2(turn[1], turn[3]) if algorithm == "euler" else sp.atan2(turn[2], turn[0])

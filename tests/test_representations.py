@@ -81,7 +81,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Comparison": lambda: strapgen.compare("euler", "rk4", 2, ["numpy"], TURN)[0],
     "Finding": lambda: next(iter(strapgen.check(strapgen.choose("euler", "rk4", 2)))),
     "Convergence": convergence,
-    "Companions": lambda: kernel().companions,
+    "AttitudeStep": lambda: kernel().attitude_step,
     "Order": lambda: kernel().order,
     "Settings": lambda: strapgen.Settings.of(word=16, max_rate_deg_s=400, step="0.01", increments=2),
     "RoundingBounds": lambda: strapgen.rounding_bounds(program()),

@@ -7,7 +7,7 @@ from pathlib import Path
 #: A step whose title tells what was imported for it; the first lines are the test's.
 STEP = """{beginning}
 from fractions import Fraction
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.ir.signals import Signal
 
@@ -17,7 +17,8 @@ def algorithm():
     state = build.input(Signal.matrix("state", "C"))
     build.input(Signal("increments", (1, 3), ("d_x", "d_y", "d_z"), unit="rad"))
     build.output(Signal.matrix("next", "next"), state)
-    return build.kernel("mine", str({title}), "this test", companions=Companions(None, None, None, (Fraction(0),) * 9))
+    step = AttitudeStep(None, None, None, (Fraction(0),) * 9)
+    return build.kernel("mine", str({title}), "this test", attitude_step=step)
 """
 
 

@@ -41,7 +41,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.firmware.check_code.conformance import Finding as Finding
     from strapgen.firmware.check_code.conformance import check as check
     from strapgen.fixedpoint.floating.bounds import rounding_bounds as rounding_bounds
-    from strapgen.ir.attitude_step import Companions as Companions
+    from strapgen.ir.attitude_step import AttitudeStep as AttitudeStep
     from strapgen.ir.attitude_step import Order as Order
     from strapgen.ir.exceptions import CompilerError as CompilerError
     from strapgen.ir.exceptions import InputError as InputError
@@ -58,10 +58,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.ir.signals import Signal as Signal
     from strapgen.ir.sources import Sources as Sources
     from strapgen.kernel import algebra as algebra
+    from strapgen.kernel.kernel import EPSILON as EPSILON
     from strapgen.kernel.kernel import Kernel as Kernel
     from strapgen.kernel.kernel import KernelBuilder as KernelBuilder
     from strapgen.kernel.kernel import Stage as Stage
-    from strapgen.kernel.kernel import resolution as resolution
     from strapgen.lab import sensor_errors as _sensor_errors
     from strapgen.lab.compare.comparison import Comparison as Comparison
     from strapgen.lab.compare.comparison import Comparisons as Comparisons
@@ -171,7 +171,7 @@ _NAMES = {
         "converge",
     ),
     "ir.attitude_step": (
-        "Companions",
+        "AttitudeStep",
         "Order",
     ),
     "ir.fixed_settings": ("Settings",),
@@ -227,7 +227,7 @@ _NAMES = {
         "Kernel",
         "KernelBuilder",
         "Stage",
-        "resolution",
+        "EPSILON",
     ),
     "navigation.systems.wiring": ("read_system",),
     "targets.registry": (
@@ -251,6 +251,8 @@ _NAMESPACES = {
     "window_design": "design.windows.family",
     "windows": "catalogue.methods.windows",
 }
+#: Present names by those of the version before, which give a warning.
+_RENAMED = {"Companions": "AttitudeStep", "resolution": "EPSILON"}
 _EXPORTS = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = ["__version__", *_EXPORTS, *_NAMESPACES]
@@ -263,6 +265,11 @@ if not _typing.TYPE_CHECKING:  # a type checker would take any name for one that
             return getattr(_importlib.import_module(f"{__name__}.{_EXPORTS[name]}"), name)
         if name in _NAMESPACES:
             return _importlib.import_module(f"{__name__}.{_NAMESPACES[name]}")
+        if name in _RENAMED:
+            from strapgen.ir.renamed import warn
+
+            warn(f"strapgen.{name}", f"strapgen.{_RENAMED[name]}")
+            return __getattr__(_RENAMED[name])
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -302,7 +302,7 @@ def test_errors_far_below_double_are_those_of_many_digits(options):
         )
         samples = [[x for row in rows[k : k + count] for x in row] for k in range(0, len(rows), count)]
         program = derived.program(choice)
-        begun = [exact.number(value) for value in program.companions.identity]
+        begun = [exact.number(value) for value in program.attitude_step.identity]
         end = exact.states(program, samples, begun)[-1]
         angle = end[3] - end[1] if len(end) == 9 else 4 * end[2]
         measured = angle / 2 / (steps * step)
@@ -326,7 +326,7 @@ def test_the_recursions_sum_as_the_closed_form_says():
     ends = []
     for k in range(4 * cycles):
         if k % cycles == 0:
-            state |= {name: np.zeros(3) for name in recursion.begun_anew}
+            state |= {name: np.zeros(3) for name in recursion.reset}
         now = state | {
             "increment": np.array([x[k + 1], y[k + 1], 0]),
             "velocity_increment": np.array([0, v[k + 1], 0]),

@@ -76,8 +76,8 @@ def in_digits(kernel: Kernel, *inputs: list) -> list:
 def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> list:
     """Return the error matrix of one step of length h in the digits of mpmath."""
     kernel = derived.kernel(choice)
-    companions = kernel.companions
-    count = kernel.inputs[1].shape[0] - companions.previous
+    attitude_step = kernel.attitude_step
+    count = kernel.inputs[1].shape[0] - attitude_step.previous
 
     def angle(t):
         return [
@@ -88,13 +88,13 @@ def one_step(choice: Choice, vectors: list[list[sp.Rational]], h: Fraction) -> l
             for k in range(3)
         ]
 
-    times = [exact.number(h) * k / count for k in range(-companions.previous, count + 1)]
+    times = [exact.number(h) * k / count for k in range(-attitude_step.previous, count + 1)]
     angles = [angle(t) for t in times]
-    state = [exact.number(x) for x in companions.identity]
+    state = [exact.number(x) for x in attitude_step.identity]
     taken = [b - a for pair in pairwise(angles) for a, b in zip(*pair, strict=True)]
     state = in_digits(kernel, state, taken)
-    if companions.attitude:
-        state = in_digits(derived.kernel(choose(companions.attitude)), state)
+    if attitude_step.attitude:
+        state = in_digits(derived.kernel(choose(attitude_step.attitude)), state)
     computed = mpmath.matrix([state[3 * i : 3 * i + 3] for i in range(3)])
 
     # The true matrix by its own Taylor series, term after term, to 40 terms.

@@ -24,7 +24,7 @@ MILLER = {"a": Fraction(57, 80), "b": Fraction(33, 80)}
 
 STEP = """
 import sympy as sp
-from strapgen import EULER, Companions, KernelBuilder, algebra, increments_signal
+from strapgen import EULER, AttitudeStep, KernelBuilder, algebra, increments_signal
 
 def algorithm():
     build = KernelBuilder()
@@ -36,7 +36,7 @@ def algorithm():
     build.output(EULER.next, algebra.quaternion_product(state, p))
     return build.kernel(
         "two", "a step", "this test", transition=EULER.transition.name,
-        companions=Companions("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1)),
+        attitude_step=AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1)),
     )
 """
 

@@ -111,13 +111,13 @@ def test_signals_are_explained(choice):
 def test_companions_are_in_the_catalogue_and_fit(choice):
     kernel = derived(choice)
     state = kernel.inputs[0]
-    companions = kernel.companions
-    product = derived(choose(companions.product))
+    attitude_step = kernel.attitude_step
+    product = derived(choose(attitude_step.product))
     assert [signal.shape for signal in product.inputs] == [state.shape, state.shape]
-    assert companions.orthonormalize in catalogue.orthonormalizations(choice.name)
-    assert len(companions.identity) == state.size
-    if companions.attitude is not None:
-        attitude = derived(choose(companions.attitude))
+    assert attitude_step.orthonormalize in catalogue.orthonormalizations(choice.name)
+    assert len(attitude_step.identity) == state.size
+    if attitude_step.attitude is not None:
+        attitude = derived(choose(attitude_step.attitude))
         assert attitude.inputs[0] == state
         assert attitude.outputs[0].signal.shape == (3, 3)
 

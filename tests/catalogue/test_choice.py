@@ -35,15 +35,15 @@ METHODS = ("rk1", "rk2")
 #: A file whose step puts a number, or an element of the state, in the first place of its matrix.
 NAMED_PI = """
 import sympy as sp
-from strapgen import Companions, KernelBuilder, Signal, increments_signal
+from strapgen import AttitudeStep, KernelBuilder, Signal, increments_signal
 
 def algorithm():
     build = KernelBuilder()
     state = build.input(Signal("state", (3, 3), ("pi", *(f"C_{{k}}" for k in range(2, 10)))))
     build.input(increments_signal(2))
     build.output(Signal.matrix("next", "next"), [{number}, *list(state)[1:]])
-    step = Companions(None, None, None, (1, 0, 0, 0, 1, 0, 0, 0, 1))
-    return build.kernel("named-pi", "A matrix", "none", companions=step)
+    step = AttitudeStep(None, None, None, (1, 0, 0, 0, 1, 0, 0, 0, 1))
+    return build.kernel("named-pi", "A matrix", "none", attitude_step=step)
 """
 
 
@@ -81,14 +81,14 @@ def test_choices_of_two_kernels_of_one_name_differ(chosen):
 
 def test_choices_differ_in_the_kernels_that_a_step_brings(chosen):
     kernel = catalogue.derive(chosen["rk1"])
-    for place, own in enumerate(kernel.own):
+    for place, own in enumerate(kernel.bundled_kernels):
         (output,) = own.outputs
         doubled = replace(output, expressions=tuple(2 * x for x in output.expressions))
-        others = [*kernel.own]
+        others = [*kernel.bundled_kernels]
         others[place] = replace(own, outputs=(doubled,))
-        other = catalogue.Choice.of_user(replace(kernel, own=tuple(others)))
+        other = catalogue.Choice.of_user(replace(kernel, bundled_kernels=tuple(others)))
         assert other.identity != chosen["rk1"].identity
-    assert len(kernel.own) > 1
+    assert len(kernel.bundled_kernels) > 1
 
 
 @pytest.mark.long

@@ -61,7 +61,7 @@ import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.ir.attitude_step import Order
 
@@ -74,7 +74,7 @@ def algorithm():
     p = build.stage(EULER.transition, {transition})
     build.output(EULER.next, algebra.quaternion_product(state, p))
     return build.kernel("two-sample", "Two-sample algorithm", "a test", transition="transition", order={order},
-        companions=Companions("euler-product", "euler-normalize", "dcm-from-euler", {identity}))
+        attitude_step=AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", {identity}))
 """
 RIGHT = {
     "phi": "first + second + sp.Rational(2, 3) * algebra.cross(first, second)",

@@ -62,7 +62,7 @@ def test_a_transition_leaves_room_for_a_state_that_fills_its_word(sizes, fractio
     signal = Signal("transition", (4,), tuple("pqrs"))
     result = Result(signal, tuple(map(Reference, "pqrs")))
     state = Signal("state", (4,), tuple("abcd"), constraint="unit")
-    code = SimpleNamespace(inputs=(state,), outputs=(), transition=result, recursion=None, companions=None)
+    code = SimpleNamespace(inputs=(state,), outputs=(), transition=result, recursion=None, attitude_step=None)
     ranges = (SimpleNamespace(range=Interval.symmetric(Fraction(size, 64))) for size in sizes)
     known = SimpleNamespace(
         items=dict(zip("pqrs", ranges, strict=True)), results={"transition": tuple("pqrs")}

@@ -63,11 +63,11 @@ def test_the_next_call_takes_whatever_a_step_returns(word):
     settings = Settings(word, Fraction(1), allowance=Fraction(1, 60))
     fixed = quantized(Choice("dcm", "rk3", 2), settings)
     (result,) = fixed.interface.outputs
-    guarded = [value for value in fixed.body if value.name in result.values and value.guarded]
-    assert guarded
+    range_checked = [value for value in fixed.body if value.name in result.values and value.range_checked]
+    assert range_checked
     limit = Fraction(61, 60) / result.format.unit
     assert limit.denominator > 1
-    for value in guarded:
+    for value in range_checked:
         assert -limit <= value.low <= value.high <= limit < value.high + 1
-    assert fixed.interface.inputs[0].high == guarded[0].high
+    assert fixed.interface.inputs[0].high == range_checked[0].high
     assert result.format == Format(word, word - 2)

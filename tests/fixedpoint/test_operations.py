@@ -39,8 +39,8 @@ def test_a_quotient_by_a_number_is_a_multiple():
 def test_the_root_of_a_number_lies_between_its_ends():
     root = derived(program({"r": node("sqrt", 2), "y": node("multiply", "r", "a")}, {"a": 1}))["r"]
     ((_, low),) = root.definition.terms
-    assert low**2 < 2 <= (low + root.inexact) ** 2
-    assert root.inexact < Fraction(1, 1 << 150)
+    assert low**2 < 2 <= (low + root.approximation_error) ** 2
+    assert root.approximation_error < Fraction(1, 1 << 150)
 
 
 @pytest.mark.parametrize(
@@ -65,17 +65,17 @@ def test_a_divisor_below_zero_is_checked_to_stay_there():
     code = program({"s": divisor, "y": node("divide", "a", "s")}, dict.fromkeys("abcd", 1))
     s = derived(replace(code, inputs=(UNIT_VECTOR,)))["s"]
     # -1 on unit vectors; the check is that of half and twice of it.
-    assert (s.range.lowest, s.range.highest, s.guarded) == (-2, Fraction(-1, 2), True)
+    assert (s.range.lowest, s.range.highest, s.range_checked) == (-2, Fraction(-1, 2), True)
 
 
 @pytest.mark.parametrize(("least", "guarded"), [(Fraction(3, 10), False), (Fraction(1, 5), True)])
-def test_a_limit_that_is_proved_within_a_factor_of_two_is_not_checked(least, guarded):
+def test_a_limit_that_is_proved_within_a_factor_of_two_is_not_checked(least, range_checked):
     """Of about 1 on unit vectors half is the limit; a proof of 3/10 is near it, and one of 1/5 is not."""
     squares = [node("multiply", name, name) for name in "abcd"]
     total = node("add", node("add", *squares[:2]), node("add", *squares[2:]))
     divisor = node("add", node("multiply", Fraction(95, 100) - least, total), least)
     code = program({"s": divisor, "y": node("divide", "a", "s")}, dict.fromkeys("abcd", 1))
-    assert derived(replace(code, inputs=(UNIT_VECTOR,)))["s"].guarded is guarded
+    assert derived(replace(code, inputs=(UNIT_VECTOR,)))["s"].range_checked is range_checked
 
 
 def test_nothing_is_checked_where_proper_inputs_come_near_zero():

@@ -115,9 +115,9 @@ def test_only_exact_sums_of_inputs_are_split_off(near, apart):
     small = op("multiply", op("multiply", "x_3", "x_2"), number(Fraction(1, 64)))
     body = {"near": near, "sum": op("add", "near", small), "y": op("multiply", "sum", "x_1")}
     total = quantities(hand_made(body, "y"), box, split=True).items["sum"]
-    assert total.beside == (((("near",), Fraction(1)),) if apart else ())
+    assert total.exact_addends == (((("near",), Fraction(1)),) if apart else ())
     assert (("near",) in dict(total.definition.terms)) is not apart
-    assert not quantities(hand_made(body, "y"), box).items["sum"].beside
+    assert not quantities(hand_made(body, "y"), box).items["sum"].exact_addends
 
 
 def test_what_stays_near_a_constant_is_kept_as_its_distance():

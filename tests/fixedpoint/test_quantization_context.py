@@ -16,12 +16,19 @@ from strapgen.ir.integer_program import IntegerSum, Term
 @pytest.mark.parametrize("sign", [1, -1])
 def test_what_passes_a_check_stands_for_an_exact_value_inside_the_range(sign):
     low, high = sorted((sign * Fraction(1, 3), sign * Fraction(9, 5)))
-    error, followed, inexact, places = Fraction(1, 40), Fraction(1, 70), Fraction(1, 90), 5
-    item = quantity("y", Sum(((("a",), Fraction(1)),)), low, high, guarded=True, inexact=inexact)
+    error, followed, approximation_error, places = Fraction(1, 40), Fraction(1, 70), Fraction(1, 90), 5
+    item = quantity(
+        "y",
+        Sum(((("a",), Fraction(1)),)),
+        low,
+        high,
+        range_checked=True,
+        approximation_error=approximation_error,
+    )
     walk = context({"a": Known(5, -80, 80)}, item)
     value = integer_value(walk, item, IntegerSum((Term(("a",), 1),)), places, error, 80, followed=followed)
-    off = error + followed + inexact
-    assert value.guarded
+    off = error + followed + approximation_error
+    assert value.range_checked
 
     def surely_inside(integer: int) -> bool:
         return low <= Fraction(integer, 32) - off and Fraction(integer, 32) + off <= high
@@ -33,7 +40,7 @@ def test_what_passes_a_check_stands_for_an_exact_value_inside_the_range(sign):
 
 def test_an_error_of_half_the_smaller_end_is_the_largest_that_a_check_allows():
     low, high = Fraction(1, 2), Fraction(2)
-    item = quantity("y", Sum(((("a",), Fraction(1)),)), low, high, guarded=True)
+    item = quantity("y", Sum(((("a",), Fraction(1)),)), low, high, range_checked=True)
     walk = context({"a": Known(5, 0, 80)}, item)
 
     def value(error):

@@ -76,13 +76,13 @@ def test_no_value_at_a_corner_or_inside_leaves_its_range(sums, box):
         assert all(known.lowest <= point[name] <= known.highest for point in points)
 
 
-def of_product(coefficient: Fraction, inexact: Fraction) -> tuple[Fraction, Fraction]:
+def of_product(coefficient: Fraction, approximation_error: Fraction) -> tuple[Fraction, Fraction]:
     """Return the range of p x, where p is a multiple of x z up to an error."""
     x, z = Interval.of(-1, 1), Interval.of(Fraction(1, 2), 1)
     items = quantities([], {"x": x, "z": z})
     p = Sum(((("x", "z"), coefficient),))
-    known = (x * z).scale(coefficient).widened(inexact)
-    items["p"] = Quantity("p", p, Fraction(0), known, inexact=inexact)
+    known = (x * z).scale(coefficient).widened(approximation_error)
+    items["p"] = Quantity("p", p, Fraction(0), known, approximation_error=approximation_error)
     result = Ranges(items, {"x": x, "z": z}).enclosure([(("p", "x"), Fraction(1))])
     return result.lowest, result.highest
 

@@ -106,15 +106,15 @@ def test_a_series_leaves_out_as_much_as_it_says_at_the_end_of_its_range(kind, la
     (one,) = (
         o
         for o in links.links
-        if o.name.startswith(f"f_{label}".rstrip("_")) and o.inexact and "rest" not in o.name
+        if o.name.startswith(f"f_{label}".rstrip("_")) and o.approximation_error and "rest" not in o.name
     )
-    assert 0 < one.inexact <= links.tolerance
+    assert 0 < one.approximation_error <= links.tolerance
     if function is None:
         return
     ends = [most * k / 8 for k in range(-8, 9)]
     missing = [abs(values(links, x)["f"] - fraction(function(real(x)))) for x in ends]
     # The next term is smaller by the square of the end over a product of two numbers above 5.
-    assert max(missing) <= one.inexact <= max(missing) * Fraction(7, 6)
+    assert max(missing) <= one.approximation_error <= max(missing) * Fraction(7, 6)
 
 
 @pytest.mark.parametrize("word", [8, 16, 32])
@@ -126,8 +126,8 @@ def test_the_arctangent_leaves_out_as_much_as_it_says(word):
         abs(values(links, x, Fraction(1))["f_arctangent"] - fraction(PRECISE.atan(real(x)))) for x in tangents
     ]
     # The bound is the sum of all terms that are left out; at the end of the range they nearly add up.
-    assert max(missing) <= one.inexact <= 2 * max(missing)
-    assert one.inexact <= links.tolerance
+    assert max(missing) <= one.approximation_error <= 2 * max(missing)
+    assert one.approximation_error <= links.tolerance
 
 
 def test_quarter_turns_are_taken_off_with_the_error_of_pi_for_each():
@@ -137,12 +137,12 @@ def test_quarter_turns_are_taken_off_with_the_error_of_pi_for_each():
     assert most == 38
     short = PI - pi()
     assert 0 < short <= PI_ERROR
-    assert most * PI_ERROR / 2 <= rest.inexact <= most * PI_ERROR
+    assert most * PI_ERROR / 2 <= rest.approximation_error <= most * PI_ERROR
     for angle in (Fraction(60), Fraction(-60), Fraction(177, 10), Fraction(3)):
         known = values(links, angle)
         exact = angle - known[count.name] * PI / 2
         off = abs(known[rest.name] - exact)
-        assert 0 < off <= rest.inexact
+        assert 0 < off <= rest.approximation_error
         # The nearest number of quarter turns leaves at most an eighth of a turn, and what the factor is off by.
         assert abs(exact) <= rest.range.highest < Fraction(79, 100)
 
@@ -168,26 +168,26 @@ def test_parts_of_half_a_turn_have_the_error_of_pi(ranges, count):
     parts = [
         (one, dict(one.definition.terms)[()])
         for one in links.links
-        if isinstance(one.definition, Sum) and one.inexact and () in dict(one.definition.terms)
+        if isinstance(one.definition, Sum) and one.approximation_error and () in dict(one.definition.terms)
         if one.name.startswith("f_angle") or one.name == "f"
     ]
     assert len(parts) >= count - 1
     for one, constant in parts:
         share = round(constant / pi() * 4)
-        assert 0 < abs(Fraction(share, 4) * PI - constant) <= one.inexact <= PI_ERROR
+        assert 0 < abs(Fraction(share, 4) * PI - constant) <= one.approximation_error <= PI_ERROR
 
 
 def test_a_whole_turn_has_twice_the_error_of_pi():
     links = chain("wrap", (-8, 8))
-    turned = [one for one in links.links if one.inexact]
+    turned = [one for one in links.links if one.approximation_error]
     assert len(turned) == 2
     for one in turned:
         constant = dict(one.definition.terms)[()]
-        assert 0 < abs(abs(constant) - 2 * PI) <= one.inexact <= 2 * PI_ERROR
+        assert 0 < abs(abs(constant) - 2 * PI) <= one.approximation_error <= 2 * PI_ERROR
 
 
 def slopes(links: Chain) -> dict[str, Fraction | None]:
-    return dict(links.links[-1].follows.slopes)
+    return dict(links.links[-1].inherited_error.slopes)
 
 
 ROOT = {0: ExactOperation("sqrt", ("q",))}
@@ -227,7 +227,7 @@ def test_an_error_of_the_argument_goes_on_by_the_largest_slope(kind, ranges, opt
         else:
             assert slope * (1 - 1e-12) <= float(told[name]) <= slope * 1.004
     inside = links.links[-1].range
-    assert links.links[-1].follows.most >= inside.highest - inside.lowest
+    assert links.links[-1].inherited_error.most >= inside.highest - inside.lowest
 
 
 @pytest.mark.parametrize(
@@ -282,7 +282,7 @@ def test_the_smaller_and_the_larger_argument_have_their_ranges():
 def test_links_stay_in_their_ranges_and_lead_to_the_function(kind, ranges):
     function = {"atan2": PRECISE.atan2, "wrap": None}.get(kind, getattr(PRECISE, kind, None))
     links = chain(kind, *ranges, word=24)
-    inexact = sum((one.inexact for one in links.links), Fraction(0))
+    approximation_error = sum((one.approximation_error for one in links.links), Fraction(0))
     grids = [
         [low + (high - low) * Fraction(k, 23) for k in range(24)]
         for low, high in ((Fraction(a), Fraction(b)) for a, b in ranges)
@@ -296,10 +296,14 @@ def test_links_stay_in_their_ranges_and_lead_to_the_function(kind, ranges):
         known = values(links, *row)
         for one in links.links:
             value = known[one.name]
-            assert one.range.lowest - one.inexact <= value <= one.range.highest + one.inexact, one.name
+            assert (
+                one.range.lowest - one.approximation_error
+                <= value
+                <= one.range.highest + one.approximation_error
+            ), one.name
         wrapped = row[0] - 2 * PI * round(row[0] / (2 * PI))
         exact = wrapped if function is None else fraction(function(*map(real, row)))
-        assert abs(known[links.links[-1].name] - exact) <= inexact
+        assert abs(known[links.links[-1].name] - exact) <= approximation_error
 
 
 @pytest.mark.parametrize(("digits", "terms"), [(1, 3), (5, 3), (6, 4), (12, 8)])

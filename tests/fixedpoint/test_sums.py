@@ -193,7 +193,7 @@ def test_what_functions_add_is_the_slope_times_the_error_or_all_there_is(form):
     base = lowered(known, plain, **form)[0]
 
     def added(slopes, most) -> Fraction:
-        value = lowered(known, replace(plain, follows=ErrorPropagation(slopes, most)), **form)[0]
+        value = lowered(known, replace(plain, inherited_error=ErrorPropagation(slopes, most)), **form)[0]
         assert (value.low, value.high) == (
             base.low,
             base.high,
@@ -211,7 +211,9 @@ def test_what_functions_add_is_the_slope_times_the_error_or_all_there_is(form):
 def test_what_a_series_leaves_out_is_added_to_the_error_and_to_the_range():
     left_out = Fraction(1, 9)
     item = quantity("y", terms((("a",), 1)), -2, 2)
-    base, more = (lowered({"a": OFF}, replace(item, inexact=by))[0] for by in (Fraction(0), left_out))
+    base, more = (
+        lowered({"a": OFF}, replace(item, approximation_error=by))[0] for by in (Fraction(0), left_out)
+    )
     assert left_out <= more.error - base.error < left_out + GRID
     assert (more.low, more.high) == (base.low - 2, base.high + 2)  # a ninth is nearly two sixteenths
 
@@ -263,7 +265,7 @@ def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_fact
     known = {name: Known(2, -15, 15, Fraction(1, 50)) for name in "ab"} | {
         "c": Known(3, -7, 7, Fraction(1, 90))
     }
-    check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), 1, 4, guarded=True)
+    check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), 1, 4, range_checked=True)
     scaled = quantity("z", Sum(((("a", "c"), ONE),)), -4, 4)
     walk = context(known, check, scaled)
     lower_sum(walk, check, check.definition)
@@ -292,7 +294,7 @@ def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_fact
 )
 def test_only_sums_of_squares_bound_what_is_squared(terms, size):
     known = {name: Known(2, -15, 15, Fraction(1, 200)) for name in "ab"}
-    check = quantity("y", Sum(terms), 1, 4, guarded=True)
+    check = quantity("y", Sum(terms), 1, 4, range_checked=True)
     walk = context(known, check)
     lower_sum(walk, check, check.definition)
     assert float(walk.size("a")) == pytest.approx(size, rel=1e-2)
@@ -300,7 +302,7 @@ def test_only_sums_of_squares_bound_what_is_squared(terms, size):
 
 def test_a_check_whose_value_is_taken_as_exact_says_nothing_of_its_parts(monkeypatch):
     known = {name: Known(2, -15, 15, Fraction(1, 2)) for name in "ab"}
-    check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), Fraction(1, 64), 4, guarded=True)
+    check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), Fraction(1, 64), 4, range_checked=True)
     walk = context(known, check)
     monkeypatch.setattr(
         "strapgen.fixedpoint.quantization_context._reset", lambda walk, item: walk.resets.add(item.name)

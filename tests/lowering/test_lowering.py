@@ -305,7 +305,7 @@ def test_the_transition_asks_for_the_increments_alone(choice):
     # The transition is the step of the identity.
     ring, *d = sp.ring(part.inputs[0].elements, sp.QQ)
     (transition,) = part.run(dict(zip(part.inputs[0].elements, d, strict=True))).values()
-    start = [*made.companions.identity, *d]
+    start = [*made.attitude_step.identity, *d]
     (step,) = made.run(dict(zip(input_names(made), start, strict=True))).values()
     assert [ring(x) for x in transition] == [ring(x) for x in step]
 

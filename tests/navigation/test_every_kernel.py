@@ -79,7 +79,7 @@ def described(choice: str, folder: Path) -> tuple[Path, dict[str, str]]:
 def test_stage_computes_what_its_kernel_does(kernel, target, tmp_path):
     path, states = described(kernel, tmp_path)
     program = pipeline.program(Choice(kernel))
-    if program.recursion is not None and program.recursion.begun_anew:
+    if program.recursion is not None and program.recursion.reset:
         with pytest.raises(InputError, match="is a sum that no stage takes"):
             read_system(path)
         return

@@ -61,7 +61,7 @@ def test_counts_become_increments_in_the_unit_of_their_scale():
 
 def test_a_sum_begins_anew_and_is_a_value_at_an_instant_while_increments_are_not():
     sum_, hold = kernel(choose("sum-3")), kernel(choose("hold-3"))
-    assert sum_.recursion.begun_anew == ("sum",)
+    assert sum_.recursion.reset == ("sum",)
     signals = {
         s.name: s for s in (*sum_.inputs, *hold.inputs, sum_.outputs[0].signal, hold.outputs[0].signal)
     }

@@ -20,7 +20,7 @@ from strapgen.run import exact
 def test_exact_runs_are_those_of_rationals(algorithm, method, rng):
     made = program(Choice(algorithm, method, 2))
     increments = rng.normal(scale=0.01, size=(3, 2, 3))
-    state = list(made.companions.identity)
+    state = list(made.attitude_step.identity)
     for row in increments.reshape(3, -1).tolist():
         values = dict(zip(made.inputs[0].elements, state, strict=True))
         values |= zip(made.inputs[1].elements, map(Fraction, row), strict=True)

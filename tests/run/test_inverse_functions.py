@@ -14,7 +14,7 @@ from precisions import precision
 import strapgen
 from strapgen.ir.signals import Signal
 from strapgen.kernel.evaluation import Wrapped
-from strapgen.kernel.kernel import KernelBuilder, resolution
+from strapgen.kernel.kernel import EPSILON, KernelBuilder
 from strapgen.run.backends import BACKENDS, of_sources
 
 
@@ -63,6 +63,6 @@ def test_whole_turns_are_taken_off(backend_name):
 
 
 def test_the_resolution_is_the_targets(backend_name):
-    evaluator = made(backend_name, lambda x: x + resolution)
+    evaluator = made(backend_name, lambda x: x + EPSILON)
     wanted = {"float": 2.0**-23, "32": 2.0**-30, "16": 2.0**-14}
     assert float(evaluator(0.0)[0]) == wanted.get(precision(backend_name), 2.0**-52)

@@ -275,12 +275,12 @@ class Propagation:
     def __init__(self, library: Library, kernel: str, target: str, rng: np.random.Generator) -> None:
         self.library, self.dtype = library, DTYPES[target]
         self.program, self.sources = programs()[kernel], generated(kernel, target)
-        companions = self.program.companions
-        assert companions is not None
-        normalizer = generated(companions.orthonormalize, target).function.name
+        attitude_step = self.program.attitude_step
+        assert attitude_step is not None
+        normalizer = generated(attitude_step.orthonormalize, target).function.name
         self.normalize = library.ffi.addressof(library.lib, normalizer)
         self.size = self.program.inputs[0].size
-        self.identity = np.array([float(x) for x in companions.identity], self.dtype)
+        self.identity = np.array([float(x) for x in attitude_step.identity], self.dtype)
         self.increments = rng.normal(scale=0.05, size=(3, 20, 6)).astype(self.dtype)
 
     def step(self, state: np.ndarray, increments: np.ndarray) -> np.ndarray:
@@ -356,7 +356,7 @@ def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(st
         next(text for name, text in sources.files.items() if name.endswith(f"_runs{end}"))
         for end in (".h", ".c")
     )
-    size, number_bytes = len(sources.companions.identity), np.dtype(DTYPES[target]).itemsize
+    size, number_bytes = len(sources.attitude_step.identity), np.dtype(DTYPES[target]).itemsize
 
     def number(pattern: str) -> int:
         (text,) = set(re.findall(pattern, source))

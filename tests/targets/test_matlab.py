@@ -77,7 +77,7 @@ def differing(choices: Iterable[Choice], rng: np.random.Generator) -> list[str]:
             bits(a) == bits(b) and bits(c) == bits(b[0])
             for a, b, c in zip(many, expected, single, strict=True)
         )
-        names += [] if same and (one.companions is None or same_run(one, reference, rng)) else [one.kernel]
+        names += [] if same and (one.attitude_step is None or same_run(one, reference, rng)) else [one.kernel]
     return names
 
 

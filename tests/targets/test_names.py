@@ -23,7 +23,7 @@ import strapgen
 from strapgen import targets
 from strapgen.catalogue.user import admission
 from strapgen.fixedpoint import quantize
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
@@ -126,8 +126,8 @@ def step(called: Names) -> Kernel:
             t[2] * sp.Rational(4, 5) - chosen / 8,
         ],
     )
-    companions = Companions(None, None, None, (Fraction(0),) * 3)
-    return build.kernel(called.kernel, "A step", "this test", companions=companions)
+    attitude_step = AttitudeStep(None, None, None, (Fraction(0),) * 3)
+    return build.kernel(called.kernel, "A step", "this test", attitude_step=attitude_step)
 
 
 REFERENCE = strapgen.lower(step(HARMLESS))

@@ -65,7 +65,7 @@ class Choice:
         """Return the choice of a user's kernel: an attitude step, or a kernel that comes with one."""
         user_kernel = kernel if isinstance(kernel, UserKernel) else UserKernel.of(kernel)
         head = user_kernel.head
-        beside, step = head.beside, head.companions
+        beside, step = head.beside, head.attitude_step
         if step is not None and not step.nodes:
             beside = step.previous, step.ahead
         if beside is None:
@@ -143,7 +143,7 @@ class Choice:
         """Names of the kernels that orthonormalize the state; for a user's step, the one that it names."""
         if self.user_kernel is None:
             return orthonormalizations(self.name)
-        step = self.user_kernel.head.companions
+        step = self.user_kernel.head.attitude_step
         return [] if step is None or step.orthonormalize is None else [step.orthonormalize]
 
     def companion(self, name: str) -> Choice:
@@ -152,7 +152,7 @@ class Choice:
         Parameters
         ----------
         name : str
-            Name of the product, orthonormalization or attitude kernel in the step's `companions`.
+            Name of the product, orthonormalization or attitude kernel in the step's `attitude_step`.
 
         Examples
         --------
@@ -161,7 +161,11 @@ class Choice:
         """
         if self.user_kernel is None or name not in self.user_kernel.head.brought:
             return Choice(name)
-        return next(Choice.of_user(kernel) for kernel in self.user_kernel.kernel.own if kernel.name == name)
+        return next(
+            Choice.of_user(kernel)
+            for kernel in self.user_kernel.kernel.bundled_kernels
+            if kernel.name == name
+        )
 
 
 def orthonormalizations(algorithm: str) -> list[str]:

@@ -26,7 +26,7 @@ _PACKAGE = __name__.rpartition(".")[0]
 def nodes(choice: Choice) -> tuple[Number, ...]:
     """Return the nodes at which a step takes the rate; empty for one that takes increments."""
     if choice.user_kernel is not None:
-        step_kernels = choice.user_kernel.head.companions
+        step_kernels = choice.user_kernel.head.attitude_step
         return step_kernels.nodes if step_kernels else ()
     if choice.method is None or choice.increments is not None:
         return ()
@@ -92,8 +92,10 @@ def _of_catalogue(choice: Choice, _identity: str) -> Kernel:
 
 
 def companion(kernel: Kernel, name: str) -> Kernel:
-    """Return a kernel named in a step's `companions`: the user's own if there is one, else that of the catalogue."""
-    return next((brought for brought in kernel.own if brought.name == name), None) or derive(Choice(name))
+    """Return a kernel named in a step's `attitude_step`: the user's own if there is one, else that of the catalogue."""
+    return next((brought for brought in kernel.bundled_kernels if brought.name == name), None) or derive(
+        Choice(name)
+    )
 
 
 def _method(method: AnyMethod) -> Method:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.ir.notebook_display import full_text
 
 if TYPE_CHECKING:
-    from strapgen.ir.attitude_step import Companions
+    from strapgen.ir.attitude_step import AttitudeStep
     from strapgen.kernel.kernel import Kernel, Stage
 
 
@@ -20,7 +20,7 @@ class _Head:
 
     name: str
     samples: int  # rows of its last input: of an attitude step all increments that it takes
-    companions: Companions | None  # of an attitude step
+    attitude_step: AttitudeStep | None  # of an attitude step
     brought: tuple[str, ...]  # names of the kernels that come with it
     text: str  # differs between different kernels; without their arguments
     unknowns: tuple[str, ...] = ()
@@ -30,11 +30,11 @@ class _Head:
     @classmethod
     def of(cls, kernel: Kernel) -> _Head:
         shape = kernel.inputs[-1].shape if kernel.inputs else ()
-        brought = tuple(other.name for other in kernel.own)
+        brought = tuple(other.name for other in kernel.bundled_kernels)
         text = _text(replace(kernel, arguments=""))
         samples = shape[0] if shape else 1
         beside = (kernel.previous, kernel.ahead) if kernel.takes_velocity else None
-        return cls(kernel.name, samples, kernel.companions, brought, text, kernel.unknowns, beside)
+        return cls(kernel.name, samples, kernel.attitude_step, brought, text, kernel.unknowns, beside)
 
 
 class UserKernel:
@@ -100,5 +100,7 @@ def _text(kernel: Kernel) -> str:
     def shown(stages: tuple[Stage, ...]) -> str:
         return full_text([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
 
-    rest = replace(kernel, stages=(), outputs=(), own=())
-    return " ".join([full_text(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.own)])
+    rest = replace(kernel, stages=(), outputs=(), bundled_kernels=())
+    return " ".join(
+        [full_text(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.bundled_kernels)]
+    )

@@ -154,7 +154,7 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
     between = every if every and len(state.signal.shape) == 2 else BETWEEN
     limit = samples.high if every else int(samples.high * _SMALL)
     increments = [[stream.randint(-limit, limit) for _ in range(samples.signal.size)] for _ in range(steps)]
-    identity = subject.program.companions.identity if subject.program.companions else ()
+    identity = subject.program.attitude_step.identity if subject.program.attitude_step else ()
     words, count, worst, proper = [int(one / state.unit) for one in identity], 0, (0.0, 1.0), True
     feedback = [entry.fresh for entry in subject.fixed.interface.residuals]
     exact = _exact_states(subject, increments, between, beside if between == every else None)
@@ -182,7 +182,7 @@ class _Normalization:
 
 def _models(subject: Subject) -> tuple[Any, _Normalization]:
     """Return the function of a step on integers, and its normalization."""
-    kernels = subject.program.companions
+    kernels = subject.program.attitude_step
     assert kernels is not None
     matrix = len(subject.program.inputs[0].shape) == 2
     name = _OF_MATRICES if matrix else str(kernels.orthonormalize)
@@ -200,7 +200,7 @@ def _exact_states(
     from flint import ctx
 
     samples = subject.fixed.interface.inputs[1]
-    kernels, transition = subject.program.companions, subject.program.transition_program()
+    kernels, transition = subject.program.attitude_step, subject.program.transition_program()
     assert kernels is not None
     product = pipeline.program(choose(str(kernels.product)))
     exact = [ball(one) for one in kernels.identity]

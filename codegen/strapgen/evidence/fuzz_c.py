@@ -20,7 +20,7 @@ def driver_name(sources: Sources) -> str:
     return f"fuzz_{sources.function.name}.c"
 
 
-def driver_files(sources: Sources, guarded: bool, commands: Sequence[str] = ()) -> dict[str, str]:
+def driver_files(sources: Sources, range_checked: bool, commands: Sequence[str] = ()) -> dict[str, str]:
     """Print the driver of a function."""
     assert sources.fixed is not None
     numbers, interface = numbers_of(sources), sources.fixed
@@ -29,7 +29,7 @@ def driver_files(sources: Sources, guarded: bool, commands: Sequence[str] = ()) 
     prefix |= {a.signal.name: f"out_{a.signal.name}" for a in outputs}
     feedback = ["feedback"] if interface.residuals else []
     order = [*(prefix[a.signal.name] for a in inputs), *feedback, *(prefix[a.signal.name] for a in outputs)]
-    step = sources.companions is not None and len(inputs) == 2
+    step = sources.attitude_step is not None and len(inputs) == 2
     values = {
         "name": sources.function.name,
         "commands": commands,
@@ -44,7 +44,7 @@ def driver_files(sources: Sources, guarded: bool, commands: Sequence[str] = ()) 
             for a in (*inputs, *outputs)
         },
         "feedback": interface.residuals,
-        "guarded": guarded,
+        "guarded": range_checked,
         "arrays": order,
         "array_call": ", ".join(f"{name}[0]" for name in order),
         "alias": _alias(inputs, outputs, order),

@@ -41,9 +41,9 @@ def fuzzing(subject: Subject, folder: Path) -> list[Verdict]:
 def fuzz_files(subject: Subject) -> dict[str, str]:
     """Return a kernel's C with its driver, text by file name."""
     sources = subject.sources
-    guarded = any(value.guarded for value in subject.fixed.body)
+    range_checked = any(value.range_checked for value in subject.fixed.body)
     commands = (" ".join(_build(sources)), f"{_PROGRAM} -max_len={LONGEST} -len_control=0 -max_total_time=60")
-    return {**sources.files, **driver_files(sources, guarded, commands)}
+    return {**sources.files, **driver_files(sources, range_checked, commands)}
 
 
 def _build(sources: Sources) -> list[str]:

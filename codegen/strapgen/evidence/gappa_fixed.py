@@ -98,7 +98,7 @@ class _FixedScriptWriter:
             case _:
                 raise CannotFollowError(f"{name} is chosen by a comparison, which is a branch")
         self.fractions[name], self.limits[name] = value.fraction, (value.low * unit, value.high * unit)
-        if value.guarded:
+        if value.range_checked:
             self.script.suppose(f"c_{name}", *self.limits[name])
         if name not in self.exact:
             self.script.rules.append(f"c_{name} ~ e_{name};")

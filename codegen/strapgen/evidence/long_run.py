@@ -108,8 +108,8 @@ def exact_states(subject: Subject, run: LongRun) -> list[list[Any]]:
 
     sources = subject.sources
     assert sources.fixed is not None
-    assert sources.companions is not None
-    product = pipeline.program(choose(str(sources.companions.product)))
+    assert sources.attitude_step is not None
+    product = pipeline.program(choose(str(sources.attitude_step.product)))
     transition = subject.program.transition_program()
     units = [argument.unit for argument in sources.fixed.inputs]
     integers = noisy_integers(run)

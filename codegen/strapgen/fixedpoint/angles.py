@@ -78,7 +78,7 @@ def _octant(chain: Chain, height: str, width: str) -> tuple[str, str]:
     series = chain.polynomial("series", coefficients[1:], square)
     bend = chain.sum("bend", ((square, series), _ONE), ((), coefficients[0] - 1))
     angle = chain.sum(
-        "arctangent", ((tangent,), _ONE), ((tangent, bend), _ONE), within=reach, inexact=left_out
+        "arctangent", ((tangent,), _ONE), ((tangent, bend), _ONE), within=reach, approximation_error=left_out
     )
     return beyond, angle
 
@@ -86,7 +86,10 @@ def _octant(chain: Chain, height: str, width: str) -> tuple[str, str]:
 def _from(chain: Chain, part: Fraction, angle: str, sign: int) -> str:
     """Return an angle measured from a part of half a turn."""
     return chain.sum(
-        "angle", ((angle,), Fraction(sign)), ((), part * pi()), inexact=PI_ERROR if part else Fraction(0)
+        "angle",
+        ((angle,), Fraction(sign)),
+        ((), part * pi()),
+        approximation_error=PI_ERROR if part else Fraction(0),
     )
 
 
@@ -108,7 +111,9 @@ def wrap(chain: Chain, argument: str) -> None:
         (inside.lowest < -limit, -limit, angle, 1),
     ):
         if beyond:
-            other = chain.sum("turned", ((angle,), _ONE), ((), sign * 2 * pi()), inexact=2 * PI_ERROR)
+            other = chain.sum(
+                "turned", ((angle,), _ONE), ((), sign * 2 * pi()), approximation_error=2 * PI_ERROR
+            )
             cases += [left, right, other]
     if cases:
         value = chain.add("principal", ExactOperation("select", (*cases, angle)), within)
@@ -119,9 +124,9 @@ def _slopes(
     chain: Chain, ordinate: str, abscissa: str, known: Fraction, turns: bool
 ) -> list[tuple[str, Fraction | None]]:
     """Return bounds of the derivatives: the inverse distance from the origin, none across the cut."""
-    above, beside = chain.range(ordinate), chain.range(abscissa)
-    distances = [max(Fraction(0), inside.lowest, -inside.highest) for inside in (above, beside)]
+    above, exact_addends = chain.range(ordinate), chain.range(abscissa)
+    distances = [max(Fraction(0), inside.lowest, -inside.highest) for inside in (above, exact_addends)]
     distance = max(known, Interval.of(sum((d * d for d in distances), Fraction(0))).sqrt().lowest)
     slope = 1 / distance if distance else None
-    is_cut = turns and above.low < 0 and beside.low < 0
+    is_cut = turns and above.low < 0 and exact_addends.low < 0
     return [(ordinate, None if is_cut else slope), (abscissa, slope)]

@@ -50,8 +50,8 @@ class Chain:
         label: str,
         definition: Definition,
         enclosure: Interval,
-        inexact: Fraction = Fraction(0),
-        follows: ErrorPropagation | None = None,
+        approximation_error: Fraction = Fraction(0),
+        inherited_error: ErrorPropagation | None = None,
     ) -> str:
         """Make a quantity unless there is an equal one; without a label it is the function's value."""
         if label and definition in self.same:
@@ -64,7 +64,14 @@ class Chain:
                 name, count = self.free(f"{self.name}_{label}_{count}"), count + 1
             self.same[definition] = name
         self.links.append(
-            Quantity(name, definition, Fraction(0), enclosure, inexact=inexact, follows=follows)
+            Quantity(
+                name,
+                definition,
+                Fraction(0),
+                enclosure,
+                approximation_error=approximation_error,
+                inherited_error=inherited_error,
+            )
         )
         self.ranges[name] = enclosure
         return name
@@ -74,8 +81,8 @@ class Chain:
         label: str,
         *terms: tuple[Monomial, Fraction],
         within: Interval | None = None,
-        inexact: Fraction = Fraction(0),
-        follows: ErrorPropagation | None = None,
+        approximation_error: Fraction = Fraction(0),
+        inherited_error: ErrorPropagation | None = None,
     ) -> str:
         """Make a sum of products; `within` is a range that is known otherwise."""
         enclosure = Interval(0, 0)
@@ -89,13 +96,13 @@ class Chain:
                 square = monomial[0] == monomial[1]
                 product = ranges[0].square() if square else ranges[0] * ranges[1]
                 enclosure += product.scale(coefficient)
-        enclosure = enclosure.widened(inexact)
+        enclosure = enclosure.widened(approximation_error)
         return self.add(
             label,
             Sum(tuple((m, c) for m, c in terms if c)),
             enclosure if within is None else enclosure.meet(within),
-            inexact,
-            follows,
+            approximation_error,
+            inherited_error,
         )
 
     def selection(self, label: str, *cases: tuple[Operand, Operand, Operand], otherwise: Operand) -> str:
@@ -140,10 +147,10 @@ class Chain:
     def finish(self, value: str, *slopes: tuple[str, Fraction | None]) -> None:
         """Make the last quantity the function's value; `slopes` bound its derivatives by quantities taken as exact."""
         inside = self.range(value)
-        follows = ErrorPropagation(slopes, inside.highest - inside.lowest)
+        inherited_error = ErrorPropagation(slopes, inside.highest - inside.lowest)
         last = self.links[-1] if self.links else None
         if last is not None and last.name == value and isinstance(last.definition, Sum):
             del self.same[last.definition]
-            self.links[-1] = replace(last, name=self.name, follows=follows)
+            self.links[-1] = replace(last, name=self.name, inherited_error=inherited_error)
         else:  # one that is rounded to a word where a word is needed
-            self.sum("", ((value,), _ONE), follows=follows)
+            self.sum("", ((value,), _ONE), inherited_error=inherited_error)

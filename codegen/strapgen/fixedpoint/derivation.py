@@ -63,9 +63,13 @@ def _derived(
 def _add_truncation(context: DerivationContext) -> None:
     """Add the truncation error of the transition's series to its elements."""
     program = context.program
-    if program.transition is None or program.companions is None or program.companions.truncation is None:
+    if (
+        program.transition is None
+        or program.attitude_step is None
+        or program.attitude_step.truncation is None
+    ):
         return
-    truncation = program.companions.truncation
+    truncation = program.attitude_step.truncation
     square = context.items[truncation.square]
     left_out = truncation.bound((square.range + Interval.of(square.offset)).magnitude)
     if left_out is None:
@@ -73,7 +77,9 @@ def _add_truncation(context: DerivationContext) -> None:
     for name in context.quantities.results[program.transition.signal.name]:
         if isinstance(name, str):
             quantity = context.items[name]
-            context.items[name] = replace(quantity, inexact=quantity.inexact + up(left_out))
+            context.items[name] = replace(
+                quantity, approximation_error=quantity.approximation_error + up(left_out)
+            )
 
 
 def _context(program: Program, ranges: Mapping[str, Interval], split: bool, word: int) -> DerivationContext:
@@ -126,13 +132,13 @@ def _is_whole_word(quantity: Quantity) -> bool:
     match quantity.definition:
         case InputElement() | ExactOperation("select"):
             return False
-    return not quantity.offset and not quantity.beside
+    return not quantity.offset and not quantity.exact_addends
 
 
 def _drop_unused(known: Quantities) -> None:
     """Drop unused quantities: a function of a root may have been derived from its radicand."""
     results = (name for names in known.results.values() for name in names if isinstance(name, str))
-    needed = set(results) | {quantity.name for quantity in known.items.values() if quantity.guarded}
+    needed = set(results) | {quantity.name for quantity in known.items.values() if quantity.range_checked}
     for quantity in reversed(list(known.items.values())):
         if quantity.name in needed:
             needed.update(used_by(quantity))

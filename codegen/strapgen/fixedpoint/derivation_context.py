@@ -79,11 +79,15 @@ def stored_terms(context: DerivationContext, name: str) -> Terms:
     """Return a quantity, its offset included, as a sum of stored quantities."""
     quantity = context.items[name]
     definition = quantity.definition
-    if isinstance(definition, Sum) and not quantity.inexact and not any(m for m, _ in definition.terms):
+    if (
+        isinstance(definition, Sum)
+        and not quantity.approximation_error
+        and not any(m for m, _ in definition.terms)
+    ):
         constant = quantity.offset + sum((c for _, c in definition.terms), Fraction(0))
         return {(): constant} if constant else {}
     offset: Terms = {(): quantity.offset} if quantity.offset else {}
-    return offset | dict(quantity.beside) | {(name,): Fraction(1)}
+    return offset | dict(quantity.exact_addends) | {(name,): Fraction(1)}
 
 
 def samples(

@@ -131,7 +131,7 @@ def _result_fraction(
     carried = carried_input(program, inputs, signal) if is_output else None
     if carried is not None:
         return carried.format.fraction
-    if is_output and (signal.constraint or program.companions is not None):
+    if is_output and (signal.constraint or program.attitude_step is not None):
         return _attitude_fraction(settings, inputs, signal)
     names = [name for name in quantities.results[signal.name] if isinstance(name, str)]
     sizes = sorted(quantities.items[name].range.magnitude for name in names) or [Fraction(1)]

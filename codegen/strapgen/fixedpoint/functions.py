@@ -105,7 +105,7 @@ def _reduced(chain: Chain, angle: str) -> tuple[str, str]:
         ((count,), -coarse),
         ((count,), coarse - pi() / 2),
         within=Interval.symmetric(most),
-        inexact=chain.range(count).magnitude * PI_ERROR,
+        approximation_error=chain.range(count).magnitude * PI_ERROR,
     )
     if ends[0] >= -2 and ends[1] <= 1:
         return count, rest
@@ -125,7 +125,11 @@ def _wave_series(chain: Chain, first: int, angle: str, square: str) -> str:
     # The sine lies between 0 and its argument.
     ends = (max(-_ONE, min(inside.lowest, Fraction(0))), min(_ONE, max(inside.highest, Fraction(0))))
     return chain.sum(
-        "sine", ((angle,), _ONE), ((angle, bend), _ONE), within=Interval.of(*ends), inexact=left_out
+        "sine",
+        ((angle,), _ONE),
+        ((angle, bend), _ONE),
+        within=Interval.of(*ends),
+        approximation_error=left_out,
     )
 
 
@@ -140,7 +144,7 @@ def _even_series(
         ((square, bend), _ONE),
         ((), coefficients[0]),
         within=Interval.of(max(-_ONE, 1 + coefficients[1] * chain.range(square).highest), 1),
-        inexact=left_out,
+        approximation_error=left_out,
     )
 
 

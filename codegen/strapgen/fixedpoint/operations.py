@@ -78,7 +78,7 @@ def _square_root(context: DerivationContext, name: str, node: Operation, meaning
         root = Interval.of(argument).sqrt()
         lowest = Sum((((), root.lowest),))
         width = root.highest - root.lowest
-        context.items[name] = Quantity(name, lowest, Fraction(0), root, meaning, inexact=width)
+        context.items[name] = Quantity(name, lowest, Fraction(0), root, meaning, approximation_error=width)
         context.ranges.expanded[name] = None
         note_samples(context, name, lambda values: np.full(len(values[""]), float(root.lowest)))
         return
@@ -95,7 +95,7 @@ def _square_root(context: DerivationContext, name: str, node: Operation, meaning
 def _radicand(context: DerivationContext, node: Node, name: str) -> Operand:
     """Return a radicand; a sum of squares as squares of words, so that it is not below 0."""
     factors = _squared_names(context, node)
-    if not any(context.items[factor].beside or context.items[factor].offset for factor in factors):
+    if not any(context.items[factor].exact_addends or context.items[factor].offset for factor in factors):
         return operand_of(context, node, name)
     terms: Terms = {}
     for factor in factors:
@@ -221,7 +221,7 @@ def _distance_from_origin(context: DerivationContext, name: str, ordinate: str, 
     if least.low > 0:
         # Two vectors of length L or more, d apart, are up to 2 asin(d/2L) apart in angle. A value that is checked
         # has an error below half its smaller end, so that d < 3L/4, the angle below 9/8 d/L; else below pi/2 d/L.
-        part = Fraction(8, 9) if context.items[distance].guarded else Fraction(7, 11)
+        part = Fraction(8, 9) if context.items[distance].range_checked else Fraction(7, 11)
         return least.sqrt().lowest * part
     del context.items[distance]
     return Fraction(0)
@@ -256,7 +256,7 @@ def _check_range(context: DerivationContext, name: str) -> None:
     near = near if values[0] > 0 else -near
     tighter = quantity.range.meet(near)
     if low <= 0 <= high or (tighter.low > low and abs(low) < abs(tighter.low) // 2):
-        context.items[name] = replace(quantity, range=tighter, guarded=True)
+        context.items[name] = replace(quantity, range=tighter, range_checked=True)
 
 
 _OPERATIONS: dict[str, Callable[[DerivationContext, str, Operation, str], None]] = {

@@ -98,16 +98,18 @@ def store(
         spread = context.ranges.enclosure(rest.items()).magnitude
         if spread <= abs(constant) * _SMALL:
             offset = constant
-    beside: Terms = {}
+    exact_addends: Terms = {}
     if context.split and not whole and not (constant and not offset):
-        beside, rest = _split(context, rest)
+        exact_addends, rest = _split(context, rest)
     if constant and not offset:
         rest[()] = constant
     note_samples(context, name, lambda values: _evaluated(rest, values))
     seen = float(np.nan_to_num(np.abs(context.anywhere[name]), posinf=0).max()) or 1e-300
     enclosure = context.ranges.of_sum(name, rest, seen)
     definition = Sum(tuple(rest.items()))
-    context.items[name] = Quantity(name, definition, offset, enclosure, meaning, beside=tuple(beside.items()))
+    context.items[name] = Quantity(
+        name, definition, offset, enclosure, meaning, exact_addends=tuple(exact_addends.items())
+    )
 
 
 def stem(name: str) -> str:
@@ -153,7 +155,7 @@ def _is_exact(context: DerivationContext, name: str) -> bool:
     return (
         isinstance(definition, Sum)
         and not quantity.offset
-        and not quantity.beside
+        and not quantity.exact_addends
         and all(
             len(monomial) == 1
             and is_power_of_two(c)
@@ -183,8 +185,10 @@ def _factor(context: DerivationContext, terms: Terms, name: str) -> Terms:
         len(m) == 1 and is_power_of_two(terms[m]) for m in linear
     ):
         stored = [context.items[m[0]] for m in linear]
-        beside = {m for quantity in stored for m, _ in quantity.beside}
-        if len(linear) == 1 or (beside and all(m in beside or context.items[m[0]].beside for m in linear)):
+        exact_addends = {m for quantity in stored for m, _ in quantity.exact_addends}
+        if len(linear) == 1 or (
+            exact_addends and all(m in exact_addends or context.items[m[0]].exact_addends for m in linear)
+        ):
             return terms
     inner = free_name(context, f"{name}_factor")
     store(context, inner, terms)

@@ -73,12 +73,12 @@ class Quantity:
     offset: Fraction  # the constant that is not stored
     range: Interval  # proved range of the stored part
     meaning: str = ""  # the comment where a named stage of the algorithm begins; "" elsewhere
-    guarded: bool = False  # whether the range holds because it is checked when the code runs
+    range_checked: bool = False  # whether the range holds because it is checked when the code runs
     #: Exact words, each with a power of two: the quantity is the sum of its stored part, its offset and these.
-    beside: tuple[tuple[Monomial, Fraction], ...] = ()
+    exact_addends: tuple[tuple[Monomial, Fraction], ...] = ()
     #: Bound of the distance of the definition from the quantity: a truncated series, or a rounded irrational number.
-    inexact: Fraction = Fraction(0)
-    follows: ErrorPropagation | None = None
+    approximation_error: Fraction = Fraction(0)
+    inherited_error: ErrorPropagation | None = None
 
 
 @dataclass
@@ -94,14 +94,14 @@ class Quantities:
         quantity = self.items[name]
         shift = quantity.offset - number
         ends = (quantity.range.lowest + shift, quantity.range.highest + shift)
-        beside = (abs(c) * self.items[m[0]].range.magnitude for m, c in quantity.beside)
-        return max(map(abs, ends)) + sum(beside, Fraction(0))
+        exact_addends = (abs(c) * self.items[m[0]].range.magnitude for m, c in quantity.exact_addends)
+        return max(map(abs, ends)) + sum(exact_addends, Fraction(0))
 
     def factors(self) -> set[str]:
         """Return the quantities that must be words: factors of products, exact parts beside others, and arguments."""
         names: set[str] = set()
         for quantity in self.items.values():
-            names.update(monomial[0] for monomial, _ in quantity.beside)
+            names.update(monomial[0] for monomial, _ in quantity.exact_addends)
             match quantity.definition:
                 case Sum(terms):
                     for monomial, coefficient in terms:
@@ -134,9 +134,9 @@ def is_dyadic(value: Fraction) -> bool:
 
 def used_by(quantity: Quantity) -> list[str]:
     """Return the names that a quantity is made from."""
-    used: list[Operand] = [monomial[0] for monomial, _ in quantity.beside]
-    if quantity.follows is not None:
-        used += [name for name, _ in quantity.follows.slopes]
+    used: list[Operand] = [monomial[0] for monomial, _ in quantity.exact_addends]
+    if quantity.inherited_error is not None:
+        used += [name for name, _ in quantity.inherited_error.slopes]
     match quantity.definition:
         case Sum(terms):
             used += [name for monomial, _ in terms for name in monomial]

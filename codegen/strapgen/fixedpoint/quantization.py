@@ -40,7 +40,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     aligned = _fixed_program(shorter)
     if not _is_worse(aligned, fixed):
         context, fixed = shorter, aligned
-    if program.companions is None or program.transition is None:
+    if program.attitude_step is None or program.transition is None:
         return fixed
     (result,) = fixed.interface.outputs
     errors = step_errors(context, program.transition, result)
@@ -82,7 +82,7 @@ def _splits(program: Program, settings: Settings) -> bool:
 
     A rotation vector that is a word of its own is rounded before the transition, out of reach of the feedback.
     """
-    kernels = program.companions
+    kernels = program.attitude_step
     through_vector = kernels is not None and kernels.truncation is not None
     return settings.carry == "state" or (settings.carry == "full" and through_vector)
 
@@ -104,7 +104,7 @@ def _walked(
 
 def _is_unused_constant(context: Quantization, quantity: Quantity, total: Sum) -> bool:
     """Tell whether a sum is a constant that no word needs to hold, or is there already."""
-    exact = not quantity.offset and not quantity.inexact
+    exact = not quantity.offset and not quantity.approximation_error
     constant = exact and all(not monomial for monomial, _ in total.terms)
     unused = (not total.terms or constant) and quantity.name not in context.plan.words
     return unused or quantity.name in context.values

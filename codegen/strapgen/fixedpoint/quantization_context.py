@@ -80,13 +80,13 @@ def integer_value(
     bounds every partial sum.
     """
     unit = Fraction(2) ** fraction
-    local = up(error + quantity.inexact)
+    local = up(error + quantity.approximation_error)
     total = local + followed
     low, high = quantity.range.lowest, quantity.range.highest
-    if quantity.guarded and total > min(abs(low), abs(high)) * _LARGEST_PART:
+    if quantity.range_checked and total > min(abs(low), abs(high)) * _LARGEST_PART:
         _reset(context, quantity)
         total, limits = Fraction(0), (math.ceil(low * unit), math.floor(high * unit))
-    elif quantity.guarded:
+    elif quantity.range_checked:
         # What passes the check is so far inside that the exact value is in the range too.
         limits = (math.ceil((low + total) * unit), math.floor((high - total) * unit))
     else:
@@ -101,7 +101,7 @@ def integer_value(
         quantity.offset,
         total,
         peak,
-        quantity.guarded,
+        quantity.range_checked,
         quantity.meaning,
     )
 

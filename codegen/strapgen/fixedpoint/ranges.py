@@ -84,7 +84,11 @@ class Ranges:
     def _with_square(self, one: str, other: str) -> Interval | None:
         """Return the interval of a product whose first factor is a multiple of the second, by a square."""
         definition = self.items[one].definition
-        if not isinstance(definition, Sum) or len(definition.terms) != 1 or self.items[one].inexact:
+        if (
+            not isinstance(definition, Sum)
+            or len(definition.terms) != 1
+            or self.items[one].approximation_error
+        ):
             return None
         ((monomial, coefficient),) = definition.terms
         if len(monomial) != 2 or other not in monomial:

@@ -24,7 +24,7 @@ def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> Non
     """Lower a sum of products to a word, or to a wide number where no word is needed."""
     value = _lowered(context, quantity, definition)
     if (
-        quantity.guarded
+        quantity.range_checked
         and quantity.name not in context.resets
         and _note_squares(context, quantity, definition)
     ):
@@ -57,7 +57,7 @@ def _lowered(context: Quantization, quantity: Quantity, definition: Sum) -> Valu
 def _note_squares(context: Quantization, quantity: Quantity, definition: Sum) -> bool:
     """Note bounds of quantities where the sum of their squares has passed its check; False of other sums."""
     terms = dict(definition.terms)
-    room = quantity.range.highest + quantity.inexact - terms.pop((), Fraction(0))
+    room = quantity.range.highest + quantity.approximation_error - terms.pop((), Fraction(0))
     if not terms or any(len({*m}) != 1 or len(m) != 2 or c <= 0 for m, c in terms.items()):
         return False
     for (name, _), coefficient in terms.items():
@@ -73,7 +73,14 @@ def word_of(context: Quantization, name: str) -> str:
     rounded = f"{name}_word"
     if rounded not in context.values:
         exact = context.quantities.items[name]
-        quantity = replace(exact, name=rounded, meaning="", guarded=False, inexact=Fraction(0), follows=None)
+        quantity = replace(
+            exact,
+            name=rounded,
+            meaning="",
+            range_checked=False,
+            approximation_error=Fraction(0),
+            inherited_error=None,
+        )
         terms = [Placed(Term((name,), 1), wide.fraction, wide.error)]
         fraction = min(finest(exact.range.magnitude, context.word), wide.fraction)
         value = _rounded(context, quantity, terms, fraction)
@@ -267,7 +274,7 @@ def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
             f"format {Format(context.word, value.fraction)} of {quantity.name} does not hold its range "
             f"{inside.text()}{', less ' + str(quantity.offset) if quantity.offset else ''}"
         )
-    return replace(value, low=max(value.low, -limit), high=min(value.high, limit), guarded=True)
+    return replace(value, low=max(value.low, -limit), high=min(value.high, limit), range_checked=True)
 
 
 def _is_attitude(context: Quantization, name: str) -> bool:
@@ -290,7 +297,7 @@ def _known_limit(context: Quantization, name: str) -> Fraction | None:
             if result.signal.constraint:
                 return Fraction(1) + context.settings.allowance
             following = carried_input(program, inputs, result.signal)
-            if following is None and program.companions is not None:  # the state of the next step
+            if following is None and program.attitude_step is not None:  # the state of the next step
                 following = inputs[0]
             if following is not None:
                 return following.high * following.format.unit
@@ -299,7 +306,9 @@ def _known_limit(context: Quantization, name: str) -> Fraction | None:
 
 def _followed_error(context: Quantization, quantity: Quantity) -> Fraction:
     """Return the error inherited from quantities that were taken as exact on the way to this one."""
-    if quantity.follows is None:
+    if quantity.inherited_error is None:
         return Fraction(0)
-    errors = {name: context.values[word_of(context, name)].error for name, _ in quantity.follows.slopes}
-    return up(quantity.follows.bound(errors))
+    errors = {
+        name: context.values[word_of(context, name)].error for name, _ in quantity.inherited_error.slopes
+    }
+    return up(quantity.inherited_error.bound(errors))

@@ -40,7 +40,7 @@ class Truncation:
 
 
 @dataclass(frozen=True)
-class Companions:
+class AttitudeStep:
     """The kernels and properties of an attitude step that a back end needs in addition to the step itself.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 
-from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.attitude_step import AttitudeStep, Order
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.recursion import Recursion
 
@@ -26,7 +26,7 @@ class KernelInfo:
         ``strapgen redundancy FILE``, where another than ``strapgen generate`` generates it.
     notes : tuple of str
         Remarks for the reader of generated code: domain, conventions.
-    companions : Companions or None
+    attitude_step : AttitudeStep or None
         The kernels of an attitude step; None for every other kernel.
     order : Order or None
         Order of an attitude step.
@@ -40,7 +40,7 @@ class KernelInfo:
     _: KW_ONLY
     arguments: str = ""
     notes: tuple[str, ...] = ()
-    companions: Companions | None = None
+    attitude_step: AttitudeStep | None = None
     order: Order | None = None
     recursion: Recursion | None = None
 

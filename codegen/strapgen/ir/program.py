@@ -14,11 +14,12 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.once import once
 from strapgen.ir.recursion import Recursion
+from strapgen.ir.renamed import renamed
 from strapgen.ir.signals import Signal
 
 
@@ -138,6 +139,7 @@ class _Instructions(NamedTuple):
     results: list[tuple[str, list[int]]]
 
 
+@renamed(companions="attitude_step", own="bundled_programs")
 @dataclass(frozen=True)
 class Program:
     """Straight-line code for one kernel.
@@ -154,7 +156,7 @@ class Program:
         Outputs, with the node that holds each element.
     transition : Result or None
         For a step that is linear in the state, the part that depends on the increments alone.
-    own : tuple of Program
+    bundled_programs : tuple of Program
         Kernels that a user's step brings.
     name : str
         Name in generated code; by default the identifier of the kernel.
@@ -172,7 +174,7 @@ class Program:
     body: tuple[Assignment, ...]
     outputs: tuple[Result, ...]
     transition: Result | None = None
-    own: tuple[Program, ...] = ()
+    bundled_programs: tuple[Program, ...] = ()
     name: str = ""
     function: str = ""
 
@@ -225,9 +227,9 @@ class Program:
         return self.info.notes
 
     @property
-    def companions(self) -> Companions | None:
+    def attitude_step(self) -> AttitudeStep | None:
         """The kernels of an attitude step; None for every other program."""
-        return self.info.companions
+        return self.info.attitude_step
 
     @property
     def recursion(self) -> Recursion | None:
@@ -350,7 +352,9 @@ class Program:
         used = self.used([self.transition])
         return replace(
             self,
-            info=replace(self.info, title=f"{self.title}: its transition", companions=None, recursion=None),
+            info=replace(
+                self.info, title=f"{self.title}: its transition", attitude_step=None, recursion=None
+            ),
             inputs=tuple(s for s in self.inputs if used & set(s.elements)),
             body=tuple(a for a in self.body if a.name in used),
             outputs=(self.transition,),
@@ -385,7 +389,7 @@ class Program:
         names = tuple(name for name in order if name in needed)
         prepared = Signal("prepared", (len(names),), names, meaning="what depends on the other inputs alone")
         result = Result(prepared, tuple(map(Reference, names)))
-        part = replace(self, info=replace(self.info, companions=None), transition=None)
+        part = replace(self, info=replace(self.info, attitude_step=None), transition=None)
         return (
             replace(part, inputs=self.inputs[1:], body=tuple(ahead), outputs=(result,)),
             replace(part, inputs=(first, prepared), body=tuple(behind)),

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Self
 
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.recursion import Recursion
+from strapgen.ir.renamed import renamed
 from strapgen.ir.signals import Signal
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class Function:
     outputs: tuple[Signal, ...]
 
 
+@renamed(companions="attitude_step", own="bundled_programs")
 @dataclass(frozen=True)
 class Sources:
     """Generated source text and its interface.
@@ -48,7 +50,7 @@ class Sources:
         Intermediate values of one call.
     fixed : Interface or None
         Formats, ranges and error bounds of fixed-point code; None for every other target.
-    own : tuple of Program
+    bundled_programs : tuple of Program
         Programs of the kernels that a user's step brings.
     runs : tuple of str
         Names of the files that hold loops over samples and runs, which a host calls and firmware does not need.
@@ -63,7 +65,7 @@ class Sources:
     operations: dict[str, int]
     temporaries: int
     fixed: Interface | None = None
-    own: tuple[Program, ...] = ()
+    bundled_programs: tuple[Program, ...] = ()
     runs: tuple[str, ...] = ()
     rounding: RoundingBounds | None = None
 
@@ -98,9 +100,9 @@ class Sources:
         return self.info.name
 
     @property
-    def companions(self) -> Companions | None:
+    def attitude_step(self) -> AttitudeStep | None:
         """The kernels that go with an attitude step; None for every other kernel."""
-        return self.info.companions
+        return self.info.attitude_step
 
     @property
     def recursion(self) -> Recursion | None:

@@ -8,17 +8,18 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import counted_shape, notebook_latex, short_repr
 from strapgen.ir.program import RESOLUTION
+from strapgen.ir.renamed import current, renamed
 from strapgen.ir.signals import Signal
 from strapgen.kernel import unknown_values
 from strapgen.kernel.evaluation import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
-resolution = sp.Symbol(RESOLUTION, real=True)
+EPSILON = sp.Symbol(RESOLUTION, real=True)
 
 
 def symbols(signal: Signal) -> sp.Matrix:
@@ -70,13 +71,14 @@ def evaluate_stages(
     return known
 
 
+@renamed(companions="attitude_step", own="bundled_kernels")
 @dataclass(frozen=True)
 class Kernel(KernelInfo):
     """An algorithm as exact expressions. Its `KernelInfo` is the words and names that every stage passes on.
 
     Parameters
     ----------
-    name, title, source, arguments, notes, companions, order, recursion
+    name, title, source, arguments, notes, attitude_step, order, recursion
         See `KernelInfo`.
     inputs : tuple of Signal
         Inputs; their elements are the free symbols of the expressions.
@@ -86,21 +88,21 @@ class Kernel(KernelInfo):
         Intermediate quantities in order; later expressions may use their symbols.
     transition : str or None
         Name of the stage on which the state's update depends linearly, see `Program.transition`.
-    own : tuple of Kernel
-        Kernels that `companions` names and the catalogue does not have.
+    bundled_kernels : tuple of Kernel
+        Kernels that `attitude_step` names and the catalogue does not have.
     unknowns : tuple of str
         Names of the coefficients that are not known yet. Series and conditions are polynomials in them; no code can be
         generated before `substitute` has replaced all of them.
     previous, ahead : int
         Of a step of velocity and position, numbers of samples from before it and from after it that it takes in
-        addition; `companions` has those of an attitude step.
+        addition; `attitude_step` has those of an attitude step.
     """
 
     inputs: tuple[Signal, ...]
     outputs: tuple[Stage, ...]
     stages: tuple[Stage, ...] = ()
     transition: str | None = None
-    own: tuple[Kernel, ...] = ()
+    bundled_kernels: tuple[Kernel, ...] = ()
     unknowns: tuple[str, ...] = ()
     previous: int = 0
     ahead: int = 0
@@ -300,22 +302,23 @@ class KernelBuilder:
     def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
         """Return the kernel; `rest` are further fields of `Kernel`.
 
-        Of an attitude step, `previous` and `ahead` go into its companions, where its back ends read them.
+        Of an attitude step, `previous` and `ahead` go into its `attitude_step`, where its back ends read them.
 
         Raises
         ------
         InputError
-            If the companions state other numbers.
+            If its `attitude_step` states other numbers.
         """
-        step = rest.get("companions")
-        if isinstance(step, Companions):
+        rest = current(rest, {"companions": "attitude_step", "own": "bundled_kernels"})
+        step = rest.get("attitude_step")
+        if isinstance(step, AttitudeStep):
             stated = {what: rest.pop(what) for what in ("previous", "ahead") if rest.get(what)}
             for what, number in stated.items():
                 if getattr(step, what) not in (0, number):
                     raise InputError(
-                        f"kernel {name}: {what} is {number}, and {getattr(step, what)} in its companions"
+                        f"kernel {name}: {what} is {number}, and {getattr(step, what)} in its attitude_step"
                     )
-            rest["companions"] = replace(step, **stated)
+            rest["attitude_step"] = replace(step, **stated)
         stages, outputs = (
             tuple(Stage(s.signal, tuple(self._real(x) for x in s.expressions)) for s in stages)
             for stages in (self.stages, self.outputs)

@@ -45,7 +45,7 @@ def lower(kernel: Kernel) -> Program:
     program = min(programs, key=cost)
     if core is not None and program is not programs[0]:
         canonical.verify(core, program)
-    return replace(program, own=tuple(map(lower, kernel.own)))
+    return replace(program, bundled_programs=tuple(map(lower, kernel.bundled_kernels)))
 
 
 def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]:

@@ -106,7 +106,7 @@ def dossier(
         if fixed is not None or not TARGETS[name].fixed
     }
     runs = None
-    if choice.increments is not None and kernel.companions is not None:
+    if choice.increments is not None and kernel.attitude_step is not None:
         runs = _runs(choice, conditions or Conditions(), settings, backends)
     return AlgorithmDossier(choice, kernel, program, sources, fixed, reason, runs)
 

@@ -145,7 +145,7 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
 
 def interpreter(name: str, step: Program | None = None) -> Interpreter:
     """Return the interpreter of a kernel by name: one that a step brings, or of the catalogue."""
-    programs = () if step is None else step.own
+    programs = () if step is None else step.bundled_programs
     return Interpreter(next((one for one in programs if one.kernel == name), None) or _program(name))
 
 
@@ -182,7 +182,7 @@ def attitudes(backend: Backend, increments: Iterable[Sequence[Any]]) -> Iterator
     """
     step, convert = backend.evaluator, backend.attitude and backend.beside(backend.attitude)
     assert isinstance(step, ExactEvaluator), "doubles hold no further digits"
-    assert backend.sources.companions is not None, "a back end runs an attitude step"
-    state = [number(value) for value in backend.sources.companions.identity]
+    assert backend.sources.attitude_step is not None, "a back end runs an attitude step"
+    state = [number(value) for value in backend.sources.attitude_step.identity]
     for after in itertools.accumulate(increments, step.digits, initial=state):
         yield convert.digits(after) if isinstance(convert, ExactEvaluator) else after

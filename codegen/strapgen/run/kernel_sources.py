@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
@@ -26,7 +26,9 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
     """Return what a back end runs of a program: generated text where `target` is one, else the program itself."""
     if target in TARGETS:
         return pipeline.generate(program, target, settings)
-    return _ProgramSources.of(program, target, program.name, {}, own=program.own, program=program)
+    return _ProgramSources.of(
+        program, target, program.name, {}, bundled_programs=program.bundled_programs, program=program
+    )
 
 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
@@ -59,11 +61,11 @@ class StepSources:
         _ = self.step_kernels
 
     @property
-    def step_kernels(self) -> Companions:
+    def step_kernels(self) -> AttitudeStep:
         """Names of the step's kernels, and what else its sources tell of an attitude step."""
-        if self.step.companions is None:
+        if self.step.attitude_step is None:
             raise InputError(f"kernel {self.step.kernel} is no attitude step; back ends are built from steps")
-        return self.step.companions
+        return self.step.attitude_step
 
     @property
     def nodes(self) -> tuple[float, ...]:
@@ -93,7 +95,7 @@ class StepSources:
         settings = fixed.companion_settings if fixed else None
         if self.choice is not None:
             return sources_of_choice(self.choice.companion(kernel), target, settings)
-        for program in self.step.own:
+        for program in self.step.bundled_programs:
             if program.kernel == kernel:
                 return sources_of_program(program, target, settings)
         return sources_of_choice(Choice(kernel), target, settings)

@@ -91,8 +91,8 @@ class NumpyEvaluator(Evaluator):
         shape = self.function.inputs[0].shape
         history = np.empty((runs, 1 + steps // loop.record_every, *shape))
         history[:, 0] = state = loop.state.reshape(runs, *shape)
-        assert self.sources.companions is not None, "only an attitude step has a product"
-        identity = np.array([float(x) for x in self.sources.companions.identity])
+        assert self.sources.attitude_step is not None, "only an attitude step has a product"
+        identity = np.array([float(x) for x in self.sources.attitude_step.identity])
         scan = BlockedScan(self._transition, loop.product._product, identity)
         for first, length, segments in _spans(steps, loop.restore_every, max(1, _SPAN // max(runs, 1))):
             span = samples[:, first : first + length * segments]

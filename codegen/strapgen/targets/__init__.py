@@ -63,7 +63,7 @@ def emit(program: Program | FixedProgram, target: str) -> Sources:
     if isinstance(program, FixedProgram):
         _require_word(entry, program.word)
     plain = program.program if isinstance(program, FixedProgram) else program
-    return replace(registry.run(target, program), own=plain.own)
+    return replace(registry.run(target, program), bundled_programs=plain.bundled_programs)
 
 
 def _entry(name: str) -> Target:

@@ -106,9 +106,9 @@ def accumulation_text(accumulation: RoundingAccumulation, program: Program, stat
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
     """Return advice on normalizing the state of a step, before and after an error code; "" for another kernel."""
-    if program.companions is None or program.companions.orthonormalize is None:
+    if program.attitude_step is None or program.attitude_step.orthonormalize is None:
         return ""
-    kernel = program.companions.orthonormalize
+    kernel = program.attitude_step.orthonormalize
     command = f"strapgen generate {kernel} --target {target}"
     proper = "orthogonal with rows of length 1" if len(program.inputs[0].shape) == 2 else "of length 1"
     if interface is None:

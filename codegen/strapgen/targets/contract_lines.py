@@ -74,7 +74,7 @@ def of_fixed(fixed: FixedProgram, function: str, command: str, memory: Mapping[s
 
     requires = [("requires", between(argument)) for argument in interface.inputs]
     requires.append(("otherwise", "the call returns 1 and writes nothing"))
-    if any(value.guarded for value in fixed.body):
+    if any(value.range_checked for value in fixed.body):
         requires.append(
             ("otherwise", "the call returns 2 and writes nothing where a value leaves its limits")
         )

@@ -41,7 +41,7 @@ def of_fixed(fixed: FixedProgram, function: str, literal: Callable[..., str] | N
             result.append(Macro(f"{name}_FRACTION_BITS", fraction, f"{argument.format}", "int"))
         result.append(Macro(f"{name}_UNIT", _double(argument.unit), _unit(argument), "double"))
         result += _limits(name, argument, literal)
-    step = fixed.program.companions
+    step = fixed.program.attitude_step
     if step is not None:
         state = interface.inputs[0].format
         words = ", ".join(literal(state.nearest(x), bits) for x in step.identity)
@@ -56,7 +56,7 @@ def of_fixed(fixed: FixedProgram, function: str, literal: Callable[..., str] | N
 
 def of_program(program: Program, function: str, printer: Printer) -> list[Macro]:
     """Return the definitions of floating-point code."""
-    step, head = program.companions, function.upper()
+    step, head = program.attitude_step, function.upper()
     if step is None:
         return []
     numbers = ", ".join(printer.constant(x) for x in step.identity)

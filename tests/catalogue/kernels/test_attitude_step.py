@@ -198,7 +198,7 @@ def test_a_step_says_the_command_that_makes_it(chosen, name, arguments):
     kernel = catalogue.derive(choice)
     assert choice.kernel == kernel.name == name
     assert kernel.arguments == arguments
-    assert kernel.companions.previous == choice.previous == (chosen[4] if len(chosen) > 4 else 0)
+    assert kernel.attitude_step.previous == choice.previous == (chosen[4] if len(chosen) > 4 else 0)
 
 
 def test_a_step_by_a_tableau_of_a_file_says_the_command_that_makes_it(tmp_path):

@@ -118,7 +118,7 @@ def test_states_are_handed_on(name):
     samples = inputs.keys() - set(kernel.recursion.inputs.values())
     coning = name == "coning-fast"
     assert samples == ({"increment"} if coning else {"increment", "velocity_increment"})
-    assert kernel.recursion.kept == (("previous_increment",) if coning else ())
+    assert kernel.recursion.retained == (("previous_increment",) if coning else ())
 
 
 # Drift, by running the recursions
@@ -140,7 +140,7 @@ def run(loop, samples, kept, slow_cycles):
     state = {name: np.zeros(3) for name, _ in recursion.states} | kept
     ends = []
     for cycle in range(slow_cycles):
-        state = state | {name: np.zeros(3) for name in recursion.begun_anew}
+        state = state | {name: np.zeros(3) for name in recursion.reset}
         for k in range(TURNS):
             now = {name: values[cycle * TURNS + k] for name, values in samples.items()}
             result = loop(*(state[name] if name in state else now[name] for name in names))

@@ -131,10 +131,10 @@ def test_the_step_is_the_product_with_the_step_of_the_identity(algorithm, method
     step, result = kernel(algorithm, method), polynomials(algorithm, method)
     ring = result[0].ring
     x, d = split(algorithm, list(ring.gens), 2)
-    identity = step.companions.identity
+    identity = step.attitude_step.identity
     names = [name for signal in step.inputs for name in signal.elements]
     transition = step.expand(dict(zip(names, [*map(ring, identity), *d.flat], strict=True)))["next"]
-    product = derive(step.companions.product)
+    product = derive(step.attitude_step.product)
     elements = [name for signal in product.inputs for name in signal.elements]
     assert product.expand(dict(zip(elements, [*x.flat, *transition], strict=True)))["next"] == result
 
@@ -200,7 +200,7 @@ def test_the_transition_is_a_stage_of_the_kernel(algorithm, method):
     step = kernel(algorithm, method)
     assert step.transition in [stage.signal.name for stage in step.stages]
     assert step.name == f"{algorithm}-{method}-2"
-    assert step.companions.attitude == (None if algorithm == "dcm" else f"dcm-from-{algorithm}")
+    assert step.attitude_step.attitude == (None if algorithm == "dcm" else f"dcm-from-{algorithm}")
 
 
 @ALGORITHM
@@ -244,7 +244,7 @@ def test_a_step_with_irrational_coefficients_has_its_order():
     x = sp.Symbol("x")
     kernel = step(KINEMATICS["euler"], method(TABLEAUX["cooper-verner8"]), 1)
     state, increments = kernel.inputs
-    values = dict(zip(state.elements, kernel.companions.identity, strict=True))
+    values = dict(zip(state.elements, kernel.attitude_step.identity, strict=True))
     values |= dict(zip(increments.elements, (x, sp.Integer(0), sp.Integer(0)), strict=True))
     result = [sp.expand(element) for element in kernel.expand(values)["next"]]
     exponential = sum((sp.I * x / 2) ** k / sp.factorial(k) for k in range(9))

@@ -58,7 +58,7 @@ def test_every_order_of_the_list_is_its_series(name):
     kernel = derive("euler", name, 1)
     ring, x = sp.ring("x", sp.QQ)
     state, samples = kernel.inputs
-    values = dict(zip(state.elements, map(ring, kernel.companions.identity), strict=True))
+    values = dict(zip(state.elements, map(ring, kernel.attitude_step.identity), strict=True))
     values |= dict(zip(samples.elements, (x, ring(0), ring(0)), strict=True))
     result = [ring(element) for element in kernel.expand(values)["next"]]
     assert result[1] == result[2] == 0

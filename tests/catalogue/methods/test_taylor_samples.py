@@ -91,7 +91,7 @@ def test_the_series_from_the_middle_converges_where_that_from_the_beginning_does
 )
 def test_a_transition_is_a_rotation_whatever_the_increments_are(algorithm, order, count, previous):
     kernel, random = derive(algorithm, f"taylor{order}", count, previous=previous), Random(1969)
-    assert kernel.companions.isometry
+    assert kernel.attitude_step.isometry
     with mpmath.workdps(60):
         for size in (10**-4, 1, 5):
             samples = [mpmath.mpf(random.randint(-999, 999)) * size / 1000 for _ in kernel.inputs[1].elements]
@@ -113,8 +113,8 @@ def test_time_reversed_takes_the_step_back(algorithm, order, count):
 
 
 def test_a_series_on_two_samples_is_no_rotation():
-    assert not derive("euler", "taylor4", 2).companions.isometry
-    assert not derive("euler", "taylor4", 1, previous=1).companions.isometry
+    assert not derive("euler", "taylor4", 2).attitude_step.isometry
+    assert not derive("euler", "taylor4", 1, previous=1).attitude_step.isometry
 
 
 def test_a_series_that_leaves_out_part_of_the_rate_is_refused():

@@ -117,7 +117,7 @@ def test_operations_of_combined_coning_coefficients_counted_alike():
 
 @pytest.mark.parametrize(("algorithm", "scale"), [("euler", 2), ("cayley-klein", 2), ("dcm", 1)])
 def test_the_series_leaves_out_no_more_than_is_stated(algorithm, scale):
-    truncation = derive(algorithm, "window-3-3").companions.truncation
+    truncation = derive(algorithm, "window-3-3").attitude_step.truncation
     assert truncation.scale == Fraction(1, scale)
     with mpmath.workdps(60):
         for angle in ("0.01", "0.25", "1", "3"):

@@ -7,7 +7,7 @@ import pytest
 import strapgen
 from strapgen import InputError
 
-STEP = """from strapgen import EULER, Companions, KernelBuilder, Order, Signal, algebra, increments_signal
+STEP = """from strapgen import EULER, AttitudeStep, KernelBuilder, Order, Signal, algebra, increments_signal
 import sympy as sp
 
 
@@ -24,7 +24,7 @@ def algorithm():
     build.output(EULER.next, algebra.quaternion_product(state, p))
     return build.kernel(
         "one-and-one", "Coning from the increment before", "none", transition=EULER.transition.name,
-        companions=Companions("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1){companions}),
+        attitude_step=AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1){companions}),
         order=Order(4, 4, 2, 4){declared},
     )
 """
@@ -39,7 +39,7 @@ def drift(tmp_path, **texts: object) -> float:
 
 def test_previous_increments_that_are_declared_are_taken(tmp_path):
     declared = drift(tmp_path, declared=", previous=1")
-    assert declared == drift(tmp_path, companions=", previous=1") < 1e-6
+    assert declared == drift(tmp_path, attitude_step=", previous=1") < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_previous_increments_that_are_declared_are_taken(tmp_path):
         ({}, "its increments say, the first 1 are those before the step, and it declares previous=0"),
         (
             {"declared": ", previous=1", "companions": ", previous=2"},
-            "previous is 1, and 2 in its companions",
+            "previous is 1, and 2 in its attitude_step",
         ),
     ],
 )

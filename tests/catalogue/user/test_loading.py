@@ -62,7 +62,7 @@ def strapgen_says(capsys: pytest.CaptureFixture[str]):
 def test_a_file_is_an_algorithm(folder):
     kernel = strapgen.derive("mrp.py")
     assert kernel.name == "mrp-rk4-2"
-    assert [made.name for made in kernel.own] == ["dcm-from-mrp"]
+    assert [made.name for made in kernel.bundled_kernels] == ["dcm-from-mrp"]
     assert kernel.arguments == "mrp.py"
 
 
@@ -148,7 +148,7 @@ def test_what_a_file_says_now_counts(folder):
 STEP = """
 from fractions import Fraction
 import sympy as sp
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage
 from strapgen.ir.signals import Signal
 
@@ -158,7 +158,7 @@ def algorithm():
     d = build.input(Signal("increments", (1, 3), ("d_x", "d_y", "d_z"), unit="rad"))
     twice = build.stage(Signal.vector("twice", "v", meaning="twice the increment"), 2 * d)
     build.output(Signal.matrix("next", "next"), state * (1 + twice[0]))
-    return build.kernel("mine", "Mine", "this test", companions=Companions(None, None, None, (Fraction(0),) * 9))
+    return build.kernel("mine", "Mine", "this test", attitude_step=AttitudeStep(None, None, None, (Fraction(0),) * 9))
 """
 FROM_INCREMENTS = STEP[STEP.index('Signal("increments"') :]
 
@@ -196,7 +196,11 @@ WRONG = {
         "return 3, build.kernel(",
         "algorithm() returned tuple; a Kernel is needed",
     ),
-    "companions": (", companions=Companions", "); (Companions", "kernel mine: it has no companions"),
+    "no attitude step": (
+        ", attitude_step=AttitudeStep",
+        "); (AttitudeStep",
+        "kernel mine: it has no attitude_step",
+    ),
     "name": ('kernel("mine"', 'kernel("My step"', "kernel 'My step' has no name for generated code"),
     "empty name": ('kernel("mine"', 'kernel(""', "kernel '' has no name for generated code"),
     "taken name": ('kernel("mine"', 'kernel("euler-product"', "kernel euler-product is in the catalogue"),
@@ -278,7 +282,7 @@ WRONG = {
         ",) * 9, nodes=(0,))",
         "takes increments and has nodes; nodes go with turns",
     ),
-    "no nodes": ('Signal("increments"', 'Signal("turns"', "its companions need as many different nodes"),
+    "no nodes": ('Signal("increments"', 'Signal("turns"', "its attitude_step needs as many different nodes"),
     "a decimal node": (
         FROM_INCREMENTS,
         FROM_INCREMENTS.replace('"increments"', '"turns"').replace(",) * 9)", ",) * 9, nodes=(0.5,))"),
@@ -298,11 +302,15 @@ WRONG = {
         "isometry 'x' is no truth value",
     ),
     "no companions": (
-        "companions=Companions(",
-        "companions=dict(x=1) or Companions(",
-        "strapgen.Companions is needed",
+        "attitude_step=AttitudeStep(",
+        "attitude_step=dict(x=1) or AttitudeStep(",
+        "strapgen.AttitudeStep is needed",
     ),
-    "product": ("Companions(None,", 'Companions("dcm-product",', "a product and a transition go together"),
+    "product": (
+        "AttitudeStep(None,",
+        'AttitudeStep("dcm-product",',
+        "a product and a transition go together",
+    ),
     "companion": (
         "(None, None, None,",
         '(None, "mend", None,',

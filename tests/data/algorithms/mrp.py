@@ -7,7 +7,7 @@ import sympy as sp
 from strapgen.catalogue.methods.runge_kutta import advance
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.signals import Signal
 from strapgen.kernel import rotations
 from strapgen.kernel.kernel import KernelBuilder
@@ -45,6 +45,6 @@ def algorithm(method=TABLEAUX["rk4"], increments=2, previous=0):
         f"mrp-{method.name}-{increments}" + (f"-previous{previous}" if previous else ""),
         f"Modified Rodrigues parameters: step by {method.title}",
         SOURCE,
-        companions=Companions(None, None, "dcm-from-mrp", (Fraction(0),) * 3, previous),
-        own=(attitude(),),
+        attitude_step=AttitudeStep(None, None, "dcm-from-mrp", (Fraction(0),) * 3, previous),
+        bundled_kernels=(attitude(),),
     )

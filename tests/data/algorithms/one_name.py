@@ -16,8 +16,8 @@ def algorithm(method=TABLEAUX["rk4"], increments=2, previous=0):
     return replace(
         kernel,
         name="mine",
-        companions=replace(kernel.companions, orthonormalize="mend", attitude="matrix-from-mine"),
-        own=(
+        attitude_step=replace(kernel.attitude_step, orthonormalize="mend", attitude="matrix-from-mine"),
+        bundled_kernels=(
             replace(derive(Choice(scheme)), name="mend"),
             replace(derive(Choice("dcm-from-euler")), name="matrix-from-mine"),
         ),

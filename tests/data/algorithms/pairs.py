@@ -1,6 +1,6 @@
 """Euler parameters from increments and their cross products, with an unknown coefficient for each pair or distance."""
 
-from strapgen import EULER, Companions, KernelBuilder, Signal, algebra, increments_signal
+from strapgen import EULER, AttitudeStep, KernelBuilder, Signal, algebra, increments_signal
 
 
 def algorithm(increments=2, previous=0):
@@ -22,7 +22,7 @@ def algorithm(increments=2, previous=0):
         "Euler parameters from cross products of increments",
         "this test",
         transition=EULER.transition.name,
-        companions=Companions(
+        attitude_step=AttitudeStep(
             "euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1), previous, isometry=True
         ),
     )

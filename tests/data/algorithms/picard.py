@@ -4,7 +4,7 @@ from fractions import Fraction
 
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.kernel.rotations import cross
@@ -28,7 +28,7 @@ def algorithm():
         "Euler parameters: rotation vector of two increments",
         "this test",
         transition="transition",
-        companions=Companions(
+        attitude_step=AttitudeStep(
             "euler-product", "euler-normalize", "dcm-from-euler", tuple(map(Fraction, (0, 0, 0, 1)))
         ),
     )

@@ -174,7 +174,7 @@ def test_a_step_rounds_its_transition_and_its_product_by_nearly_their_bounds(nam
             assert worst <= float(error) * 1.001
             assert float(error) <= 4 * worst
     # Ranges are those of intervals, in which an increment may differ from itself.
-    for away, one, other in zip(bounds.step.away, exact, code.companions.identity, strict=True):
+    for away, one, other in zip(bounds.step.away, exact, code.attitude_step.identity, strict=True):
         distance = float(np.abs(one - one.dtype.type(other)).max())
         assert distance <= float(away) <= 2.5 * distance
 
@@ -209,7 +209,7 @@ def test_the_error_of_a_step_is_that_of_its_product_and_what_its_transition_make
 
 def test_a_transition_that_calls_functions_stretches_by_no_more_than_its_distance_from_the_identity():
     code = strapgen.lower(strapgen.derive("euler", method="magnus2", increments=1))
-    code = replace(code, info=replace(code.info, companions=replace(code.companions, isometry=False)))
+    code = replace(code, info=replace(code.info, attitude_step=replace(code.attitude_step, isometry=False)))
     zero, away = (Fraction(0),) * 4, tuple(map(Fraction, (0, 3, 4, 0)))
     limits = {s.name: size for s, size in zip(code.inputs, LARGEST.values(), strict=True)}
     growth = _accumulation(code, limits, StepRounding(zero, zero, away), zero).growth
@@ -220,7 +220,7 @@ def adversarial_run(code, number: str, steps: int, rng: np.random.Generator) -> 
     """Return the error after every step when of 64 increments those are taken that make it longest."""
     state, samples = code.inputs[0], code.inputs[1]
     width = state.shape[-1]
-    near = np.array([float(x) for x in code.companions.identity])
+    near = np.array([float(x) for x in code.attitude_step.identity])
     exact = near.astype(np.longdouble)
     lengths = []
     for _ in range(steps):

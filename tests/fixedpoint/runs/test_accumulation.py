@@ -114,11 +114,11 @@ def test_roots_functions_and_what_stands_beside_move_too():
     items = {
         "a": quantity("a", InputElement("x")),
         "b": quantity("b", InputElement("z")),
-        "double": quantity("double", Sum(((("a",), 2 * one),)), beside=((("a",), -one / 2),)),
+        "double": quantity("double", Sum(((("a",), 2 * one),)), exact_addends=((("a",), -one / 2),)),
         # The root moves most from zero: to the root of what its argument moves by.
         "root": quantity("root", ExactOperation("sqrt", ("a",)), 0),
-        "function": quantity("function", Sum(()), follows=slopes),
-        "steep": quantity("steep", Sum(()), follows=replace(slopes, most=one / 8)),
+        "function": quantity("function", Sum(()), inherited_error=slopes),
+        "steep": quantity("steep", Sum(()), inherited_error=replace(slopes, most=one / 8)),
     }
     moves = _moves(Quantities(items), {"x": one / 16})
     expected = {"a": 1 / 16, "b": 0, "double": 5 / 32, "root": 1 / 4, "function": 3 / 16, "steep": 1 / 8}
@@ -134,7 +134,9 @@ def test_a_transition_is_as_far_from_the_identity_as_its_offset_and_what_is_stor
     }
     context = SimpleNamespace(
         quantities=Quantities(items, {"transition": ("t_x", "t_s", Fraction(1, 3))}),
-        program=SimpleNamespace(companions=SimpleNamespace(identity=(Fraction(0), Fraction(1), Fraction(0)))),
+        program=SimpleNamespace(
+            attitude_step=SimpleNamespace(identity=(Fraction(0), Fraction(1), Fraction(0)))
+        ),
     )
     result = SimpleNamespace(signal=SimpleNamespace(name="transition"))
     assert _away(context, result) == (Fraction(1, 4), Fraction(5, 16), Fraction(1, 3))
@@ -176,7 +178,7 @@ def planar(carry: str = "full"):
     state = Signal("state", (2,), ("s_1", "s_2"), bound=1)
     one = Interval.symmetric(Fraction(LENGTH) / Fraction(math.sqrt(2)))
     items = {name: Quantity(name, InputElement("state"), Fraction(0), one) for name in state.elements}
-    program = SimpleNamespace(inputs=(state,), companions=SimpleNamespace(isometry=True))
+    program = SimpleNamespace(inputs=(state,), attitude_step=SimpleNamespace(isometry=True))
     settings = SimpleNamespace(carry=carry)
     return SimpleNamespace(quantities=Quantities(items), program=program, settings=settings)
 

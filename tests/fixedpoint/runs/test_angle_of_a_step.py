@@ -295,9 +295,9 @@ def test_dual_rows_have_room_for_what_steps_take_between_them():
 @pytest.mark.parametrize("rounding", [HALF, Fraction(1)])
 def test_sizes_are_lengths_of_all_elements_and_feedback_is_told_from_its_middle(rounding):
     state = Signal("state", (2, 2), tuple("abcd"), bound=1)
-    companions = SimpleNamespace(isometry=True)
+    attitude_step = SimpleNamespace(isometry=True)
     context = SimpleNamespace(
-        program=SimpleNamespace(inputs=(state,), companions=companions),
+        program=SimpleNamespace(inputs=(state,), attitude_step=attitude_step),
         settings=SimpleNamespace(allowance=Fraction(1, 16), carry="full"),
         quantities=None,
         rounding_error=rounding,

@@ -9,7 +9,7 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.signals import Signal
 from strapgen.kernel import rotations
 from strapgen.kernel.kernel import Kernel, KernelBuilder
@@ -30,8 +30,8 @@ def two_sample(stage: str, prefix: str, transition: tuple[str, ...], increments:
         [*(phi * (sp.Rational(1, 2) - rotations.dot(phi, phi) / 48)), 1 - rotations.dot(phi, phi) / 8],
     )
     build.output(EULER.next, rotations.quaternion_product(state, p))
-    companions = Companions("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1))
-    return build.kernel("two-sample", "Two samples", "this test", transition="p", companions=companions)
+    attitude_step = AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1))
+    return build.kernel("two-sample", "Two samples", "this test", transition="p", attitude_step=attitude_step)
 
 
 @pytest.mark.parametrize(

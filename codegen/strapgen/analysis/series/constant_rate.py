@@ -152,7 +152,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
     x**4/64 + 1
     """
     attitude_step = one_step.linear_step(choice)
-    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
+    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.attitude_step
     assert step_kernels is not None, "checked by `linear_step`"
     state, samples = kernel.inputs
     share = 1 if attitude_step.nodes is not None else samples.shape[0] - step_kernels.beside

@@ -219,7 +219,7 @@ def _about_an_axis(compiled: dict[int, Callable[..., Matrix]], settings: list[An
 def _orthonormalization(choice: Choice) -> Callable[[Matrix], Matrix]:
     """Return the function that orthonormalizes a computed matrix, by the scheme of the algorithm."""
     kernel = pipeline.derive(choice)
-    step_kernels = kernel.companions
+    step_kernels = kernel.attitude_step
     assert step_kernels is not None, "checked by error_rate"
     if step_kernels.orthonormalize is None:
         return lambda computed: computed

@@ -91,7 +91,7 @@ def sculling(
     True
     """
     if not _takes_velocities(systems.checked(kernel)):
-        if kernel.recursion is not None and kernel.companions is None:
+        if kernel.recursion is not None and kernel.attitude_step is None:
             raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
         return _dual(drift(kernel, nodes=nodes, previous=previous, ahead=ahead))
     system = systems.of(kernel, "m/s", nodes, previous, ahead)
@@ -208,7 +208,7 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
 
 def _of(choice: Choice, quantity: str) -> Assessment:
     kernel = pipeline.derive(choice)
-    if quantity == "sculling" and kernel.companions is not None:
+    if quantity == "sculling" and kernel.attitude_step is not None:
         return _dual(of(choice))
     assess = {"drift": drift, "sculling": sculling}[quantity]
     return assess(kernel, nodes=catalogue.nodes(choice), previous=choice.previous, ahead=choice.ahead)

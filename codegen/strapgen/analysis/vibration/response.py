@@ -116,7 +116,7 @@ def _motions(
                 total = total.summed()
             waves[channel] = total
         constant = {}
-        if name in system.begun_anew:
+        if name in system.reset:
             constant = {channel: wave.scaled(-one) for channel, wave in waves.items()}
         motions[name] = _Motion(waves, constant)
     for i, name in enumerate(states):  # a constant part must not change within a slow cycle

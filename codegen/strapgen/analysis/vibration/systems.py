@@ -51,7 +51,7 @@ class System:
     #: Every element of the states after a call as a function of the elements before it and of the samples
     following: dict[str, Expansion]
     #: Elements that are reset to zero in every slow cycle; may be empty
-    begun_anew: frozenset[str]
+    reset: frozenset[str]
     #: The response of every element of the samples to every channel
     samples: dict[str, dict[str, Wave]]
     #: The time from call to call as a shift
@@ -85,7 +85,7 @@ def of(
             f"kernel {kernel.name} takes no samples of a vibration; allowed: {', '.join(NAMES)}, or a kernel of your "
             "own that takes angle increments"
         )
-    if kernel.companions is not None:
+    if kernel.attitude_step is not None:
         return _of_step(kernel, sampled, nodes)
     if kernel.recursion is not None:
         return _of_recursion(kernel, sampled, unit)
@@ -107,16 +107,16 @@ def checked(kernel: Any) -> Kernel:
 
 
 def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction | sp.Expr]) -> System:
-    assert kernel.companions is not None
-    name = kernel.companions.attitude
+    assert kernel.attitude_step is not None
+    name = kernel.attitude_step.attitude
     attitude = None if name is None else catalogue.companion(kernel, name)
     expander = Expander([kernel] if attitude is None else [kernel, attitude])
     state, output = kernel.inputs[0], kernel.outputs[-1].signal
     initial = {
         element: expander.variable(element, exact(value))
-        for element, value in zip(state.elements, kernel.companions.identity, strict=True)
+        for element, value in zip(state.elements, kernel.attitude_step.identity, strict=True)
     }
-    beside = kernel.companions.previous, kernel.companions.ahead
+    beside = kernel.attitude_step.previous, kernel.attitude_step.ahead
     samples, times, cycle = _waves(expander, kernel, sampled, beside, nodes)
     following = expander(kernel, initial | _variables(expander, samples))[output.name]
     if attitude is None:
@@ -128,7 +128,7 @@ def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction
         kernel=kernel,
         domain=expander.domain,
         following=_states_after(kernel, expander, initial, dict(zip(state.elements, following, strict=True))),
-        begun_anew=frozenset(),
+        reset=frozenset(),
         samples=samples,
         cycle=cycle,
         slow_cycle=None,
@@ -196,7 +196,7 @@ def _of_vector(
         kernel=kernel,
         domain=expander.domain,
         following=_states_after(kernel, expander, initial, following),
-        begun_anew=frozenset(),
+        reset=frozenset(),
         samples=samples,
         cycle=cycle,
         slow_cycle=None,
@@ -240,12 +240,12 @@ def _of_recursion(kernel: Kernel, sampled: Sequence[Signal], unit: str) -> Syste
             f"kernel {kernel.name} has {len(summed) or 'no'} states in {unit} that sum products of samples; "
             "one is needed"
         )
-    anew = frozenset(element for name in kernel.recursion.begun_anew for element in inputs[name].elements)
+    anew = frozenset(element for name in kernel.recursion.reset for element in inputs[name].elements)
     return System(
         kernel=kernel,
         domain=expander.domain,
         following=_states_after(kernel, expander, initial, following),
-        begun_anew=anew,
+        reset=anew,
         samples={
             name: {channel: _with_end(wave) for channel, wave in waves.items()}
             for name, waves in samples.items()

@@ -11,7 +11,7 @@ import sympy as sp
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import Companions, Order, Truncation
+from strapgen.ir.attitude_step import AttitudeStep, Order, Truncation
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.kernel.rotations import dot
@@ -40,7 +40,7 @@ def step(
         f"{kinematics.title}: step by {method.title} from {source}",
         f"{kinematics.source}; {extracted}{method.title}: {method.source}",
         transition=kinematics.transition.name,
-        companions=Companions(
+        attitude_step=AttitudeStep(
             f"{kinematics.name}-product",
             kinematics.orthonormalize,
             kinematics.attitude,

@@ -146,7 +146,7 @@ def euler_from_dcm_followed(rule: str) -> Kernel:
         f"euler-from-dcm-{name}",
         f"Euler parameters from a direction cosine matrix, {words}",
         f"{SAVAGE}, equation (18){'' if rule == 'element' else ', its sign by the scalar product'}",
-        recursion=Recursion((("previous", converted.name),), kept=("previous",)),
+        recursion=Recursion((("previous", converted.name),), retained=("previous",)),
         notes=(f"The sign is continuous for turns of less than {note} degrees from call to call.",),
     )
 

@@ -11,7 +11,7 @@ from strapgen.catalogue.kinematics import DCM, SAVAGE
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import ANY, Signal
 from strapgen.kernel.evaluation import Direction, Wrapped
-from strapgen.kernel.kernel import Kernel, KernelBuilder, resolution
+from strapgen.kernel.kernel import EPSILON, Kernel, KernelBuilder
 
 ANGLES = Signal(
     "angles",
@@ -53,7 +53,7 @@ def followed_angles(
     """Name roll, pitch and heading of a rotation in rad, equations (61) to (63); a vertical pitch keeps `before`."""
     square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, f"square of the cosine of {names[1]}")
     pitch = build.value(f"next_{names[1]}", sp.atan2(-C[2, 0], sp.sqrt(square)), names[1])
-    vertical = (_VERTICAL * resolution) ** 2
+    vertical = (_VERTICAL * EPSILON) ** 2
     roll = build.value(
         f"next_{names[0]}",
         sp.Piecewise((before, square <= vertical), (sp.atan2(C[2, 1], C[2, 2]), True)),
@@ -104,7 +104,7 @@ def euler_angles_from_dcm() -> Kernel:
         "euler-angles-from-dcm",
         "Euler angles from a direction cosine matrix",
         f"{SAVAGE}, equations (61) to (63), the root of (61) of C11^2 + C21^2",
-        recursion=Recursion((("previous", "next"),), kept=("previous",)),
+        recursion=Recursion((("previous", "next"),), retained=("previous",)),
         notes=(
             "Heading - roll at pitch up, heading + roll at pitch down, are as good as the matrix at every pitch.",
             "Errors of angles are told without whole turns.",

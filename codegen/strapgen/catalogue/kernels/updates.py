@@ -79,7 +79,9 @@ def update(name: str, order: int | None = None) -> Kernel:
         f"{kinematics.title}: update by a rotation vector{words}",
         source,
         transition=kinematics.transition.name,
-        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+        recursion=Recursion(
+            ((kinematics.state.name, kinematics.next.name),), retained=(kinematics.state.name,)
+        ),
         notes=notes,
     )
 
@@ -103,7 +105,9 @@ def navigation_update(name: str, order: int | None = None) -> Kernel:
         f"{name}-navigation-update" + (f"-{order}" if order else ""),
         f"{kinematics.title}: update by the rotation of the navigation frame{words}",
         source,
-        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+        recursion=Recursion(
+            ((kinematics.state.name, kinematics.next.name),), retained=(kinematics.state.name,)
+        ),
         notes=notes,
     )
 
@@ -125,6 +129,6 @@ def navigation_rotation() -> Kernel:
         f"{SAVAGE}, equation (27)",
         recursion=Recursion(
             tuple((signal.name, after(signal).name) for signal in (NAVIGATION_ROTATION, PREVIOUS_TURN)),
-            kept=(PREVIOUS_TURN.name,),
+            retained=(PREVIOUS_TURN.name,),
         ),
     )

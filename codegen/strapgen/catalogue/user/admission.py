@@ -13,7 +13,7 @@ from strapgen.catalogue.derivation import companion as derived_companion
 from strapgen.catalogue.methods.samples import beside
 from strapgen.catalogue.names import reserved
 from strapgen.ir import checks
-from strapgen.ir.attitude_step import Companions, Order
+from strapgen.ir.attitude_step import AttitudeStep, Order
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import RESOLUTION
 from strapgen.kernel import reading
@@ -40,9 +40,9 @@ ALLOWED = (
 
 def require(kernel: Kernel) -> None:
     """Check the kernel of a user's step and the kernels that come with it; raise InputError that names the fault."""
-    names = [each.name for each in (kernel, *kernel.own)]
+    names = [each.name for each in (kernel, *kernel.bundled_kernels)]
     _require_unknowns(kernel)
-    for each in (kernel, *kernel.own):
+    for each in (kernel, *kernel.bundled_kernels):
         _require_names(each)
         _require_functions(each, {*reserved(), *names})
         _require_texts(each)
@@ -97,7 +97,7 @@ def _require_names(kernel: Kernel) -> None:
 def _require_unknowns(kernel: Kernel) -> None:
     """Check the names of the unknowns: text that holds them must be read again as it was meant."""
     elements = {element for signal in kernel.signals for element in signal.elements} | {RESOLUTION}
-    if any(each.unknowns for each in kernel.own):
+    if any(each.unknowns for each in kernel.bundled_kernels):
         _refuse(kernel, "a kernel that comes with it holds unknowns; the step alone may")
     for name in kernel.unknowns:
         if not (name.isascii() and name.isidentifier()) or keyword.iskeyword(name):
@@ -195,8 +195,8 @@ def _require_changes(kernel: Kernel) -> None:
         names = ", ".join(signal.name for signal in outputs) or "nothing"
         _refuse(kernel, f"it returns {names}; {' and '.join(CHANGES)}, (3,) each, or one of them, are needed")
     _require_beside(kernel, kernel.previous, kernel.ahead, shapes[0][0])
-    if kernel.companions is not None:
-        _refuse(kernel, "a step of velocity and position has no companions")
+    if kernel.attitude_step is not None:
+        _refuse(kernel, "a step of velocity and position has no attitude_step")
 
 
 def _require_beside(kernel: Kernel, previous: int, ahead: int, samples: int) -> None:
@@ -211,7 +211,7 @@ def _require_beside(kernel: Kernel, previous: int, ahead: int, samples: int) -> 
 _BESIDE = re.compile(r"; the (?:first|last) \d+ are those (?:before|after) the step")
 
 
-def _require_samples(kernel: Kernel, step: Companions) -> None:
+def _require_samples(kernel: Kernel, step: AttitudeStep) -> None:
     names = [signal.name for signal in kernel.inputs]
     shape: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
     if names not in (["state", "increments"], ["state", "turns"]) or len(shape) != 2 or shape[1] != 3:
@@ -235,7 +235,9 @@ def _require_samples(kernel: Kernel, step: Companions) -> None:
     if not all(isinstance(node, (int, Fraction)) for node in step.nodes):
         _refuse(kernel, f"its nodes are {step.nodes!r}; whole numbers and fractions.Fraction are needed")
     if len(step.nodes) != shape[0] or len(set(step.nodes)) != shape[0]:
-        _refuse(kernel, f"it takes rates at {shape[0]} nodes; its companions need as many different nodes")
+        _refuse(
+            kernel, f"it takes rates at {shape[0]} nodes; its attitude_step needs as many different nodes"
+        )
     if step.beside:
         _refuse(kernel, "it takes rates; previous and ahead go with increments")
 
@@ -244,12 +246,12 @@ def _require_step(kernel: Kernel) -> None:
     if kernel.takes_velocity:
         _require_changes(kernel)
         return
-    step = kernel.companions
+    step = kernel.attitude_step
     if step is None:
-        _refuse(kernel, "it has no companions; an attitude step needs them")
+        _refuse(kernel, "it has no attitude_step, the companions of an attitude step")
         return
-    if not isinstance(step, Companions):
-        _refuse(kernel, f"its companions are {step!r}; strapgen.Companions is needed")
+    if not isinstance(step, AttitudeStep):
+        _refuse(kernel, f"its attitude_step is {step!r}; strapgen.AttitudeStep is needed")
     if not isinstance(step.isometry, bool):
         _refuse(kernel, f"isometry {step.isometry!r} is no truth value")
     if kernel.order is not None and not isinstance(kernel.order, Order):
@@ -278,7 +280,7 @@ def _require_step(kernel: Kernel) -> None:
 
 
 def _companions(kernel: Kernel) -> list[tuple[str, str]]:
-    step = kernel.companions
+    step = kernel.attitude_step
     if step is None:  # a step of velocity and position
         return []
     roles = ("product", "orthonormalize", "attitude")

@@ -104,7 +104,7 @@ def _of_rotation(filters: LateFilters, interface: Interface) -> Settings:
 
 def _truncation(step: Choice) -> Truncation:
     """Return what the series of the rotation of a step leaves out."""
-    kernels = pipeline.program(step).companions
+    kernels = pipeline.program(step).attitude_step
     assert kernels is not None
     assert kernels.truncation is not None, "the rotation is a series"
     return kernels.truncation

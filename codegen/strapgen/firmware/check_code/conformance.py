@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapgen import fixedpoint, pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir.attitude_step import Companions
+from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
@@ -143,11 +143,11 @@ class _Precise:
         return exact.states(self.program, rows, [exact.number(x) for x in self.identity])
 
 
-def _step_kernels(program: Program) -> Companions:
+def _step_kernels(program: Program) -> AttitudeStep:
     """Return the kernels of an attitude step."""
-    if program.companions is None:
+    if program.attitude_step is None:
         raise InputError(f"kernel {program.kernel} is no attitude step")
-    return program.companions
+    return program.attitude_step
 
 
 def _samples(program: Program) -> int:

@@ -39,7 +39,7 @@ def project_files(
     command += " --project"
     tests = table_files(table)
     motion: dict[str, str] = {}
-    steps = sources.companions is not None and sources.function.inputs[-1].name == "increments"
+    steps = sources.attitude_step is not None and sources.function.inputs[-1].name == "increments"
     kernel = _conversion(sources)
     if steps and kernel is not None:
         conversion = StepSources(sources, choice).sources(kernel, "c") if kernel else None
@@ -53,10 +53,10 @@ def project_files(
 
 def _conversion(sources: Sources) -> str | None:
     """Return the kernel that turns a step's state into a matrix, "" where it is one; None where nothing does."""
-    if sources.companions is None:
+    if sources.attitude_step is None:
         return None
-    if sources.companions.attitude is not None:
-        return sources.companions.attitude
+    if sources.attitude_step.attitude is not None:
+        return sources.attitude_step.attitude
     return "" if sources.function.inputs[0].constraint == "rotation" else None
 
 
@@ -81,9 +81,9 @@ def motion_files(kernels: Iterable[str], others: Iterable[Sources]) -> dict[str,
 
 def coning_run(sources: Sources, conversion: str) -> MotionRun:
     """Return a run of a step on coning whose increments lie well inside the range of its input."""
-    assert sources.companions is not None
+    assert sources.attitude_step is not None
     signal = sources.function.inputs[-1]
-    samples = signal.size // 3 - sources.companions.beside
+    samples = signal.size // 3 - sources.attitude_step.beside
     largest, step = LARGEST, _STEP
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]

@@ -55,14 +55,14 @@ def cmake(sources: Sources, command: str, motion: Sequence[str], tests: Sequence
 
 def step_main(sources: Sources, command: str, run: MotionRun) -> str:
     """Return a main program that runs an attitude step on coning and prints the attitude and its error."""
-    assert sources.companions is not None
-    beside = sources.companions
+    assert sources.attitude_step is not None
+    beside = sources.attitude_step
     return render(
         "project_c/main_step.c.j2",
         samples=sources.function.inputs[-1].size // 3 - beside.beside,
         previous=beside.previous,
         ahead=beside.ahead,
-        **_values(sources, command, run, sources.companions.identity),
+        **_values(sources, command, run, sources.attitude_step.identity),
         **_formats(sources),
     )
 

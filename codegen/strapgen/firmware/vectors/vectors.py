@@ -239,8 +239,8 @@ def _tolerant(
 
 def _rest(sources: Sources, signal: Signal) -> list[float]:
     """Return what stands for no motion: the identity of an attitude, zeros for all else."""
-    if sources.companions is not None and signal == sources.function.inputs[0]:
-        return [float(element) for element in sources.companions.identity]
+    if sources.attitude_step is not None and signal == sources.function.inputs[0]:
+        return [float(element) for element in sources.attitude_step.identity]
     if signal.constraint == "rotation":
         return [float(place % 4 == 0) for place in range(signal.size)]
     if signal.constraint == "unit":

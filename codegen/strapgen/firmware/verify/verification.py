@@ -138,7 +138,7 @@ def verify(
 def file_backend(file: Path, request: Request, *, run_differing: bool = False) -> Backend:
     """Return a file as a back end; parameters and errors are those of `verify`."""
     sources, here = _read(file, request)
-    if sources.companions is None:
+    if sources.attitude_step is None:
         raise InputError(f"{file} is the kernel {sources.kernel}, which is no attitude step")
     differences = list(_differences(file.parent, here, sources))
     if differences and not run_differing:
@@ -334,8 +334,8 @@ def _inside(row: CallVector, sources: Sources) -> bool:
 
 def _identity(sources: Sources) -> list[int]:
     """Return the integers of the state of zero rotation."""
-    assert sources.fixed is not None and sources.companions is not None
-    return [sources.fixed.inputs[0].format.nearest(x) for x in sources.companions.identity]
+    assert sources.fixed is not None and sources.attitude_step is not None
+    return [sources.fixed.inputs[0].format.nearest(x) for x in sources.attitude_step.identity]
 
 
 def _cone(interface: Interface) -> Array | None:

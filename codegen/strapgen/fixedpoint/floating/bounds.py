@@ -166,9 +166,9 @@ def _has_numpy() -> bool:
 
 def _left_out(program: Program, analysis: _Analysis) -> Fraction | None:
     """Return a bound of the truncation error of the transition's series; None where it is not known."""
-    if program.companions is None or program.companions.truncation is None:
+    if program.attitude_step is None or program.attitude_step.truncation is None:
         return Fraction(0)
-    truncation = program.companions.truncation
+    truncation = program.attitude_step.truncation
     left_out = truncation.bound(analysis.ranges[analysis.expressions.names[truncation.square]].magnitude)
     return None if left_out is None else up(left_out)
 
@@ -187,12 +187,12 @@ def _library_functions(program: Program) -> tuple[str, ...]:
 def _step_rounding(program: Program, analysis: _Analysis, added: Sequence[Fraction]) -> StepRounding | None:
     """Return the errors that a call of an attitude step adds to a run; None for other kernels."""
     transition = program.transition
-    if program.companions is None or transition is None or len(program.outputs) > 1:
+    if program.attitude_step is None or transition is None or len(program.outputs) > 1:
         return None
     places = analysis.expressions.results[transition.signal.name]
     away = (
         (analysis.ranges[place] - Interval.of(one)).magnitude
-        for place, one in zip(places, program.companions.identity, strict=True)
+        for place, one in zip(places, program.attitude_step.identity, strict=True)
     )
     return StepRounding(
         _errors(analysis.moves(program.outputs[0], held=places), added),

@@ -90,7 +90,7 @@ def accumulation(context: Quantization, transition: Result, errors: StepErrors) 
 def stretch(context: Quantization, transition: Result, width: int) -> Interval | None:
     """Return bounds of the squared singular values, less 1, of a transition with rows of `width`; None if unknown."""
     program, quantities = context.program, context.quantities
-    if program.companions is not None and program.companions.isometry:
+    if program.attitude_step is not None and program.attitude_step.isometry:
         return Interval.of(0)
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     sizes = tuple(quantities.items[name].range.magnitude for name in inputs)
@@ -102,7 +102,7 @@ def stretch(context: Quantization, transition: Result, width: int) -> Interval |
 
 def _away(context: Quantization, transition: Result) -> tuple[Fraction, ...]:
     """Return a bound of the distance of every element of the transition from that of the identity."""
-    quantities, kernels = context.quantities, context.program.companions
+    quantities, kernels = context.quantities, context.program.attitude_step
     identity = kernels.identity if kernels is not None else ()
     distances = []
     for place, element in enumerate(quantities.results[transition.signal.name]):
@@ -152,15 +152,15 @@ def _moves(quantities: Quantities, by: Mapping[str, Fraction]) -> dict[str, Frac
                 moves[name] = by.get(signal, Fraction(0))
             case Sum() as total:
                 moves[name] = _sum_move(total, quantities, moves)
-                moves[name] += sum(abs(c) * moves[m[0]] for m, c in quantity.beside)
+                moves[name] += sum(abs(c) * moves[m[0]] for m, c in quantity.exact_addends)
             case ExactOperation("computed" | "nearest"):
                 moves[name] = Fraction(0)  # within a function, whose slope tells what becomes of it
             case ExactOperation("sqrt", (str(argument),)):
                 moves[name] = root(moves[argument])
             case _:
                 return None
-        if quantity.follows is not None:
-            moves[name] += quantity.follows.bound(moves)
+        if quantity.inherited_error is not None:
+            moves[name] += quantity.inherited_error.bound(moves)
     return moves
 
 
@@ -190,7 +190,7 @@ def transition_growth(
     program: Program, transition: Result, sizes: tuple[Fraction, ...], width: int, coarse: Fraction
 ) -> Fraction:
     """Return an upper bound of the norm of any transition: `coarse` if it calls functions."""
-    if program.companions is not None and program.companions.isometry:
+    if program.attitude_step is not None and program.attitude_step.isometry:
         return Fraction(1)
     try:
         return root(1 + _proved_stretch(program, transition, sizes, width).highest)

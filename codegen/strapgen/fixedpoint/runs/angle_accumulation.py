@@ -326,7 +326,7 @@ def _products(program: Program, transition: Result) -> list[Polynomial] | None:
 
 def _leaves_states_alone(program: Program, terms: list[Polynomial]) -> bool:
     """Tell whether every term is a product of state and transition, and the identity returns the state."""
-    kernels = program.companions
+    kernels = program.attitude_step
     if kernels is None or any([name[0] for name in key] != ["s", "t"] for term in terms for key in term):
         return False
     for k, term in enumerate(terms):

@@ -75,7 +75,7 @@ def _weights(
     quantity = quantities.items[name]
     if isinstance(quantity.definition, InputElement):
         return {places[name]: Fraction(1)} if name in places else {}
-    if not isinstance(quantity.definition, Sum) or quantity.offset or quantity.beside:
+    if not isinstance(quantity.definition, Sum) or quantity.offset or quantity.exact_addends:
         return {}
     terms = quantity.definition.terms
     if any(len(m) != 1 or m[0] not in places or not is_power_of_two(c) for m, c in terms):

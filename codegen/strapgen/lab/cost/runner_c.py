@@ -51,7 +51,7 @@ class CallRun:
     def pairs(self) -> list[tuple[Signal, Signal]]:
         """The inputs that an output of the call before becomes, with that output."""
         function = self.sources.function
-        if self.sources.companions is not None:
+        if self.sources.attitude_step is not None:
             return [(function.inputs[0], function.outputs[0])]
         if self.sources.recursion is None:
             return []
@@ -112,9 +112,9 @@ class LongRun:
     def identity(self) -> list[int]:
         """Zero rotation as the integers of the state."""
         assert self.sources.fixed is not None
-        assert self.sources.companions is not None
+        assert self.sources.attitude_step is not None
         state = self.sources.fixed.inputs[0].format
-        return [state.nearest(element) for element in self.sources.companions.identity]
+        return [state.nearest(element) for element in self.sources.attitude_step.identity]
 
 
 def long_run_files(run: LongRun) -> dict[str, str]:

@@ -34,7 +34,7 @@ def step_of_increments(choice: Choice) -> Kernel:
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
-    if kernel.companions is None or kernel.inputs[1].name != "increments":
+    if kernel.attitude_step is None or kernel.inputs[1].name != "increments":
         raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")
     return kernel
 

@@ -46,13 +46,13 @@ class Step:
     @property
     def increments_per_step(self) -> int:
         """Number of increments of the step itself."""
-        beside = self.kernel.companions.beside if self.kernel.companions else 0
+        beside = self.kernel.attitude_step.beside if self.kernel.attitude_step else 0
         return int(self.kernel.inputs[1].shape[0]) - beside
 
     @property
     def intervals(self) -> range:
         """Numbers of the sampling intervals that it takes: 0 is the first of the step, -1 the one before it."""
-        step_kernels = self.kernel.companions
+        step_kernels = self.kernel.attitude_step
         assert step_kernels is not None, "checked by `step`"
         return range(-step_kernels.previous, self.increments_per_step + step_kernels.ahead)
 
@@ -82,7 +82,7 @@ def step(choice: Choice) -> Step:
     if not isinstance(choice, Choice):
         raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
-    if kernel.companions is None:
+    if kernel.attitude_step is None:
         raise InputError(f"kernel {kernel.name} is no attitude step")
     nodes = None if kernel.inputs[1].name == "increments" else catalogue.nodes(choice)
     rounded = kernel.order is not None and bool(catalogue.rounding(choice))
@@ -192,7 +192,7 @@ def computed_state(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list
 
 def state_of(attitude_step: Step, sampled: Sequence[Powers], ring: Any, top: int) -> list[Powers]:
     """Return the state after one step from zero rotation, row by row, for samples that are series."""
-    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
+    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.attitude_step
     assert step_kernels is not None, "checked by `step`"
     state, samples = kernel.inputs
     values: dict[str, Any] = {
@@ -213,7 +213,7 @@ def computed_matrix(attitude_step: Step, ring: Any, rate: Rate, top: int) -> lis
 
 def matrix_of(attitude_step: Step, elements: list[Powers], ring: Any, top: int) -> list[Powers]:
     """Return the direction cosine matrix of a state, row by row."""
-    step_kernels = attitude_step.kernel.companions
+    step_kernels = attitude_step.kernel.attitude_step
     if step_kernels is None or step_kernels.attitude is None:
         return elements
     attitude = catalogue.companion(attitude_step.kernel, step_kernels.attitude)

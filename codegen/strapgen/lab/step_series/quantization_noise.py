@@ -135,7 +135,7 @@ def extraction_noise(increments: int, node: sp.Expr, previous: int = 0, ahead: i
 
 def _rotation(attitude_step: Step) -> tuple[list[sp.Expr], list[tuple[sp.Symbol, ...]]]:
     """Return the rotation vector of a step to the second power, and the increments in whose symbols it is."""
-    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.companions
+    kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.attitude_step
     assert step_kernels is not None, "checked by `step`"
     state, samples = kernel.inputs
     ring = sp.ring(list(samples.elements), attitude_step.domain)[0]

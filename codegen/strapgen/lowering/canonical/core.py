@@ -92,7 +92,7 @@ def extract(kernel: Kernel) -> Core:
         raise NotCovariantError(f"the transition of {kernel.name} is always the same")
     whole = None
     if len(kernel.inputs) == 2 and kernel.inputs[1].name == "increments":
-        previous = kernel.companions.previous if kernel.companions else 0
+        previous = kernel.attitude_step.previous if kernel.attitude_step else 0
         whole = tuple(Fraction(int(k >= previous)) for k in range(len(inputs)))
     return Core(list(inputs), vectors, stages, whole)
 

@@ -123,5 +123,5 @@ def late_latitude() -> Kernel:
         "late-latitude",
         "Attitude corrected for a latitude that is entered late",
         DERIVED,
-        recursion=Recursion((("state", "next_state"),), kept=("state",)),
+        recursion=Recursion((("state", "next_state"),), retained=("state",)),
     )

@@ -146,5 +146,7 @@ def navigation_turn(ahead: bool = False) -> Kernel:
         "navigation-turn-ahead",
         f"{title}, extrapolated",
         DERIVED,
-        recursion=Recursion(((PREVIOUS_RATE.name, after(PREVIOUS_RATE).name),), kept=(PREVIOUS_RATE.name,)),
+        recursion=Recursion(
+            ((PREVIOUS_RATE.name, after(PREVIOUS_RATE).name),), retained=(PREVIOUS_RATE.name,)
+        ),
     )

@@ -39,7 +39,7 @@ def geographic_angles() -> Kernel:
         "geographic-angles",
         "Latitude, longitude and wander angle of a position",
         DERIVED,
-        recursion=Recursion((("previous", "next"),), kept=("previous",)),
+        recursion=Recursion((("previous", "next"),), retained=("previous",)),
         notes=(
             "At a pole only longitude and wander angle together are determined; the wander angle is held there.",
             "Errors of angles are told without whole turns.",

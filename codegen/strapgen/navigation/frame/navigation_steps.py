@@ -127,5 +127,5 @@ def height_step() -> Kernel:
 def _recursion(*states: Signal) -> Recursion:
     """Return the recursion of states that no slower loop resets."""
     return Recursion(
-        tuple((signal.name, after(signal).name) for signal in states), kept=tuple(s.name for s in states)
+        tuple((signal.name, after(signal).name) for signal in states), retained=tuple(s.name for s in states)
     )

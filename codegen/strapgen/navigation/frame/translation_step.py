@@ -49,6 +49,6 @@ def translation(name: str) -> Kernel:
         f"derived: the integrals of {SAVAGE}, equations (44) and (57)",
         recursion=Recursion(
             ((VELOCITY.name, after(VELOCITY).name), (DISPLACEMENT.name, after(DISPLACEMENT).name)),
-            kept=(VELOCITY.name, DISPLACEMENT.name),
+            retained=(VELOCITY.name, DISPLACEMENT.name),
         ),
     )

@@ -26,7 +26,7 @@ ROWS = tuple(
     for name, number, axis in (("row_1", "first", "x"), ("row_2", "second", "y"))
 )
 _RECURSION = Recursion(
-    tuple((row.name, after(row).name) for row in ROWS), kept=tuple(row.name for row in ROWS)
+    tuple((row.name, after(row).name) for row in ROWS), retained=tuple(row.name for row in ROWS)
 )
 _TITLE = "Two rows of the direction cosine matrix"
 

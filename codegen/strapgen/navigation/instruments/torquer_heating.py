@@ -78,7 +78,7 @@ def scale_factor_heating(errors: bool = False) -> Kernel:
         "torquer-heating-errors" if errors else "scale-factor-heating",
         "Gyros whose torquers heat up" if errors else "Scale factors of gyros whose torquers heat up",
         f"{MICHELIN}, (6.2), (6.6) and (6.7), printed; recursion on the deviation derived",
-        recursion=Recursion(((DEVIATION.name, after(DEVIATION).name),), kept=(DEVIATION.name,)),
+        recursion=Recursion(((DEVIATION.name, after(DEVIATION).name),), retained=(DEVIATION.name,)),
         notes=(
             "The scale factor is 1 + deviation at the start of the cycle.",
             "(6.8) and (6.9) are the solution for one constant rate and no recursion: they never decay.",

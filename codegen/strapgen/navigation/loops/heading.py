@@ -44,7 +44,7 @@ def heading_loop() -> Kernel:
         LTR81,
         recursion=Recursion(
             ((HEADING_BIAS.name, after(HEADING_BIAS).name),),
-            kept=(HEADING_BIAS.name,),
+            retained=(HEADING_BIAS.name,),
         ),
         notes=(
             "Forward Euler: poles at -1/tau become 1 - T/tau, and a steady state stays exactly the same.",

@@ -86,4 +86,4 @@ def erection() -> Kernel:
 
 def _recursion(names: tuple[str, ...]) -> Recursion:
     """Return the recursion of states that no slower loop resets."""
-    return Recursion(tuple((name, f"next_{name}") for name in names), kept=names)
+    return Recursion(tuple((name, f"next_{name}") for name in names), retained=names)

@@ -49,7 +49,7 @@ def vertical_loop() -> Kernel:
         "vertical-loop",
         "Vertical loop of third order",
         LTR81,
-        recursion=Recursion(tuple((name, f"next_{name}") for name in names), kept=names),
+        recursion=Recursion(tuple((name, f"next_{name}") for name in names), retained=names),
         notes=(
             "Forward Euler: poles at -1/tau become 1 - T/tau, and a steady state stays exactly the same.",
             "With k3 = 0 the loop is of second order, and holds its bias.",

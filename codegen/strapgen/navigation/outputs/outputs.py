@@ -94,7 +94,7 @@ def butterworth() -> Kernel:
         f"type printed in {FENNER}; digital form derived: bilinear, prewarped, as integrators",
         recursion=Recursion(
             tuple((state.name, after(state).name) for state in (FIRST, SECOND)),
-            kept=(FIRST.name, SECOND.name),
+            retained=(FIRST.name, SECOND.name),
         ),
         notes=(
             "For rates and accelerations that are shown or control; never in the way of attitude or velocity.",

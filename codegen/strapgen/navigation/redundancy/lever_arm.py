@@ -71,7 +71,7 @@ def moment_arm() -> Kernel:
         "moment-arm",
         "Velocity increment at the end of a moment arm",
         f"{SEBRING}, arm printed, equations lost and derived",
-        recursion=Recursion(((PREVIOUS.name, after(PREVIOUS).name),), kept=(PREVIOUS.name,)),
+        recursion=Recursion(((PREVIOUS.name, after(PREVIOUS).name),), retained=(PREVIOUS.name,)),
         notes=("The rate of change is the difference of two cycles, and so that of half a cycle before.",),
     )
 
@@ -107,5 +107,5 @@ def boresight() -> Kernel:
         "boresight",
         "Mean relative attitude of two units",
         f"{SEBRING}, printed; running mean derived",
-        recursion=Recursion(((mean.name, after(mean).name),), kept=(mean.name,)),
+        recursion=Recursion(((mean.name, after(mean).name),), retained=(mean.name,)),
     )

@@ -159,7 +159,7 @@ def parity_rest(sensors: SensorSet = HEXAD_SET) -> Kernel:
         "Parity without its mean at rest",
         _source("mean", sensors),
         arguments=sensors.command,
-        recursion=Recursion(((bias.name, after(bias).name),), kept=(bias.name,)),
+        recursion=Recursion(((bias.name, after(bias).name),), retained=(bias.name,)),
     )
 
 

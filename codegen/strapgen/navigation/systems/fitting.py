@@ -245,7 +245,9 @@ class _Fit:
         """Return the error feedback of a stage: in full it is that of all that goes on, sums and increments too."""
         carry = stage.carry or self.settings.carry
         return (
-            "all" if carry == "full" and self.description.programs[stage.name].companions is None else carry
+            "all"
+            if carry == "full" and self.description.programs[stage.name].attitude_step is None
+            else carry
         )
 
     def _signals(self, stage: SystemStage) -> tuple[Signal, ...]:

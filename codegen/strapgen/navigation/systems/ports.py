@@ -47,7 +47,7 @@ class Ports:
         """The output that each state becomes, by the name of the input."""
         if self.program.recursion is not None:
             return dict(self.program.recursion.states)
-        if self.program.companions is not None:
+        if self.program.attitude_step is not None:
             return {self.program.inputs[0].name: self.program.outputs[0].signal.name}
         return {}
 
@@ -55,7 +55,7 @@ class Ports:
     def sums(self) -> tuple[str, ...]:
         """States that are cleared when a slower stage has taken them."""
         recursion = self.program.recursion
-        return () if recursion is None else recursion.begun_anew
+        return () if recursion is None else recursion.reset
 
     def state_of(self, signal: str) -> str | None:
         """Return the state that a name stands for: its own, or that of the output that it becomes."""
@@ -65,7 +65,7 @@ class Ports:
 
     def start(self, signal: Signal) -> tuple[Fraction, ...]:
         """Return what a signal is before the first cycle if the file does not say so: no rotation, or zero."""
-        step = self.program.companions
+        step = self.program.attitude_step
         if step is not None and signal.name == self.program.inputs[0].name:
             return step.identity
         if signal.identity is not None:

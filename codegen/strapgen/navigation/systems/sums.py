@@ -31,7 +31,7 @@ def summed(program: Program) -> dict[str, str]:
     """
     signals = {signal.name: signal for signal in program.inputs}
     values = {assignment.name: assignment.value for assignment in program.body}
-    cleared = () if program.recursion is None else program.recursion.begun_anew
+    cleared = () if program.recursion is None else program.recursion.reset
     result = {}
     for state, elements in _next_elements(program).items():
         sums = {_added(values.get(element)) for element in elements}

@@ -47,7 +47,7 @@ def check_order(stages: Sequence[Ports]) -> None:
                 f"stage {stage.name}: every {stage.text.every} is no multiple of the {before.text.every} "
                 f"of {before.name}; rates divide"
             )
-    if stages[0].text.every != 1 and stages[0].program.companions is None:
+    if stages[0].text.every != 1 and stages[0].program.attitude_step is None:
         raise InputError(
             f"stage {stages[0].name}: every is {stages[0].text.every}; the fastest stage has 1, unless it "
             "collects samples"
@@ -104,7 +104,7 @@ def check_initial(stage: Ports, name: str, signal: Signal, initial: Sequence[Fra
 def check_rates(where: str, stage: Ports, signal: Signal, source: Source, samples: int) -> None:
     """Check that what changes over a cycle passes between stages of one rate."""
     here, there = stage.text.every, source.every
-    step = stage.program.companions
+    step = stage.program.attitude_step
     if samples and step is not None:
         due = there * (samples - step.beside)
         if here != due:

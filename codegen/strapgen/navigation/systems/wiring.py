@@ -304,7 +304,7 @@ class _Wiring:
 
     def _samples(self, stage: Ports, signal: Signal, source: Source) -> int:
         """Return how many samples of its source an input collects; 0 if it takes one."""
-        if len(signal.shape) == 2 and stage.program.companions is not None:
+        if len(signal.shape) == 2 and stage.program.attitude_step is not None:
             return signal.shape[0]
         return 0
 

@@ -54,7 +54,7 @@ def pulse_torque() -> Kernel:
         "pulse-torque",
         "Control law of a pulse torquing loop",
         _SOURCE,
-        recursion=Recursion(tuple((name, f"next_{name}") for name in names), kept=names),
+        recursion=Recursion(tuple((name, f"next_{name}") for name in names), retained=names),
         notes=(
             "The torquer has a limit of its own; the command is rounded and limited where it is handed over.",
         ),

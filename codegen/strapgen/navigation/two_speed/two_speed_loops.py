@@ -89,7 +89,7 @@ def slow(name: str, form: int) -> Kernel:
         f"{SAVAGE}, equations {_UPDATE[name]}, (22), (27) and {VELOCITY_EQUATIONS[name, form]}",
         recursion=Recursion(
             tuple((held.name, signal.name) for held, signal, _ in states),
-            kept=(kinematics.state.name, PREVIOUS_TURN.name),
+            retained=(kinematics.state.name, PREVIOUS_TURN.name),
         ),
     )
 
@@ -112,7 +112,9 @@ def navigation(name: str) -> Kernel:
         f"{name}-two-speed-navigation",
         f"Two speeds: navigation loop of the {_title(name)}",
         f"{SAVAGE}, equations {_TURNED_FRAME[name]} and (59)",
-        recursion=Recursion(((kinematics.state.name, kinematics.next.name),), kept=(kinematics.state.name,)),
+        recursion=Recursion(
+            ((kinematics.state.name, kinematics.next.name),), retained=(kinematics.state.name,)
+        ),
     )
 
 

@@ -129,7 +129,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "definitions": definitions.of_program(program, name, printer),
         "result": program.outputs[0].signal,
         "code": code_of(program, printer),
-        "propagation": _loop(program, runs_printer, name) if program.companions else None,
+        "propagation": _loop(program, runs_printer, name) if program.attitude_step else None,
     }
     return render_c("c", name, **values)
 

@@ -32,7 +32,7 @@ class StatementPrinter:
         self.uses: set[str] = set()
         self.wide_names = {value.name for value in fixed.body if value.wide}
         self.places = {feedback.name: k for k, feedback in enumerate(fixed.interface.residuals)}
-        self.checks = any(value.guarded for value in fixed.body)
+        self.checks = any(value.range_checked for value in fixed.body)
         self.nearest = fixed.interface.settings.rounding == "nearest"
         self.adds_shifted = fixed.interface.settings.multiply == "shift-add"
         # A file that multiplies nothing else has no function for squares, whose text needs that for products.
@@ -150,7 +150,7 @@ class StatementPrinter:
             case IntegerOperation("select", arguments):
                 lines += self._selection(value, kind, arguments, note)
         # The word of a sum is checked before it is narrowed.
-        if value.guarded and (value.wide or not self._checked_in_sum(value)):
+        if value.range_checked and (value.wide or not self._checked_in_sum(value)):
             lines += self._guard(name, value)
         return lines
 
@@ -227,14 +227,14 @@ class StatementPrinter:
             text = self._joined([*words[:1], rounded, *words[1:]])
             return [*lines, self._declared(kind, name, text, note)]
         coarse = [self.term(term) for term in definition.coarse]
-        if not coarse and not value.guarded and not value.saturated:
+        if not coarse and not value.range_checked and not value.saturated:
             return [*lines, self._declared(kind, name, self.narrow(total, value, shift), note)]
         rounded = f"+{self._shifted(total, shift)}"
         return lines + self._result(value, kind, self._joined([*coarse[:1], rounded, *coarse[1:]]), note)
 
     def _result(self, value: Value, kind: str, text: str, note: str) -> list[str]:
         """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
-        if value.guarded and not value.wide:
+        if value.range_checked and not value.wide:
             name = f"{value.name}_raw"
             return [
                 self._declared(self.word.wide, name, text),

@@ -56,7 +56,7 @@ def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> 
         lines.append(f"{name} = {_expression(definition)}")
     if value.saturated:
         lines.append(f"{name} = _saturated({name}, {value.low}, {value.high})")
-    check = "_require" if value.guarded else "_within"
+    check = "_require" if value.range_checked else "_within"
     lines.append(f'{check}("{label}", {name}, {value.low}, {value.high})')
     return lines
 

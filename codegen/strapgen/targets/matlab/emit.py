@@ -51,7 +51,7 @@ class _MatlabPrinter(Printer):
 def emit(program: Program, target: str) -> Sources:
     """Print a function of arrays (shape, samples), one sample being a column or a matrix, and a loop over steps."""
     name = file_name(program)
-    runs = (f"{name}_propagate.m",) if program.companions else ()
+    runs = (f"{name}_propagate.m",) if program.attitude_step else ()
     return sources_of(program, target, name, _files, MATLAB, runs)
 
 
@@ -74,8 +74,8 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "turn": tuple(map(printer.constant, HALF_TURNS)),
     }
     files = {f"{name}.m": render("matlab/function.m.j2", **values)}
-    if program.companions is not None:
-        values |= _loop(program, program.companions.identity, printer)
+    if program.attitude_step is not None:
+        values |= _loop(program, program.attitude_step.identity, printer)
         values["loop_signature"] = _signature(f"{name}_propagate", ["history"], _PROPAGATE)
         files[f"{name}_propagate.m"] = render("matlab/propagate.m.j2", **values)
     return files

@@ -1,0 +1,47 @@
+"""Old names of fields and attributes, which keep working for one version with a warning."""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+T = TypeVar("T", bound=type)
+
+
+def warn(old: str, new: str, level: int = 3) -> None:
+    """Warn at the caller's line that a name has changed."""
+    warnings.warn(f"{old} is now {new}", DeprecationWarning, stacklevel=level)
+
+
+def current(fields: dict[str, Any], renamed: dict[str, str]) -> dict[str, Any]:
+    """Return keyword arguments with the present names of fields."""
+    for old in renamed.keys() & fields:
+        warn(old, renamed[old], level=4)
+    return {renamed.get(name, name): value for name, value in fields.items()}
+
+
+def renamed(**names: str) -> Callable[[T], T]:
+    """Decorate a class so that fields and attributes keep old names beside the present ones."""
+
+    def decorate(kind: T) -> T:
+        fields = {old: new for old, new in names.items() if new in getattr(kind, "__dataclass_fields__", ())}
+        if fields:
+            make: Callable[..., None] = vars(kind)["__init__"]
+
+            @functools.wraps(make)
+            def init(self: Any, *values: Any, **rest: Any) -> None:
+                make(self, *values, **current(rest, fields))
+
+            kind.__init__ = init
+        for old, new in names.items():
+
+            def read(self: Any, old: str = old, new: str = new) -> Any:
+                warn(f"{kind.__name__}.{old}", new)
+                return getattr(self, new)
+
+            setattr(kind, old, property(read))
+        return kind
+
+    return decorate
