@@ -71,6 +71,8 @@ class Registration:
         Tables of targets: mappings of names to `strapgen.Target`.
     backends : tuple of str, optional
         Tables of back ends: mappings of names to `strapgen.run.backend_names.Entry`.
+    files : mapping of str to str, optional
+        Kinds of users' TOML files by name: each a `strapgen.catalogue.toml_files.UserFile`.
     lists : mapping of str to str, optional
         Functions without arguments that return names with their meanings, by the kind under which ``strapgen list``
         shows them.
@@ -92,6 +94,7 @@ class Registration:
     motions: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
     backends: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
     lists: Mapping[str, str] = field(default_factory=dict)
     extensions: Mapping[str, str] = field(default_factory=dict)
     requires: tuple[str, ...] = ()

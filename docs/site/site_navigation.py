@@ -103,6 +103,7 @@ SECTIONS = (
             *_docs(
                 "README", "command-line", "reference/commands/index", "python-api", "reference/python/index"
             ),
+            *_docs("user-files"),
             *("generated/COST.md", "generated/EVIDENCE.md"),
             *("benchmarks/RESULTS.md", "benchmarks/FIXED_POINT.md", "examples"),
         ),

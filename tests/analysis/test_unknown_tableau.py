@@ -195,21 +195,21 @@ def test_a_member_is_a_file_for_other_commands(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"unknowns": []}, "unknowns is empty"),
-        ({"unknowns": "c2"}, "unknowns is of type str; a list is needed"),
+        ({"unknowns": []}, "unknowns has 0 entries; at least 1"),
+        ({"unknowns": "c2"}, "unknowns is 'c2'; a list of at least 1 texts is needed"),
         ({"unknowns": [*THREE["unknowns"], "c2"]}, "unknowns holds c2 twice"),
         ({"unknowns": [*THREE["unknowns"], "d"]}, "no coefficient holds d"),
-        ({"unknowns": ["c2"]}, "nodes, entry 3 is 'c3': c3 is not known; known are c2, pi"),
+        ({"unknowns": ["c2"]}, "nodes[3] is 'c3': c3 is not known; known are c2, pi"),
         ({"unknowns": ["c 2"]}, "names of letters, digits and underscores are needed"),
         ({"unknowns": ["sqrt"]}, "means something else"),
-        ({"order": 7}, "a whole number from 1 to 6 is needed with unknowns"),
+        ({"order": 7}, "order is 7; a whole number from 1 to 6 is needed"),
         ({"nodes": ["c2", "c2", "c3"]}, "the first stage of an explicit method is at 0"),
         ({"nodes": ["0", "c2"]}, "matrix has 3 rows"),
-        ({"matrix": [[], ["c2"], ["a31"]]}, "matrix row 3 has 1 entry"),
+        ({"matrix": [[], ["c2"], ["a31"]]}, "matrix[3] has 1 entry"),
         ({"weights": ["b1"]}, "weights has 1 entry"),
-        ({"weights": ["b1", "b2", "b3.real"]}, "weights, entry 3"),
+        ({"weights": ["b1", "b2", "b3.real"]}, "weights[3]"),
         ({"tolerance": "1e-14"}, "key 'tolerance' is not known"),
-        ({"name": "3"}, "must begin with a letter"),
+        ({"name": "3"}, "name is '3'; a text that begins with a letter"),
     ],
 )
 def test_a_bad_file_gets_one_line(change, reason):

@@ -26,8 +26,8 @@ from tolerances import certified
 
 import strapgen
 from strapgen import catalogue, pipeline
-from strapgen.catalogue import Choice
-from strapgen.catalogue.methods import coefficients, coning_coefficients
+from strapgen.catalogue import Choice, coefficients
+from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.lab.motions.motions import motion as make_motion

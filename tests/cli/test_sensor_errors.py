@@ -126,12 +126,12 @@ def test_fixed_point_takes_formats_that_hold_the_errors(run):
         (f"simulate euler {MOTION} --step 0.02 --errors nothing.toml", "nothing.toml cannot be read"),
         (
             f"simulate euler {MOTION} --step 0.02 --errors bad.toml",
-            "bad.toml: [gyro] key 'bias' is not known",
+            "bad.toml: gyro: key 'bias' is not known",
         ),
-        (f"compare euler {MOTION} --step 0.02 --errors bad.toml", "bad.toml: [gyro] key 'bias' is not known"),
+        (f"compare euler {MOTION} --step 0.02 --errors bad.toml", "bad.toml: gyro: key 'bias' is not known"),
         (
             f"strapdown dcm {LOG} --fast-cycles 4 --errors bad.toml",
-            "bad.toml: [gyro] key 'bias' is not known",
+            "bad.toml: gyro: key 'bias' is not known",
         ),
         (f"simulate euler {MOTION} --step 0.02 --errors force.toml", "a specific force is needed"),
         (f"simulate euler {MOTION} --step 0.02 --rates --errors bias.toml", "the algorithm takes rates"),

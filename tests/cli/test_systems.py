@@ -107,7 +107,7 @@ def test_what_does_not_go_with_a_system_is_refused_in_one_line(file, log, tmp_pa
         (f"simulate {gyro} {CONING} --duration 1", "system gyro has no attitude among its outputs"),
         (f"simulate {tmp_path}/none.toml {CONING} --duration 1", "none.toml cannot be read"),
         (f"simulate {file} --increments-csv {log} --record 1", "go with --motion"),
-        (f"simulate {file} --increments-csv {log} --specific-force 0,0,1", "--specific-force goes with"),
+        (f"simulate {file} --increments-csv {log} --specific-force 0,0,1", "--specific-force needs --motion"),
         (f"simulate euler {CONING} --step 0.1 --duration 1 --specific-force 0,0,1", "--specific-force goes"),
         (f"compare {run} --fail-above 1", "--fail-above does not go"),
         (f"compare {run} --source x.c", "x.c"),

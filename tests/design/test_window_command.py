@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from strapgen.catalogue.methods import windows
+from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
 from strapgen.design.windows import window_command as window
@@ -78,7 +79,7 @@ def test_options_reach_the_file(run):
     assert (window.previous, window.ahead, window.conditions, window.degree) == (3, 2, 2, 2)
     # 2 pi 20/100, rounded to 1e-6.
     assert window.band == Fraction("1.256637")
-    assert window.gyro == (40, Fraction("0.7071"), 100)
+    assert window.gyro == GyroResponse(Fraction(40), Fraction("0.7071"), Fraction(100))
     assert (window.noise, window.one_sided[0].noise) == (Fraction(1, 10**4), Fraction(1, 10**3))
     assert (window.rotation, window.terms, window.objective) == ("exact", 20, "mean square")
     assert "wrote w.toml" in warned
@@ -139,22 +140,26 @@ def test_a_spectrum_shapes_the_filters(run, tmp_path):
         ("--previous 2 --ahead 2 --band-hz 20", "--band-hz needs --sample-hz"),
         (
             "--previous 2 --ahead 2 --band 1 --band-hz 20",
-            "--band 1 and --band-hz 20 are both given; one is needed",
+            "--band and --band-hz are both given; one is needed",
         ),
         ("--previous 2 --ahead 2 --band 3", "the band is 3 rad a sample; a number below 3 is needed"),
         ("--previous 2 --ahead 2 --band-hz 60 --sample-hz 100", "the band is 3.76991 rad a sample"),
         ("--previous 2 --ahead 2 --band 0", "--band is 0; a number above 0 is needed"),
         (
             "--previous 2 --ahead 2 --band 1 --sample-hz 100",
-            "--sample-hz goes with --band-hz, --gyro-bandwidth-hz or",
+            "--sample-hz needs --band-hz, --gyro-bandwidth-hz or --spectrum",
         ),
-        ("--previous 2 --ahead 2 --band 1 --gyro-bandwidth-hz 4", "--gyro-damping is missing"),
-        ("--previous 2 --ahead 2 --band 1 --gyro-damping 0.7", "--gyro-bandwidth-hz is missing"),
+        ("--previous 2 --ahead 2 --band 1 --gyro-bandwidth-hz 4", "--gyro-bandwidth-hz needs --gyro-damping"),
+        ("--previous 2 --ahead 2 --band 1 --gyro-damping 0.7", "--gyro-damping needs --gyro-bandwidth-hz"),
         (
             "--previous 2 --ahead 2 --band 1 --gyro-damping 0.7 --gyro-bandwidth-hz 4",
             "--gyro-bandwidth-hz needs --sample-hz",
         ),
-        ("--previous 2 --ahead 2 --band 1 --spectrum file", "file holds 0 rows below its header"),
+        ("--previous 2 --ahead 2 --band 1 --spectrum file", "--spectrum needs --sample-hz"),
+        (
+            "--previous 2 --ahead 2 --band 1 --spectrum file --sample-hz 100",
+            "file holds 0 rows below its header",
+        ),
         ("--previous 2 --ahead 2 --band 1 --powers 6", "--powers is 6; a whole number from 1 to 5 is needed"),
         (
             "--previous 2 --ahead 2 --band 1 --coefficients 9",
@@ -170,7 +175,7 @@ def test_a_spectrum_shapes_the_filters(run, tmp_path):
             "--noise is -1; a number that is not below 0 is needed",
         ),
         ("--previous 2 --ahead 2 --band 1 --rotation second", "rotation 'second' is not known"),
-        ("--previous 2 --ahead 2 --band 1 --series-terms 20", "--series-terms goes with --rotation exact"),
+        ("--previous 2 --ahead 2 --band 1 --series-terms 20", "--series-terms needs --rotation exact"),
         (
             "--previous 2 --ahead 2 --band 1 --name 'window 7 7'",
             "--name window 7 7 is that of a window of the catal",

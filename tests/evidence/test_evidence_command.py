@@ -58,8 +58,8 @@ def test_a_tool_that_is_missing_is_named_and_fails_where_all_must_be_there(capsy
     ("command", "line"),
     [
         ("", "a kernel is needed, or --all"),
-        ("euler --all", "--all examines the whole catalogue; euler does not go with it"),
-        ("euler --check", "--page is missing"),
+        ("euler --all", "NAME... and --all are both given; one is needed"),
+        ("euler --check", "--check needs --page"),
         ("euler --tool gapa", "did you mean gappa"),
     ],
 )

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from strapgen.cli import main
+from strapgen.cli.option_groups import stated
 from strapgen.firmware.verify import header_command, verification
 from strapgen.ir.exceptions import InputError
 from strapgen.run.generated_files import command_of, text_of
@@ -259,16 +260,14 @@ def test_header_command_reads_every_value_option():
         "strapgen generate imu-compensate --constant cycle=0.02 --constant 'rate_scale=1/3, -2e-9' --target c-fixed "
         "--word=16 --fix a=Q2.13"
     )
-    values = {name: value for name, value in command.values.items() if value not in (None, False)}
-    assert values == {
-        "algorithm": "imu-compensate",
-        "constant": ["cycle=0.02", "rate_scale=1/3, -2e-9"],
-        "target": "c-fixed",
-        "word": "16",
-        "formats": ["a=Q2.13"],
-    }
-    with pytest.raises(InputError, match="does not generate one function"):
-        header_command.read("strapgen two-speed dcm").request()
+    values = command.values
+    assert (values["algorithm"], values["targets"]) == ("imu-compensate", ("c-fixed",))
+    assert stated(values["method"]) == {"--constant": {"cycle": "0.02", "rate_scale": "1/3, -2e-9"}}
+    assert stated(values["fixed"]) == {"--word": 16, "--fix": {"a": "Q2.13"}}
+    assert not values["all_"] and not stated(values["output"]) and values["format"] == "text"
+    for several in ("strapgen two-speed dcm", "strapgen generate euler --target c,cpp"):
+        with pytest.raises(InputError, match="does not generate one function"):
+            header_command.read(several).request()
 
 
 def test_compared_file_runs_on_the_counts_of_its_header(tmp_path, capsys):

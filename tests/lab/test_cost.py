@@ -79,7 +79,7 @@ def test_the_command_prints_what_was_agreed(capsys):
     ("words", "said"),
     [
         ("", "a kernel is needed, or --all"),
-        ("euler --all", "--all measures the whole catalogue in fixed point; euler does not go with it"),
+        ("euler --all", "NAME... and --all are both given; one is needed"),
         ("--all --word 16", "--word does not go with it"),
         ("--all --target c", "--target does not go with it"),
         ("--all --method rk2", "--method does not go with it"),

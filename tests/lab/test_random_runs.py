@@ -94,13 +94,13 @@ def test_runs_of_more_steps_than_are_drawn_at_a_time_are_those_of_any_number_of_
     [
         ("--runs 0", "runs is 0"),
         ("--length many", "length is 'many'; a whole number is needed"),
-        ("--pulse-arcsec -1", "pulse-arcsec is -1; 0 for none"),
+        ("--pulse-arcsec -1", "--pulse-arcsec is -1; a number that is not below 0"),
         ("--noise-deg-sqrt-h 0", "are both 0"),
         ("--sample-hz 0", "sample-hz is 0"),
         ("--backend exact", "backend 'exact'"),
         ("--seed -1", "seed is -1"),
         ("--of 0", "of is 0"),
-        ("--jobs 2 --cluster local:2", "--jobs goes with processes on this machine"),
+        ("--jobs 2 --cluster local:2", "--jobs and --cluster are both given"),
         ("--out a.txt --results a.txt", "--out and --results are both a.txt"),
     ],
 )

@@ -265,7 +265,7 @@ def test_back_ends_agree_on_a_monte_carlo(run):
         (f"noise.toml {MOTION} --runs 9", "runs is 9; a whole number from 10"),
         (f"noise.toml {MOTION} --runs many", "runs is 'many'"),
         (f"noise.toml {MOTION} --seed -1", "seed is -1"),
-        ("noise.toml --duration 5", "one of --motion"),
+        ("noise.toml --duration 5", "--motion is needed"),
         ("noise.toml --motion constant --set z_deg_s=1 --duration 5", "--motion needs --step"),
         (f"noise.toml {MOTION} --backend paper", "backend 'paper'"),
         ("noise.toml --motion constant --set z_deg_s=1 --step 1e-6 --duration 5", "are too many"),

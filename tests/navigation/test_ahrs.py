@@ -13,7 +13,7 @@ import pytest
 import strapgen
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.loops.ahrs import RestingSensors, run_modes, tilt
-from strapgen.navigation.loops.loop_schedule_file import read
+from strapgen.navigation.loops.loop_schedule import read
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ahrs.toml"
 SCHEDULE = read()

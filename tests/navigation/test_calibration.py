@@ -122,17 +122,17 @@ def test_combinations_that_leave_no_trace_are_exact(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "positions are missing"),
-        ("positions = [[0, 1]]", r"position 1 is \[0, 1\]; three numbers are needed"),
-        ("positions = [[0, 0, 2]]", "position 1 has the length 2; 1 is needed"),
-        ('positions = [[0, 0, "up"]]', "position 1"),
+        ("", "positions is missing; a list of"),
+        ("positions = [[0, 1]]", r"positions\[1\] has 2 entries; 3 are needed"),
+        ("positions = [[0, 0, 2]]", r"positions\[1\] has the length 2; 1 is needed"),
+        ('positions = [[0, 0, "up"]]', r"positions\[1\]\[3\] is 'up'"),
         ("positions = [[0, 0, 1]]\nsigma = 3", "key 'sigma' is not known"),
         ("positions = [[0, 0, 1]]\nrate_sigma_deg_h = 0", "rate_sigma_deg_h is 0"),
         (
             "positions = [[0, 0, 1]]\nrate_errors_deg_h = [[1, 2, 3], [1, 2, 3]]",
             "has 2 rows; one for each of 1",
         ),
-        ("positions = [[0, 0, 1]]\nrate_errors_deg_h = [[1, 2]]", "row 1 is"),
+        ("positions = [[0, 0, 1]]\nrate_errors_deg_h = [[1, 2]]", r"rate_errors_deg_h\[1\] has 2 entries"),
     ],
 )
 def test_a_scheme_that_cannot_be_is_refused(tmp_path, text, said):

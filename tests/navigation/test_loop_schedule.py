@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.loops.loop_schedule_file import BUILT_IN, read
+from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
 
 SCHEDULE = read()
 
@@ -49,16 +49,20 @@ def test_cut_out_and_hysteresis_are_arguments():
 
 
 CHANGES = {
-    "missing cycle": ("cycle_s = 0.01\n", "", "the schedule has no cycle_s"),
+    "missing cycle": (
+        "cycle_s = 0.01\n",
+        "",
+        "cycle_s is missing; a number from 1e-05 to 1000 in s is needed",
+    ),
     "unknown key": ("cycle_s", "cycle_ms", "key 'cycle_ms'"),
     "zero": ("cycle_s = 0.01", "cycle_s = 0", "cycle_s is 0"),
-    "reference": ('reference = "zero"', 'reference = "gps"', "mode fast: reference of the level loop 'gps'"),
+    "reference": ('reference = "zero"', 'reference = "gps"', "mode[fast].level.reference 'gps'"),
     "open": (
         "heading = { tau_s = 40 }",
         'heading = { tau_s = 40, reference = "open" }',
         "the heading loop is open",
     ),
-    "no loop": ("heading = { tau_s = 40 }\n", "", "mode fast: the heading loop is missing"),
+    "no loop": ("heading = { tau_s = 40 }\n", "", "mode[fast].heading is missing; a table with tau_s"),
     "two levels": (
         "duration_s = 30\n",
         "duration_s = 30\nerection = { tau_s = 3 }\n",
@@ -66,10 +70,18 @@ CHANGES = {
     ),
     "endless": ("duration_s = 30\n", "", "mode fast has no duration_s; only the last"),
     "twice": ('"fine"', '"fast"', "two modes of the schedule have the same name"),
-    "order": ("tau_s = 5,", "tau_s = 5, order = 4,", "order of the level loop is 4"),
+    "order": ("tau_s = 5,", "tau_s = 5, order = 4,", "mode[fast].level.order is 4; 2 or 3 is needed"),
     "hysteresis": ('off_m_s = "463/9"', "off_m_s = 60", "air_data_off_m_s is 60; at most"),
-    "slow": ("tau_s = 5,", "tau_s = 1e7,", "tau_s of the level loop is 1e7; 0.001 to 1e+06 is possible"),
-    "text": ("duration_s = 30", "duration_s = true", "mode fast: duration_s is no number"),
+    "slow": (
+        "tau_s = 5,",
+        "tau_s = 1e7,",
+        "level.tau_s is 1e+7; a number from 0.001 to 1000000 in s is needed",
+    ),
+    "text": (
+        "duration_s = 30",
+        "duration_s = true",
+        "mode[fast].duration_s is true; a number above 0 in s is needed",
+    ),
 }
 
 

@@ -15,7 +15,7 @@ import pytest
 from strapgen.cli import main
 from strapgen.navigation.loops import loops_study
 from strapgen.navigation.loops.loop_gains import closed_loop
-from strapgen.navigation.loops.loop_schedule_file import BUILT_IN, read
+from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
 from strapgen.navigation.loops.loops_study import LoopErrors, factors, run_loops
 
 SCHEDULE = replace(read(), cycle_s=Fraction(1, 10))

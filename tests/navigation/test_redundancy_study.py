@@ -94,7 +94,7 @@ def test_a_geometry_becomes_code_and_tables(tmp_path, monkeypatch, capsys):
     [
         ("redundancy flat.toml", "flat.toml: all axes lie in one plane"),
         ("redundancy absent.toml", "absent.toml cannot be read"),
-        ("redundancy flat.toml --force", "--force goes with --out"),
+        ("redundancy flat.toml --force", "--force needs --out"),
         ("study redundancy --set noise=3", "noise"),
         ("study redundancy --set noise_arcsec=-3", "noise_arcsec is -3.0"),
         ("study redundancy --set rate_deg_s=1000", "beyond the range 1/8"),

@@ -60,16 +60,16 @@ def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, 
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(stage_cache, "_results", {})
     monkeypatch.setattr(stage_cache, "_MOST_RESULTS", 2)
-    read, read_entry = [], cache.read
+    stored, asked = cache.stored, []
 
-    def noted(place, name):
-        read.append(place.name)
-        return read_entry(place, name)
+    def noted(kind, parts, work, what):
+        asked.extend(parts)
+        return stored(kind, parts, work, what)
 
-    monkeypatch.setattr(cache, "read", noted)
+    monkeypatch.setattr(cache, "stored", noted)
     for key in ("a", "b", "a", "c", "a", "b"):
-        assert stage_cache._remembered("kind", key, "", lambda key=key: key, False) == key
-    assert read == ["a", "b", "c", "b"]
+        assert stage_cache._remembered("kind", [key], "", lambda key=key: key, False) == key
+    assert asked == ["a", "b", "c", "b"]
 
 
 def test_a_change_of_the_generator_makes_new_sources(monkeypatch, tmp_path):

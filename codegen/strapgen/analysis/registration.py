@@ -33,5 +33,6 @@ REGISTRATION = Registration(
             summary="Show at which constant rates the state grows in a step",
         ),
     },
+    files={"tableau-with-unknowns": f"{__package__}.unknowns.unknown_tableau:UNKNOWN_TABLEAU"},
     requires=("lab",),
 )

@@ -15,7 +15,7 @@ from strapgen.ir import checks
 from strapgen.ir.timing import timed
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coefficients import Number
+    from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.methods.method import Method
     from strapgen.kernel.kernel import Kernel
 

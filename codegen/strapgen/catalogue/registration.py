@@ -11,4 +11,9 @@ REGISTRATION = Registration(
     tableaux=(f"{__package__}.methods:butcher_tableaux",),
     windows=(f"{__package__}.methods:window_filters",),
     coning_shapes=(f"{__package__}.methods:coning_shapes",),
+    files={
+        "tableau": f"{__package__}.methods.tableaux:TABLEAU",
+        "window": f"{__package__}.methods.windows:WINDOW",
+        "coning": f"{__package__}.methods.shaped_coning:SHAPE",
+    },
 )

@@ -7,13 +7,12 @@ from typing import Annotated
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import Algorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
-
-_SHOWN = ("text", "latex", "program", "operations")
+from strapgen.cli.rules import Needs, rules
+from strapgen.cli.values import names
 
 
 @grouped
+@rules(Needs("--format=csv|markdown", "--show=program|operations"))
 def derive(
     algorithm: Algorithm,
     *,
@@ -25,6 +24,7 @@ def derive(
             metavar="NAME",
             help="What to show: text or latex (the formulas), program, or operations.",
             panel="Output",
+            read=names(("text", "latex", "program", "operations")),
         ),
     ] = "text",
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
@@ -37,9 +37,6 @@ def derive(
     Example: strapgen derive euler --method rk4 --increments 2 --show operations
     """
     output.check(algorithm, *method.files)
-    checks.choice("show", show, _SHOWN)
-    if output.format in ("csv", "markdown") and show in ("text", "latex"):
-        raise InputError(f"--format {output.format} goes with --show program or --show operations")
     choice = method.choose(algorithm, step=False)
     from strapgen import pipeline
     from strapgen.results.display.formulas import formulas_report, unknown_formulas_report

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.options import one, option, pair, whole
+from strapgen.cli.option_groups import stated
+from strapgen.cli.options import option
+from strapgen.cli.rules import Needs, OneOf, Rule
+from strapgen.cli.values import Positive, names
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
     from strapgen.catalogue import Choice
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
@@ -21,8 +23,18 @@ _Text = str | None
 #: The options of a run: its formats are chosen for its own increments, or for a largest rate that is stated.
 RUN_OPTIONS = (
     *("word", "max_rate_deg_s", "lsb", "lsb_rad", "input_bits"),
-    *("state", "rounding", "carry", "drift_allowance"),
+    *("state", "rounding", "carry", "allowance"),
 )
+
+
+def _rate_of_a_count(option: str, text: str) -> str:
+    """Read a rate with its unit."""
+    from strapgen.ir.sensor import Sensor
+
+    if text.strip().endswith("rad"):
+        raise InputError(f"{option} is {text}, an angle a count; --lsb-rad takes it, without its unit")
+    Sensor.of(text, Fraction(1))
+    return text
 
 
 @dataclass(frozen=True)
@@ -30,9 +42,16 @@ class FixedOptions:
     """Word and rounding of fixed-point code, and the largest numbers that it must hold."""
 
     panel: ClassVar[str] = "Fixed point"
+    rules: ClassVar[tuple[Rule, ...]] = (
+        OneOf("--step --sample-hz"),
+        OneOf("--lsb --lsb-rad"),
+        Needs("--max-rate-deg-s", "--step --sample-hz"),
+        Needs("--lsb", "--sample-hz --step"),
+        Needs("--step --sample-hz", "--max-rate-deg-s --lsb"),
+    )
 
     word: Annotated[
-        _Text,
+        int | None,
         option(
             "--word",
             metavar="BITS",
@@ -40,7 +59,7 @@ class FixedOptions:
         ),
     ] = None
     max_rate_deg_s: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--max-rate-deg-s",
             metavar="DEG_S",
@@ -48,10 +67,11 @@ class FixedOptions:
         ),
     ] = None
     step: Annotated[
-        _Text, option("--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s.")
+        Positive | None,
+        option("--step", metavar="S", help="Step length in s; it goes with --max-rate-deg-s."),
     ] = None
     sample_hz: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--sample-hz",
             metavar="HZ",
@@ -65,22 +85,23 @@ class FixedOptions:
             metavar="RATE",
             help="Rate that a count of the gyro stands for, as 0.0175dps, 17.5mdps or 3e-4rad/s; the increments are "
             "then counts.",
+            read=_rate_of_a_count,
         ),
     ] = None
     lsb_rad: Annotated[
-        _Text,
+        Positive | None,
         option("--lsb-rad", metavar="RAD", help="Angle that a count stands for in rad, in place of a rate."),
     ] = None
     input_bits: Annotated[
-        _Text,
+        int | None,
         option(
             "--input-bits",
             metavar="BITS",
             help="Bits of an increment; up to 16 they are int16_t.  [default: those of a word; 16 with --lsb]",
         ),
     ] = None
-    max_angle_rad: Annotated[
-        _Text,
+    largest_angle: Annotated[
+        Positive | None,
         option(
             "--max-angle-rad",
             metavar="RAD",
@@ -93,6 +114,7 @@ class FixedOptions:
             "--rounding",
             metavar="NAME",
             help="How results are rounded: nearest or truncation.  [default: nearest]",
+            read=names("strapgen.ir.formats:ROUNDINGS"),
         ),
     ] = None
     carry: Annotated[
@@ -103,6 +125,7 @@ class FixedOptions:
             help="Error feedback, which adds the rounding errors of a step to the next one: none; state for those of "
             "the state; full for those of the transition too; all for those of sums and outgoing increments too.  "
             "[default: none]",
+            read=names("strapgen.ir.fixed_settings:CARRIES"),
         ),
     ] = None
     multiply: Annotated[
@@ -112,10 +135,11 @@ class FixedOptions:
             metavar="NAME",
             help="How products with a constant are computed: product, or shift-add for sums of shifted terms.  "
             "[default: product]",
+            read=names("strapgen.ir.signed_digits:MULTIPLICATIONS"),
         ),
     ] = None
     digits: Annotated[
-        _Text,
+        int | None,
         option(
             "--digits",
             metavar="N",
@@ -130,10 +154,11 @@ class FixedOptions:
             metavar="NAME",
             help="State in the format of CMSIS: q31 for words of 32 bits, q15 for 16, q63 for 64. It saturates at "
             "-1 and below 1.",
+            read=names("strapgen.ir.fixed_settings:STATES"),
         ),
     ] = None
-    drift_allowance: Annotated[
-        _Text,
+    allowance: Annotated[
+        Fraction | None,
         option(
             "--drift-allowance",
             metavar="A",
@@ -141,7 +166,7 @@ class FixedOptions:
         ),
     ] = None
     ranges: Annotated[
-        list[str] | None,
+        dict[str, Positive] | None,
         option(
             "--range",
             metavar="NAME=MAX",
@@ -149,7 +174,7 @@ class FixedOptions:
         ),
     ] = None
     formats: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--fix",
             metavar="NAME=Qm.n",
@@ -157,82 +182,21 @@ class FixedOptions:
         ),
     ] = None
 
-    @property
-    def stated(self) -> dict[str, Any]:
-        """The options that the command line states, with their values."""
-        options = {
-            "--word": self.word,
-            "--max-rate-deg-s": self.max_rate_deg_s,
-            "--step": self.step,
-            "--sample-hz": self.sample_hz,
-            "--lsb": self.lsb,
-            "--lsb-rad": self.lsb_rad,
-            "--input-bits": self.input_bits,
-            "--state": self.state,
-            "--max-angle-rad": self.max_angle_rad,
-            "--rounding": self.rounding,
-            "--carry": self.carry,
-            "--drift-allowance": self.drift_allowance,
-            "--multiply": self.multiply,
-            "--digits": self.digits,
-            "--range": self.ranges,
-            "--fix": self.formats,
-        }
-        return {option: value for option, value in options.items() if value not in (None, [])}
-
     def settings(self, increments: int) -> Settings | None:
         """Return the settings of fixed point for so many increments a step; None if no option is stated."""
-        if not self.stated:
+        given = {part.name: value for part in fields(self) if (value := getattr(self, part.name)) is not None}
+        if not given:
             return None
-        from strapgen.ir import checks
         from strapgen.ir.fixed_settings import Settings
 
-        self._check_pairs()
-        bits = whole("word", self.word)
-        allowance = {}
-        if self.drift_allowance is not None:
-            allowance["allowance"] = checks.number("drift allowance", self.drift_allowance)
-        return Settings.of(
-            word=32 if bits is None else bits,
-            max_rate_deg_s=self.max_rate_deg_s,
-            step=self.step,
-            increments=increments,
-            largest_angle=self.max_angle_rad,
-            sample_hz=self.sample_hz,
-            lsb=self.lsb if self.lsb_rad is None else f"{self.lsb_rad}rad",
-            input_bits=whole("input bits", self.input_bits),
-            state=self.state or "",
-            rounding="nearest" if self.rounding is None else self.rounding,
-            carry="none" if self.carry is None else self.carry,
-            multiply="product" if self.multiply is None else self.multiply,
-            digits=whole("digits", self.digits) or 0,
-            **allowance,
-            ranges=_numbers(self.ranges or ()),
-            formats=dict(pair("--fix", text) for text in self.formats or ()),
-        )
-
-    def _check_pairs(self) -> None:
-        """Refuse options that do not go together, or that another one is missing for."""
-        for one_option, other in (("--step", "--sample-hz"), ("--lsb", "--lsb-rad")):
-            if {one_option, other} <= {*self.stated}:
-                raise InputError(f"{one_option} and {other} are both given; one is needed")
-        timed = self.step is not None or self.sample_hz is not None
-        if self.max_rate_deg_s is not None and not timed:
-            raise InputError("--max-rate-deg-s and --step go together; --step is missing, or --sample-hz")
-        if self.lsb is not None and not timed:
-            raise InputError("--lsb is a rate a count; --sample-hz is missing, which makes it an angle")
-        if timed and self.max_rate_deg_s is None and self.lsb is None:
-            stated = "--step" if self.sample_hz is None else "--sample-hz"
-            raise InputError(
-                f"--max-rate-deg-s and {stated} go together; --max-rate-deg-s is missing, or --lsb"
-            )
-        if self.lsb is not None and self.lsb.strip().endswith("rad"):
-            raise InputError(f"--lsb is {self.lsb}, an angle a count; --lsb-rad takes it, without its unit")
+        if "lsb_rad" in given:
+            given["lsb"] = f"{given.pop('lsb_rad')}rad"
+        return Settings.of(increments=increments, **given)
 
     def at_step(self, seconds: float) -> FixedOptions:
         """Return the options at the step of a run in s, by which a largest rate becomes a largest increment."""
         is_needed = self.max_rate_deg_s is not None or self.lsb is not None
-        return replace(self, step=repr(seconds) if is_needed else None)
+        return replace(self, step=Positive(repr(seconds)) if is_needed else None)
 
     def check_increments(self, choice: Choice) -> None:
         """Refuse a largest rate or angle for a kernel that takes neither."""
@@ -240,8 +204,9 @@ class FixedOptions:
         from strapgen.fixedpoint.sensor_scale import counted
         from strapgen.ir.fixed_settings import TURNING
 
-        of_gyro = {*self.stated} & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
-        of_angle = {*self.stated} & {"--max-rate-deg-s", "--step", "--max-angle-rad"}
+        options = {*stated(self)}
+        of_gyro = options & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
+        of_angle = options & {"--max-rate-deg-s", "--step", "--max-angle-rad"}
         if not of_gyro and not of_angle:
             return
         program = pipeline.program(choice)
@@ -263,19 +228,11 @@ class FixedOptions:
 
     def check_backend(self, backend: str) -> None:
         """Refuse options of fixed point for a back end in floating point."""
-        from strapgen.ir import checks
         from strapgen.run.backends import BACKENDS
 
-        one("--backend", backend)
-        checks.choice("backend", backend, BACKENDS)
-        if self.stated and not BACKENDS[backend].fixed:
-            raise InputError(f"{next(iter(self.stated))} is for fixed-point back ends, not for {backend}")
-
-    def check_pulse(self, pulse: str | None) -> None:
-        """Refuse a gyro pulse beside the scale of a gyro that counts, which is one."""
-        scale = next((name for name in ("--lsb", "--lsb-rad") if name in self.stated), None)
-        if pulse is not None and scale is not None:
-            raise InputError(f"--pulse-arcsec and {scale} both state the angle of a count; one is needed")
+        if not BACKENDS[backend].fixed:
+            for name in stated(self):
+                raise InputError(f"{name} is for fixed-point back ends, not for {backend}")
 
     def settings_for_run(
         self, backend: str, increments: int | None, step: float, largest: Callable[[], float]
@@ -296,10 +253,3 @@ class FixedOptions:
                 f"--word {settings.word} does not go with {backend}, whose words have {bits} bits"
             )
         return settings if self.max_rate_deg_s is not None else settings.fitted(largest())
-
-
-def _numbers(texts: Iterable[str]) -> dict[str, Fraction]:
-    from strapgen.ir import checks
-
-    pairs = (pair("--range", text) for text in texts)
-    return {name: checks.number(f"range of {name}", value, positive=True) for name, value in pairs}

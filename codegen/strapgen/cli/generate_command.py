@@ -10,10 +10,12 @@ import typer
 from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import MethodOptions, OptionalAlgorithm, listed, option
+from strapgen.cli.options import MethodOptions, OptionalAlgorithm, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import track
+from strapgen.cli.rules import Excludes, OneOf, rules
 from strapgen.cli.source_options import SourceOptions, refuse_out_of_step
+from strapgen.cli.values import names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -24,17 +26,26 @@ if TYPE_CHECKING:
 
 
 @grouped
+@rules(
+    OneOf("ALGORITHM --all", needed="an algorithm is needed, or --all; strapgen list kernels shows them"),
+    Excludes(
+        "--all",
+        "@method @fixed --name --prefix --with-runs --project --force",
+        reason="--all generates the whole catalogue",
+    ),
+)
 def generate(
     algorithm: OptionalAlgorithm = None,
     *,
     method: MethodOptions,
-    target: Annotated[
-        str | None,
+    targets: Annotated[
+        tuple[str, ...] | None,
         option(
             "--target",
             metavar="NAME,...",
             help="Kinds of code, with commas between; strapgen list targets shows all.  [default: numpy]",
             panel="Algorithm",
+            read=names("strapgen.targets:TARGETS"),
         ),
     ] = None,
     all_: Annotated[
@@ -58,15 +69,12 @@ def generate(
     Example: strapgen generate euler --target c-fixed --sample-hz 100 --lsb 0.0175dps --out firmware/gyro
     """
     check_format(format)
-    if all_:
-        _check_alone(algorithm, method, fixed, output)
-        _generate_all(None if target is None else _names(target), output, format)
-        return
     if algorithm is None:
-        raise InputError("an algorithm is needed, or --all; strapgen list kernels shows them")
+        _generate_all(targets, output, format)
+        return
     from strapgen import pipeline
 
-    tasks = [request(algorithm, method, name, fixed, output) for name in _names(target)]
+    tasks = [request(algorithm, method, name, fixed, output) for name in targets or ("numpy",)]
     results = [(task, pipeline.compile(*task)) for task in tasks]
     for _, sources in results:
         fixed.check_feedback(sources)
@@ -97,15 +105,6 @@ def generate(
         )
 
 
-def _names(target: str | None) -> list[str]:
-    from strapgen.targets import TARGETS
-
-    return [
-        checks.choice("target", name, TARGETS)
-        for name in listed("--target", "numpy" if target is None else target)
-    ]
-
-
 def _together(groups: list[dict[str, str]]) -> dict[str, str]:
     """Return the files of all targets, which go into one folder."""
     files: dict[str, str] = {}
@@ -117,7 +116,7 @@ def _together(groups: list[dict[str, str]]) -> dict[str, str]:
 
 
 def request(
-    algorithm: str, method: MethodOptions, target: str | None, fixed: FixedOptions, output: SourceOptions
+    algorithm: str, method: MethodOptions, target: str, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
     """Return the request of the command's options."""
     from strapgen.run.generation import Request
@@ -125,7 +124,6 @@ def request(
 
     choice = method.choose(algorithm, step=False)
     settings = fixed.settings(choice.increments_per_step)
-    target = checks.choice("target", "numpy" if target is None else target, TARGETS)
     if settings is not None and not TARGETS[target].fixed:
         raise InputError(
             f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
@@ -142,33 +140,6 @@ def _project_files(task: Request, output: SourceOptions) -> dict[str, str]:
     if not output.check:
         writer.refuse_changed(output.out or Path(), files, output.force)
     return files
-
-
-def _check_alone(
-    algorithm: str | None,
-    method: MethodOptions,
-    fixed: FixedOptions,
-    output: SourceOptions,
-) -> None:
-    for name, value in (
-        ("an algorithm", algorithm),
-        ("--method", method.method),
-        ("--tableau", method.tableau),
-        ("--window", method.window),
-        ("--coning", method.coning),
-        ("--increments", method.increments),
-        ("--previous", method.previous),
-        ("--ahead", method.ahead),
-        ("--rates", method.rates or None),
-        ("--constant", method.constant or None),
-        ("--layout", method.layout),
-        ("a fixed-point option", fixed.stated or None),
-        (output.for_libraries, output.for_libraries),
-        ("--project", output.project or None),
-        ("--force", output.force or None),
-    ):
-        if value is not None:
-            raise InputError(f"--all generates the whole catalogue; {name} does not go with it")
 
 
 def _text(sources: Sources, written: list[Path], settings: Settings | None, samples: int) -> str:
@@ -188,7 +159,7 @@ def _call_rate(settings: Settings | None, samples: int) -> list[str]:
     return [f"  a step takes {samples} samples of the gyro: call it at {float(hertz):g} Hz"]
 
 
-def _generate_all(targets: list[str] | None, output: SourceOptions, format: str) -> None:
+def _generate_all(targets: tuple[str, ...] | None, output: SourceOptions, format: str) -> None:
     from strapgen import catalogue
     from strapgen.run import standard_tree
     from strapgen.storage import resources

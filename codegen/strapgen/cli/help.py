@@ -30,6 +30,8 @@ class PlainCommand(TyperCommand):
         try:
             return super().invoke(ctx)
         except StrapgenError as error:
+            if getattr(error, "in_file", False):
+                raise
             told = type(error)(_in_options(self, str(error)))
             vars(told).update(vars(error))
             raise told from error

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import wraps
 from inspect import Parameter, Signature
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
+from typer.models import OptionInfo, ParameterInfo
+
+from strapgen.cli import values
+from strapgen.cli.rules import CommandLine, Rule, check
+
 Command = TypeVar("Command", bound=Callable[..., Any])
-#: Typer passes every value by its name, so that one without a default may stand behind others.
-_KEYWORD = Parameter.KEYWORD_ONLY
 
 
 class Shown(NamedTuple):
@@ -22,85 +26,173 @@ class Shown(NamedTuple):
     before: str = ""  # the field or parameter that the help shows after these; "" for the parameter's place
 
 
-def grouped(command: Command) -> Command:
-    """Show Typer the fields of a command's groups as options of the command.
+class Option(NamedTuple):
+    """An option or an argument of a command: what Typer reads, and what makes a typed value of it."""
 
-    A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. The command gets an
-    object of the dataclass in place of the single values. Its class variable `panel` is the heading of its options.
+    spellings: tuple[str, ...]  # on the command line; of an argument its metavar
+    kind: Any  # of its values, without None
+    parameter: Parameter
+    read: values.Reader | None
+
+    @property
+    def spelling(self) -> str:
+        """The name of the option, as it is spelled."""
+        return self.spellings[0]
+
+    @property
+    def is_argument(self) -> bool:
+        """Whether it has no name on the command line."""
+        return not self.spelling.startswith("-")
+
+    def value(self, word: Any) -> Any:
+        """Return the typed value of a word; None stands for none."""
+        return word if word is None or self.read is None else self.read(self.spelling, word)
+
+
+class Group(NamedTuple):
+    """A dataclass whose fields are options of a command."""
+
+    kind: type[Any]
+    options: Sequence[Option]
+
+    @property
+    def spellings(self) -> list[str]:
+        """The options as they are spelled."""
+        return [option.spelling for option in self.options]
+
+
+class CommandOptions:
+    """The options of a command in the order of its help, its groups, and the rules of what goes with what."""
+
+    def __init__(self, command: Callable[..., Any]) -> None:
+        self.options: dict[str, Option] = {}
+        self.groups: dict[str, Group] = {}
+        self.rules: Sequence[Rule] = getattr(command, "rules", ())
+        hints = get_type_hints(command, include_extras=True)
+        for parameter in Signature.from_callable(command).parameters.values():
+            hint = hints[parameter.name]
+            kind = getattr(hint, "__origin__", hint)
+            if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+                shown = next(
+                    (one for one in getattr(hint, "__metadata__", ()) if isinstance(one, Shown)), Shown()
+                )
+                group = self.groups[parameter.name] = Group(kind, _fields(kind, shown.only))
+                self._insert(group.options, shown.before)
+            else:
+                self._insert([_option(parameter.name, hint, parameter.default)], "")
+
+    def _insert(self, more: Sequence[Option], before: str) -> None:
+        names = list(self.options)
+        added = {option.parameter.name: option for option in more}
+        if twice := {*names} & {*added}:
+            raise TypeError(f"two options of a command are named {', '.join(sorted(twice))}")
+        place = names.index(before) if before else len(names)
+        items = list(self.options.items())
+        self.options = dict([*items[:place], *added.items(), *items[place:]])
+
+    def typed(self, words: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the arguments of the command from the words of a command line, and refuse what breaks a rule."""
+        read = {name: one.value(words.get(name, one.parameter.default)) for name, one in self.options.items()}
+        line = CommandLine(
+            {one.spelling: read[name] for name, one in self.options.items()},
+            {one.spelling: one.value(_optional(one.parameter.default)) for one in self.options.values()},
+            {name: group.spellings for name, group in self.groups.items()},
+        )
+        check(self.rules, line)
+        for group in self.groups.values():
+            check(getattr(group.kind, "rules", ()), line.of(group.spellings))
+        made = {
+            name: group.kind(**{one.parameter.name: read.pop(one.parameter.name) for one in group.options})
+            for name, group in self.groups.items()
+        }
+        return read | made
+
+
+def grouped(command: Command) -> Command:
+    """Let Typer read the options of a command, and give the command typed values and objects of its groups.
+
+    A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. Its class variable
+    `panel` is the heading of its options, and `rules` says which of them go together.
     """
-    hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, tuple[type[Any], tuple[str, ...]]] = {}
-    options: dict[str, Parameter] = {}
-    for parameter in Signature.from_callable(command).parameters.values():
-        hint = hints[parameter.name]
-        kind = getattr(hint, "__origin__", hint)
-        shown = next((item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Shown)), Shown())
-        if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-            fields = _options(kind, shown.only)
-            groups[parameter.name] = kind, tuple(option.name for option in fields)
-        else:
-            fields = [parameter.replace(annotation=hint, kind=_KEYWORD)]
-        options = _insert(options, fields, shown.before)
+    options = CommandOptions(command)
 
     @wraps(command)
-    def run(**values: Any) -> Any:
-        objects = {
-            name: kind(**{field: values.pop(field) for field in fields})
-            for name, (kind, fields) in groups.items()
-        }
-        return command(**values, **objects)
+    def run(**words: Any) -> Any:
+        return command(**options.typed(words))
 
+    parameters = [option.parameter for option in options.options.values()]
     del run.__dict__["__wrapped__"]  # else the command's own signature would be read
-    run.__dict__["__signature__"] = Signature(list(options.values()))
-    run.__annotations__ = {option.name: option.annotation for option in options.values()}
+    run.__dict__["__signature__"] = Signature(parameters)
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    run.__dict__["options"] = options
     return run  # type: ignore[return-value]
 
 
-def _options(group: type[Any], only: tuple[str, ...]) -> list[Parameter]:
+def _fields(group: type[Any], only: tuple[str, ...]) -> list[Option]:
     hints = get_type_hints(group, include_extras=True)
     fields = {field.name: field for field in dataclasses.fields(group)}
     if unknown := {*only} - {*fields}:
         raise TypeError(f"{group.__name__} has no option {', '.join(sorted(unknown))}")
     panel = getattr(group, "panel", None)
-    return [
-        Parameter(name, _KEYWORD, default=_default(fields[name]), annotation=_in_panel(hints[name], panel))
-        for name in only or fields
-    ]
-
-
-def _in_panel(hint: Any, panel: str | None) -> Any:
-    metadata = [copy(item) if hasattr(item, "rich_help_panel") else item for item in hint.__metadata__]
-    for item in metadata:
-        if hasattr(item, "rich_help_panel"):
-            item.rich_help_panel = panel
-    return Annotated[hint.__origin__, *metadata]
+    return [_option(name, hints[name], _default(fields[name]), panel) for name in only or fields]
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
     return Parameter.empty if field.default is dataclasses.MISSING else field.default
 
 
-def _insert(options: dict[str, Parameter], more: list[Parameter], before: str) -> dict[str, Parameter]:
-    if twice := {*options} & {option.name for option in more}:
-        raise TypeError(f"two options of a command are named {', '.join(sorted(twice))}")
-    names = list(options)
-    place = names.index(before) if before else len(names)
-    items = list(options.items())
-    return dict([*items[:place], *((option.name, option) for option in more), *items[place:]])
+def _optional(default: Any) -> Any:
+    return None if default is Parameter.empty else default
 
 
-def command_line(command: str, names: Iterable[str], stated: Mapping[str, str], *groups: Any) -> str:
-    """Return the command line of arguments, stated options and groups, with all options that are not the default."""
-    words = ["strapgen", command, *names, *(word for pair in stated.items() for word in pair)]
-    for group in groups:
-        hints = get_type_hints(type(group), include_extras=True)
-        for field in dataclasses.fields(group):
-            value = getattr(group, field.name)
-            if value == field.default or value is None:
-                continue
-            name = (
-                hints[field.name].__metadata__[0].default
-            )  # in an annotation Typer has the first name there
-            values = value if isinstance(value, list) else [value]
-            words += [word for each in values for word in ((name,) if each is True else (name, str(each)))]
+def _option(name: str, hint: Any, default: Any, panel: str | None = None) -> Option:
+    """Return the option of a parameter, for which Typer reads text and takes the default as it is written."""
+    # Typer passes every value by its name, so that one without a default may stand behind others.
+    parameter = Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+    info = copy(
+        next((one for one in getattr(hint, "__metadata__", ()) if isinstance(one, ParameterInfo)), None)
+    )
+    if info is None:
+        return Option((name,), hint, parameter, None)
+    kind, _ = values.split(hint.__origin__)
+    read, info.parser = values.reader(hint.__origin__, info.parser), None  # type: ignore[arg-type]
+    info.rich_help_panel = panel or info.rich_help_panel
+    # In an annotation Typer takes the first name of an option for its default.
+    named = isinstance(info, OptionInfo)
+    spellings = (str(info.default), *(info.param_decls or ())) if named else (info.metavar or name,)
+    words: Any = hint.__origin__
+    if read is not None and kind is not Path:
+        words = list[str] if issubclass(kind, Mapping) else str
+        words = words | None if default is None else words
+        default = default if default in (None, Parameter.empty) else values.written(default)
+    return Option(
+        spellings, kind, parameter.replace(default=default, annotation=Annotated[words, info]), read
+    )
+
+
+def stated(group: Any) -> dict[str, Any]:
+    """Return the options of a group that have not their defaults, with their values."""
+    return {
+        option.spelling: value
+        for option in _fields(type(group), ())
+        if (value := getattr(group, option.parameter.name)) is not None
+        and value != option.value(_optional(option.parameter.default))
+    }
+
+
+def command_line(command: str, *parts: Any, files_by_name: bool = False) -> str:
+    """Return a command line of arguments, of options by their names, and of groups without what is the default."""
+    words = ["strapgen", *command.split()]
+    for part in parts:
+        if isinstance(part, str):
+            words.append(part)
+            continue
+        for name, value in (part if isinstance(part, Mapping) else stated(part)).items():
+            if value is True:
+                words.append(name)
+            elif isinstance(value, Mapping):
+                words += [word for key, one in value.items() for word in (name, f"{key}={one}")]
+            elif value is not None:
+                by_name = files_by_name and isinstance(value, Path)
+                words += [name, values.written(value.name if by_name else value)]
     return shlex.join(words)

@@ -1,15 +1,17 @@
-"""Options that several commands share, and readers of option values; each option has one name, metavar and sentence."""
+"""Options that several commands share; each option has one name, metavar and sentence."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import typer
 
 from strapgen.cli.progress import waiting
+from strapgen.cli.rules import OneOf, Rule
+from strapgen.cli.values import Positive, Reader, folder, names, single
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -20,20 +22,16 @@ if TYPE_CHECKING:
 _Text = str | None
 
 
-def option(*names: str, metavar: str | None = None, help: str, panel: str | None = None) -> Any:
+def option(
+    *names: str, metavar: str | None = None, help: str, panel: str | None = None, read: Reader | None = None
+) -> Any:
     """Return an option of a command; the names after the first one are aliases, which the help does not show.
 
-    A default of the parameter is shown if it is not None; one that the command finds stands in the help.
+    A default of the parameter is shown if it is not None; one that the command finds stands in the help. `read` reads
+    one value, where the type of the parameter does not say how.
     """
-    check = _require_folder if metavar == "FOLDER" else None
-    return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel, callback=check)
-
-
-def _require_folder(parameter: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Refuse the terminal where a folder is needed; elsewhere - stands for it."""
-    if value == Path("-"):
-        raise InputError(f"{parameter.opts[0]} - is no folder; files are not written to the terminal")
-    return value
+    read = read or (folder if metavar == "FOLDER" else None)
+    return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel, parser=read)  # type: ignore[arg-type]
 
 
 def _argument(help: str) -> Any:
@@ -66,24 +64,39 @@ TwoSpeedAlgorithm = Annotated[str, _argument("dcm or euler.")]
 StrapdownAlgorithm = Annotated[str, _argument("dcm or euler in two speeds, or a described system.")]
 
 _SHOWN_BACKENDS = "strapgen list backends shows all."
+#: Reads the name of a back end.
+a_backend = names("strapgen.run.registry:BACKENDS")
+
+
+def default_backends() -> tuple[str, ...]:
+    """Return the back ends of a run that names none."""
+    from strapgen.run.registry import DEFAULT_BACKENDS
+
+    return DEFAULT_BACKENDS
+
+
 #: One back end.
 OneBackend = Annotated[
-    str, option("--backend", metavar="NAME", help=f"Back end; {_SHOWN_BACKENDS}", panel="Algorithm")
+    str,
+    option(
+        "--backend", metavar="NAME", help=f"Back end; {_SHOWN_BACKENDS}", panel="Algorithm", read=a_backend
+    ),
 ]
 #: Several back ends side by side.
 SeveralBackends = Annotated[
-    str,
+    tuple[str, ...],
     option(
         "--backend",
         "--backends",
         metavar="NAME,...",
         help=f"Back ends, with commas between; {_SHOWN_BACKENDS}",
         panel="Algorithm",
+        read=a_backend,
     ),
 ]
 #: Several back ends; by default those that are fast.
 FastBackends = Annotated[
-    _Text,
+    tuple[str, ...] | None,
     option(
         "--backend",
         "--backends",
@@ -91,10 +104,11 @@ FastBackends = Annotated[
         help=f"Back ends, with commas between; {_SHOWN_BACKENDS}  "
         "[default: all but fixed-model and exact, which are slow]",
         panel="Algorithm",
+        read=a_backend,
     ),
 ]
 Sculling = Annotated[
-    str,
+    int,
     option(
         "--sculling",
         metavar="N",
@@ -102,11 +116,43 @@ Sculling = Annotated[
         panel="Algorithm",
     ),
 ]
-Duration = Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.", panel="Input")]
-Increments = Annotated[
-    _Text,
-    option("--increments", metavar="N", help="Number of angle increments in a step, 1 to 8.  [default: 2]"),
+Duration = Annotated[
+    Positive, option("--duration", metavar="S", help="Duration of each run in s.", panel="Input")
 ]
+GyroRate = Annotated[Positive, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")]
+#: An attitude step of the catalogue
+StepName = Annotated[
+    str,
+    option(
+        "--algorithm",
+        metavar="NAME",
+        help="Algorithm: dcm, euler or cayley-klein.",
+        panel="Algorithm",
+        read=names("strapgen.catalogue:ALGORITHMS"),
+    ),
+]
+#: A language of microcontrollers
+CTarget = Annotated[
+    str, option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm")
+]
+#: A processor whose instructions are counted
+Processor = Annotated[
+    str | None,
+    option(
+        "--cpu",
+        metavar="NAME",
+        help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
+        "instance cortex-m3.",
+        panel="Run",
+    ),
+]
+#: A number of increments, or as many as a method needs.
+Samples = int | Literal["enough"]
+
+
+def samples(option: str, text: str) -> Samples:
+    """Read a number of increments, or the word enough."""
+    return "enough" if text == "enough" else checks.whole(option, text)
 
 
 @dataclass(frozen=True)
@@ -114,6 +160,7 @@ class MethodOptions:
     """Options that choose a kernel: the method and the samples of a step, constants, the layout of another kernel."""
 
     panel: ClassVar[str] = "Algorithm"
+    rules: ClassVar[tuple[Rule, ...]] = (OneOf("--method --tableau --window --coning"),)
 
     method: Annotated[
         _Text,
@@ -121,6 +168,7 @@ class MethodOptions:
             "--method",
             metavar="NAME",
             help="Integration method; strapgen list methods shows all.  [default: rk4]",
+            read=single,
         ),
     ] = None
     tableau: Annotated[
@@ -147,9 +195,17 @@ class MethodOptions:
             help="TOML file with coning coefficients for a band or spectrum, in place of --method; coning writes one.",
         ),
     ] = None
-    increments: Increments = None
+    increments: Annotated[
+        Samples | None,
+        option(
+            "--increments",
+            metavar="N",
+            help="Number of angle increments in a step, 1 to 8.  [default: 2]",
+            read=checks.whole,
+        ),
+    ] = None
     previous: Annotated[
-        _Text,
+        int | None,
         option(
             "--previous",
             metavar="N",
@@ -157,7 +213,7 @@ class MethodOptions:
         ),
     ] = None
     ahead: Annotated[
-        _Text,
+        int | None,
         option(
             "--ahead",
             metavar="N",
@@ -173,7 +229,7 @@ class MethodOptions:
     ] = False
 
     constant: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--constant",
             metavar="NAME=VALUE,...",
@@ -196,51 +252,36 @@ class MethodOptions:
         """The files that the options name."""
         return self.tableau, self.window, self.coning, self.layout
 
-    @property
-    def stated(self) -> list[str]:
-        """The options that the command line has."""
-        return [
-            f"--{part.name}" for part in fields(self) if getattr(self, part.name) not in (None, False, [])
-        ]
-
     def choose(self, algorithm: str, *, step: bool = True) -> Choice:
         """Return the kernel that the options choose of an algorithm; with `step` it must be an attitude step."""
         from strapgen import catalogue
         from strapgen.catalogue.methods import shaped_coning, tableaux, windows
 
-        readers: dict[str, tuple[Path | None, Callable[[Path], AnyMethod]]] = {
-            "--tableau": (self.tableau, tableaux.read),
-            "--window": (self.window, windows.read),
-            "--coning": (self.coning, shaped_coning.read),
-        }
-        stated = {"--method": self.method, **{name: path for name, (path, _) in readers.items()}}
-        both = [f"{name} {value}" for name, value in stated.items() if value is not None]
-        if len(both) > 1:
-            raise InputError(f"{both[0]} and {both[1]} are both given; one is needed")
         method: AnyMethod | None = self.method
-        for path, read in readers.values():
+        readers: dict[Callable[[Path], AnyMethod], Path | None] = {
+            tableaux.read: self.tableau,
+            windows.read: self.window,
+            shaped_coning.read: self.coning,
+        }
+        for read, path in readers.items():
             if path is not None:
                 method = read(path)
-        one("--method", self.method)
-        count = whole("increments", self.increments)
-        before, after = whole("previous", self.previous), whole("ahead", self.ahead)
+        count = None if self.increments == "enough" else self.increments
+        constants = {
+            name: [number.strip() for number in numbers.split(",")]
+            for name, numbers in (self.constant or {}).items()
+        }
         with waiting(f"deriving {algorithm}"):  # a user's code may take its time
-            rest = method, count, self.rates, before, after, self._constants()
+            rest = method, count, self.rates, self.previous, self.ahead, constants or None
             if step:
-                return catalogue.choose_step(algorithm, *rest)
-            return catalogue.choose(algorithm, *rest, layout=self.layout)
-
-    def _constants(self) -> dict[str, list[str]] | None:
-        """Return the numbers of each constant as they are written; None if none is stated."""
-        if not self.constant:
-            return None
-        constants: dict[str, list[str]] = {}
-        for text in self.constant:
-            name, numbers = pair("--constant", text)
-            if name in constants:
-                raise InputError(f"--constant {name} is given twice; one is needed")
-            constants[name] = [number.strip() for number in numbers.split(",")]
-        return constants
+                choice = catalogue.choose_step(algorithm, *rest)
+            else:
+                choice = catalogue.choose(algorithm, *rest, layout=self.layout)
+        if self.increments != "enough":
+            return choice
+        if choice.method is None or choice.increments is None:
+            raise InputError(f"--increments enough does not go with {algorithm}; a number does")
+        return replace(choice, increments=catalogue.enough(choice.method))
 
 
 #: The options of an attitude step, which takes increments.
@@ -254,92 +295,32 @@ class SeveralMethods(MethodOptions):
     """Options that choose the methods to show side by side, and the numbers of increments of each."""
 
     method: Annotated[
-        _Text,
+        tuple[str, ...] | None,
         option(
             "--method",
             metavar="NAME,...",
             help="Integration methods, with commas between; strapgen list methods shows all.  [default: rk4]",
         ),
-    ] = None
+    ] = None  # type: ignore[assignment]
     increments: Annotated[
-        _Text,
+        tuple[Samples, ...] | None,
         option(
             "--increments",
             metavar="N,...",
             help="Numbers of angle increments in a step, 1 to 8; enough: as many as each method needs.  [default: 2]",
+            read=samples,
         ),
-    ] = None
+    ] = None  # type: ignore[assignment]
 
-    def each(self) -> list[SeveralMethods]:
-        """Return the options with one method and one number of increments each."""
+    def each(self) -> list[MethodOptions]:
+        """Return the options of one method with one number of increments each."""
+        common = {part.name: getattr(self, part.name) for part in fields(self)}
         return [
-            replace(self, method=name, increments=count)
-            for name in _parts("--method", self.method)
-            for count in _parts("--increments", self.increments)
+            MethodOptions(**common | {"method": name, "increments": count})
+            for name in self.method or (None,)
+            for count in self.increments or (None,)
         ]
 
     def choices(self, algorithm: str, *, step: bool = True) -> list[Choice]:
         """Return the choices of the algorithm with every method and every number of increments."""
         return [options.choose(algorithm, step=step) for options in self.each()]
-
-    def choose(self, algorithm: str, *, step: bool = True) -> Choice:
-        """Return the algorithm with one method; see `MethodOptions.choose`."""
-        if self.increments != "enough":
-            return super().choose(algorithm, step=step)
-        from strapgen import catalogue
-
-        choice = replace(self, increments=None).choose(algorithm, step=step)
-        if choice.method is None or choice.increments is None:
-            raise InputError(f"--increments enough does not go with {algorithm}; a number does")
-        return replace(choice, increments=catalogue.enough(choice.method))
-
-
-def whole(what: str, value: str | None) -> int | None:
-    """Read an option that takes a whole number."""
-    return None if value is None else checks.whole(what, value)
-
-
-def limit(what: str, value: str | None) -> float | None:
-    """Read an option that takes a number from 0 on."""
-    if value is None:
-        return None
-    number = float(checks.number(what, value))
-    if number < 0:
-        raise InputError(f"{what} is {value}; a number that is not below 0 is needed")
-    return number
-
-
-def one(option: str, value: str | None) -> None:
-    """Refuse a list where one name is needed."""
-    if value is not None and "," in value:
-        raise InputError(f"{option} {value} is a list; one name is needed here")
-
-
-def listed(option: str, text: str) -> list[str]:
-    """Return the values of a comma-separated list, each once, at least one."""
-    values = list(dict.fromkeys(value.strip() for value in text.split(",") if value.strip()))
-    if not values:
-        raise InputError(f"{option} is {text!r}; at least one value is needed")
-    return values
-
-
-def backends(option: str, text: str | None, default: Sequence[str]) -> list[str]:
-    """Return the back ends of a list, checked; the default without one."""
-    from strapgen.run.backends import BACKENDS
-
-    if text is None:
-        return list(default)
-    return [checks.choice("backend", name, BACKENDS) for name in listed(option, text)]
-
-
-def pair(option: str, text: str) -> tuple[str, str]:
-    """Return the name and the value of NAME=VALUE."""
-    name, equals, value = text.partition("=")
-    if not equals or not name or not value:
-        raise InputError(f"{option} {text!r} is no setting; NAME=VALUE is needed")
-    return name, value
-
-
-def _parts(option: str, text: str | None) -> list[str | None]:
-    """Return the values of a list; None stands for the default."""
-    return [None] if text is None else [*listed(option, text)]

@@ -47,6 +47,11 @@ Folder = Annotated[
     Path | None,
     option("--out", metavar="FOLDER", help="Folder for the files.  [default: here]", panel="Output"),
 ]
+#: The folder of a command that may write none.
+NewFolder = Annotated[
+    Path | None,
+    option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
+]
 WithRuns = Annotated[
     bool,
     option(

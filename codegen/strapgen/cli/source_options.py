@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen.cli.option_groups import stated
 from strapgen.cli.options import option
 from strapgen.cli.output import Project, WithRuns, print_json
 from strapgen.ir.exceptions import InputError
@@ -68,24 +69,16 @@ class SourceOptions:
 
         return Naming(self.name, self.prefix)
 
-    @property
-    def for_libraries(self) -> str | None:
-        """The first stated option that goes with C, C++, Rust and MATLAB alone; None if there is none."""
-        stated = {
-            "--name": self.name is not None,
-            "--prefix": self.prefix is not None,
-            "--with-runs": self.with_runs,
-        }
-        return next((option for option, is_stated in stated.items() if is_stated), None)
-
     def require_language(self, target: str) -> None:
         """Check that the options go with the language of a target."""
         from strapgen.targets import TARGETS
 
-        if self.for_libraries and not TARGETS[target].nameable:
-            raise InputError(
-                f"{self.for_libraries} goes with targets in C, C++, Rust and MATLAB, not with {target}"
-            )
+        if not TARGETS[target].nameable:
+            for name in ("--name", "--prefix", "--with-runs"):
+                if name in stated(self):
+                    raise InputError(
+                        f"{name} goes with targets in C, C++, Rust and MATLAB, not with {target}"
+                    )
         if self.project and not TARGETS[target].compiled:
             raise InputError(f"--project goes with targets in C, not with {target}")
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from strapgen.analysis.vibration.spectrum import read_spectrum
-from strapgen.catalogue import toml_files
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key
 from strapgen.design.environment import (
     Environment,
     Line,
@@ -17,44 +17,36 @@ from strapgen.design.environment import (
     RecordedEnvironment,
     SpectralEnvironment,
 )
-from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.cost.processors import PROCESSORS
 from strapgen.targets.registry import TARGETS
 
-#: A longer file is refused.
-_MOST_BYTES = 100_000
-#: The tables of a brief, with the keys of each.
-_KEYS: dict[str, tuple[str, ...]] = {
-    "vibration": ("lines", "psd", "recording"),
-    "gyro": ("sample_hz", "noise_deg_sqrt_h", "pulse_arcsec", "bandwidth_hz", "damping"),
-    "budget": ("drift_deg_h", "velocity_m_s", "position_m", "over_s", "software_share"),
-    "processor": ("word", "operations_per_s", "instructions_per_s", "bytes", "cpu"),
-}
-_TOP = ("max_rate_deg_s", *_KEYS)
-_LINE_KEYS = ("frequency_hz", "theta_x_rad", "theta_y_rad", "phase_rad", "acceleration_y_m_s2")
 #: Part of the budget that the software may use where the brief does not say. The share is this project's own:
 #: Savage's section 3.6 says that the algorithm cannot tolerate any errors whatsoever.
 DEFAULT_SHARE = Fraction(1, 10)
-_DEFAULT_OVER = Fraction(3600)
-_DEFAULT_WORD, _DEFAULT_CPU = 32, "cortex-m3"
-#: Largest sampling rate in Hz and largest number of steps of a budget's time.
-_MOST_HZ, _MOST_SECONDS = 1_000_000, 1_000_000
 
 
 @dataclass(frozen=True)
 class GyroBrief:
     """The gyro of a brief."""
 
-    #: Sampling rate in Hz
-    sample_hz: Fraction
-    #: Random walk of the angle on each axis in deg per root of an hour
-    noise_deg_sqrt_h: float = 0.0
-    #: Angle of a pulse; 0 for increments that are not quantized
-    pulse_arcsec: Fraction = Fraction(0)
-    #: Natural frequency and damping of a gyro of second order; None for one that passes on everything
-    bandwidth_hz: Fraction | None = None
-    damping: Fraction | None = None
+    sample_hz: Annotated[Fraction, Key("Sampling rate", "Hz", above=0, most=1_000_000)]
+    noise_deg_sqrt_h: Annotated[
+        float, Key("Random walk of the angle on each axis", "deg/sqrt(h)", least=0)
+    ] = 0.0
+    pulse_arcsec: Annotated[
+        Fraction, Key("Angle of a pulse; 0 for increments that are not quantized", "arcsec", least=0)
+    ] = Fraction(0)
+    #: Both are None for a gyro that passes on everything
+    bandwidth_hz: Annotated[
+        Fraction | None, Key("Natural frequency of a gyro of second order", "Hz", above=0)
+    ] = None
+    damping: Annotated[Fraction | None, Key("Its damping ratio", "1", above=0)] = None
+
+    def __post_init__(self) -> None:
+        if (self.bandwidth_hz is None) != (self.damping is None):
+            missing = "damping" if self.damping is None else "bandwidth_hz"
+            raise InputError(f"{missing} is missing; bandwidth_hz and damping go together")
 
     def gain(self, frequency_hz: Any) -> Any:
         """Return the complex factor by which it passes on an oscillation at a frequency, or at many, in Hz."""
@@ -68,15 +60,19 @@ class GyroBrief:
 class BudgetBrief:
     """What an algorithm may lose."""
 
-    #: Angle from the true attitude, divided by the time, of all causes together
-    drift_deg_h: float
-    #: The time in s over which errors add up
-    over_s: Fraction = _DEFAULT_OVER
-    #: Part of it that truncation, coning and rounding may use together
-    software_share: float = float(DEFAULT_SHARE)
-    #: Errors of velocity and position after that time, in which the same share belongs to sculling
-    velocity_m_s: float | None = None
-    position_m: float | None = None
+    drift_deg_h: Annotated[
+        float,
+        Key("Angle from the true attitude by all causes together, divided by the time", "deg/h", above=0),
+    ]
+    over_s: Annotated[Fraction, Key("Time over which errors add up", "s", above=0, most=1_000_000)] = (
+        Fraction(3600)
+    )
+    software_share: Annotated[
+        float, Key("Part that truncation, coning and rounding may use together", "1", above=0, most=1)
+    ] = float(DEFAULT_SHARE)
+    #: The same share of both belongs to sculling
+    velocity_m_s: Annotated[float | None, Key("Error of velocity after that time", "m/s", above=0)] = None
+    position_m: Annotated[float | None, Key("Error of position after that time", "m", above=0)] = None
 
     @property
     def limits_velocity(self) -> bool:
@@ -88,14 +84,13 @@ class BudgetBrief:
 class ProcessorBrief:
     """What an algorithm may cost."""
 
-    #: Bits of a word
-    word: int = _DEFAULT_WORD
-    #: Largest number of operations and of instructions a second, and bytes of code and constants
-    operations_per_s: float | None = None
-    instructions_per_s: float | None = None
-    bytes: float | None = None
-    #: The processor on which instructions and bytes are counted
-    cpu: str = _DEFAULT_CPU
+    word: Annotated[int, Key("Length of a word", "bit", choices=TARGETS["c-fixed"].words or ())] = 32
+    operations_per_s: Annotated[float | None, Key("Most operations", "1/s", above=0)] = None
+    instructions_per_s: Annotated[float | None, Key("Most instructions", "1/s", above=0)] = None
+    bytes: Annotated[float | None, Key("Most bytes of code and constants", "byte", above=0)] = None
+    cpu: Annotated[str, Key("Processor on which instructions and bytes are counted", choices=PROCESSORS)] = (
+        "cortex-m3"
+    )
 
     @property
     def is_measured(self) -> bool:
@@ -116,143 +111,60 @@ class DesignBrief:
     processor: ProcessorBrief
 
 
+@dataclass(frozen=True)
+class VibrationFile:
+    """The vibration of a brief: lines, a spectrum or a recording."""
+
+    lines: Annotated[tuple[Line, ...] | None, Key("Vibrations at one frequency each", least=1)] = None
+    psd: Annotated[
+        str | None, Key("CSV file of a power spectral density, its path from the brief's folder")
+    ] = None
+    recording: Annotated[
+        str | None, Key("CSV file of recorded increments, its path from the brief's folder")
+    ] = None
+
+    def __post_init__(self) -> None:
+        stated = [field.name for field in fields(self) if getattr(self, field.name) is not None]
+        if len(stated) > 1:
+            raise InputError(f"the keys {' and '.join(stated)} are there; one of them is needed")
+
+    def environment(self, folder: Path) -> Environment | None:
+        """Return the vibration; paths begin at a folder."""
+        if self.lines is not None:
+            return LineEnvironment(self.lines)
+        if self.psd is not None:
+            return SpectralEnvironment(read_spectrum(folder / self.psd))
+        return None if self.recording is None else RecordedEnvironment.read(folder / self.recording)
+
+
+@dataclass(frozen=True)
+class BriefFile:
+    """The environment, the gyro, the budget and the processor for which an algorithm is selected."""
+
+    max_rate_deg_s: Annotated[
+        Fraction, Key("Largest rate about an axis, vibration included", "deg/s", above=0)
+    ]
+    gyro: Annotated[GyroBrief, Key("The gyro")]
+    budget: Annotated[BudgetBrief, Key("What an algorithm may lose")]
+    vibration: Annotated[VibrationFile, Key("The vibration; none without it")] = VibrationFile()
+    processor: Annotated[ProcessorBrief, Key("What an algorithm may cost")] = ProcessorBrief()
+
+
+BRIEF = UserFile("a brief", BriefFile, 100_000)
+
+
 def read_brief(path: str | Path) -> DesignBrief:
     """Read a brief."""
-    data = toml_files.content(path, "a brief", _MOST_BYTES, parse_float=str)
-    try:
-        return _brief(data, Path(path).parent)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+
+    def brief(file: BriefFile) -> DesignBrief:
+        environment = file.vibration.environment(Path(path).parent)
+        return DesignBrief(file.max_rate_deg_s, environment, file.gyro, file.budget, file.processor)
+
+    return BRIEF.convert(path, brief)
 
 
 def files_of(path: str | Path) -> list[Path]:
     """Return the files that a brief is read from: its own, and that of its vibration."""
-    vibration = toml_files.content(path, "a brief", _MOST_BYTES, parse_float=str).get("vibration", {})
-    named = [vibration[key] for key in ("psd", "recording") if key in vibration]
+    vibration = BRIEF.read(path).vibration
+    named = [name for name in (vibration.psd, vibration.recording) if name is not None]
     return [Path(path), *(Path(path).parent / name for name in named)]
-
-
-def _brief(data: Mapping[str, Any], folder: Path) -> DesignBrief:
-    _check_keys("", data, _TOP)
-    tables = {}
-    for name, keys in _KEYS.items():
-        table = data.get(name, {})
-        if not isinstance(table, dict):
-            raise InputError(f"{name} is no table; [{name}] with {', '.join(keys)} is needed")
-        _check_keys(f"{name}.", table, keys)
-        tables[name] = table
-    gyro = _gyro(tables["gyro"])
-    return DesignBrief(
-        _needed(data, "", "max_rate_deg_s"),
-        _environment(tables["vibration"], folder) if tables["vibration"] else None,
-        gyro,
-        _budget(tables["budget"]),
-        _processor(tables["processor"]),
-    )
-
-
-def _check_keys(where: str, table: Mapping[str, Any], keys: tuple[str, ...]) -> None:
-    """Refuse keys that are not known."""
-    for key in table:
-        checks.choice("key", f"{where}{key}", [f"{where}{name}" for name in keys])
-
-
-def _needed(table: Mapping[str, Any], where: str, key: str) -> Fraction:
-    """Return a number above 0 that a brief must have."""
-    if key not in table:
-        raise InputError(f"{where}{key} is missing; a number above 0 is needed")
-    return _number(table, where, key, positive=True)
-
-
-def _number(table: Mapping[str, Any], where: str, key: str, *, positive: bool = False) -> Fraction:
-    """Return a number that is not below 0, or above it."""
-    value = table[key]
-    if isinstance(value, bool) or not isinstance(value, str | int):
-        raise InputError(f"{where}{key} is {value!r}; a number is needed")
-    number = checks.number(f"{where}{key}", value, positive=positive)
-    if number < 0:
-        raise InputError(f"{where}{key} is {float(number):g}; no number below 0 is allowed")
-    return number
-
-
-def _gyro(table: Mapping[str, Any]) -> GyroBrief:
-    """Return the gyro of a table."""
-    sample_hz = _needed(table, "gyro.", "sample_hz")
-    if sample_hz > _MOST_HZ:
-        raise InputError(f"gyro.sample_hz is {float(sample_hz):g}; at most {_MOST_HZ} is allowed")
-    if ("bandwidth_hz" in table) != ("damping" in table):
-        missing = "damping" if "bandwidth_hz" in table else "bandwidth_hz"
-        raise InputError(f"gyro.{missing} is missing; bandwidth_hz and damping go together")
-    both = [
-        _number(table, "gyro.", key, positive=True) if key in table else None
-        for key in ("bandwidth_hz", "damping")
-    ]
-    noise, pulse = (
-        _number(table, "gyro.", key) if key in table else Fraction(0)
-        for key in ("noise_deg_sqrt_h", "pulse_arcsec")
-    )
-    return GyroBrief(sample_hz, float(noise), pulse, *both)
-
-
-def _budget(table: Mapping[str, Any]) -> BudgetBrief:
-    """Return the budget of a table."""
-    over = _number(table, "budget.", "over_s", positive=True) if "over_s" in table else _DEFAULT_OVER
-    share = DEFAULT_SHARE
-    if "software_share" in table:
-        share = _number(table, "budget.", "software_share", positive=True)
-    if share > 1:
-        raise InputError(f"budget.software_share is {float(share):g}; at most 1 is allowed")
-    if over > _MOST_SECONDS:
-        raise InputError(f"budget.over_s is {float(over):g}; at most {_MOST_SECONDS} is allowed")
-    velocity, position = (
-        float(_number(table, "budget.", key, positive=True)) if key in table else None
-        for key in ("velocity_m_s", "position_m")
-    )
-    drift = float(_needed(table, "budget.", "drift_deg_h"))
-    return BudgetBrief(drift, over, float(share), velocity, position)
-
-
-def _processor(table: Mapping[str, Any]) -> ProcessorBrief:
-    """Return the processor of a table."""
-    word = table.get("word", _DEFAULT_WORD)
-    words = TARGETS["c-fixed"].words or ()
-    if isinstance(word, bool) or word not in words:
-        raise InputError(f"processor.word is {word!r}; {', '.join(map(str, words))} are allowed")
-    operations, instructions, memory = (
-        float(_number(table, "processor.", key, positive=True)) if key in table else None
-        for key in ("operations_per_s", "instructions_per_s", "bytes")
-    )
-    cpu = checks.choice("processor.cpu", table.get("cpu", _DEFAULT_CPU), PROCESSORS)
-    return ProcessorBrief(word, operations, instructions, memory, cpu)
-
-
-def _environment(table: Mapping[str, Any], folder: Path) -> Environment:
-    """Return the vibration of a table."""
-    stated = [key for key in _KEYS["vibration"] if key in table]
-    if len(stated) > 1:
-        raise InputError(f"vibration has {' and '.join(stated)}; one of them is needed")
-    (key,) = stated
-    if key == "lines":
-        return LineEnvironment(_lines(table[key]))
-    if not isinstance(table[key], str):
-        raise InputError(f"vibration.{key} is {table[key]!r}; the path of a file is needed")
-    path = folder / table[key]
-    return SpectralEnvironment(read_spectrum(path)) if key == "psd" else RecordedEnvironment.read(path)
-
-
-def _lines(value: Any) -> tuple[Line, ...]:
-    """Return the lines of a vibration."""
-    if not isinstance(value, list) or not value or not all(isinstance(one, dict) for one in value):
-        raise InputError(f"vibration.lines needs a list of tables with {', '.join(_LINE_KEYS)}")
-    lines = []
-    for number, one in enumerate(value, 1):
-        where = f"vibration.lines {number}: "
-        _check_keys(where, one, _LINE_KEYS)
-        frequency = _needed(one, where, "frequency_hz")
-        sizes = [
-            float(_number(one, where, key)) if key in one else 0.0
-            for key in ("theta_x_rad", "theta_y_rad", "acceleration_y_m_s2")
-        ]
-        phase = float(checks.number(f"{where}phase_rad", one.get("phase_rad", 0)))
-        lines.append(Line(float(frequency), sizes[0], sizes[1], phase, sizes[2]))
-    return tuple(lines)

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.spectrum import Spectrum, random_rates
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.recording import read_increments
 
@@ -50,14 +51,19 @@ class Environment(Protocol):
 class Line:
     """A vibration at one frequency: angles X sin(2 pi f t) about x and Y sin(2 pi f t + P) about y."""
 
-    frequency_hz: float
-    #: Amplitudes X and Y in rad
-    theta_x: float
-    theta_y: float
-    #: P in rad
-    phase: float
-    #: Amplitude of the acceleration along y in m/s^2, of the phase P
-    acceleration_y: float = 0.0
+    frequency_hz: Annotated[float, Key("Frequency f", "Hz", above=0)]
+    theta_x: Annotated[float, Key("Amplitude X", "rad", least=0, name="theta_x_rad")] = 0.0
+    theta_y: Annotated[float, Key("Amplitude Y", "rad", least=0, name="theta_y_rad")] = 0.0
+    phase: Annotated[float, Key("Phase P", "rad", name="phase_rad")] = 0.0
+    acceleration_y: Annotated[
+        float,
+        Key(
+            "Amplitude of the acceleration along y, of the phase P",
+            "m/s^2",
+            least=0,
+            name="acceleration_y_m_s2",
+        ),
+    ] = 0.0
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ REGISTRATION = Registration(
             summary="Select the cheapest algorithm that meets a brief",
         ),
     },
+    files={"brief": f"{__package__}.brief:BRIEF"},
     extensions={"lab.whole-recordings": f"{__package__}.commit_late:whole_recordings"},
     requires=("lab", "analysis"),
 )

@@ -14,7 +14,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import format_option
 from strapgen.cli.progress import track
-from strapgen.ir.exceptions import InputError
+from strapgen.cli.rules import Excludes, Needs, OneOf, rules
 from strapgen.navigation.systems.built_in import is_system
 
 if TYPE_CHECKING:
@@ -25,6 +25,11 @@ _FORMATS = ("text", "json", "csv", "markdown", "latex")
 
 
 @grouped
+@rules(
+    OneOf("NAME... --all", needed="a kernel is needed, or --all; strapgen list kernels shows them"),
+    Excludes("--all", "@method @fixed", reason="--all examines the whole catalogue"),
+    Needs("--check", "--page"),
+)
 def evidence(
     kernels: Annotated[
         list[str] | None,
@@ -43,7 +48,7 @@ def evidence(
     method: MethodOptions,
     fixed: FixedOptions,
     tool: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option("--tool", metavar="NAME,...", help="Tools to run.  [default: all]", panel="Evidence"),
     ] = None,
     complete: Annotated[
@@ -84,13 +89,10 @@ def evidence(
     from strapgen.ir import checks
 
     checks.choice("format", format, _FORMATS)
-    if check and page is None:
-        raise InputError("--check compares a page; --page is missing, which names its file")
-    subjects = [*_subjects(kernels or [], all_, method, fixed)]
-    tools = [] if tool is None else [name.strip() for name in tool.split(",")]
+    subjects = [*_subjects(kernels or [], method, fixed)]
     with _folder(out) as folder:
-        tasks = collection.collect(subjects, folder, tools)
-        total = len(tools or collection.CHECKS) * len(subjects)
+        tasks = collection.collect(subjects, folder, tool or ())
+        total = len(tool or collection.CHECKS) * len(subjects)
         verdicts = collection.in_order(
             [verdict for part in track(tasks, "examining", total) for verdict in part], subjects
         )
@@ -102,17 +104,10 @@ def evidence(
     raise typer.Exit(status)
 
 
-def _subjects(
-    kernels: list[str], all_: bool, method: MethodOptions, fixed: FixedOptions
-) -> Iterator[Subject]:
+def _subjects(kernels: list[str], method: MethodOptions, fixed: FixedOptions) -> Iterator[Subject]:
     from strapgen.evidence import subjects
 
-    stated = [*method.stated, *fixed.stated]
-    if all_ and (kernels or stated):
-        raise InputError(f"--all examines the whole catalogue; {[*stated, *kernels][0]} does not go with it")
-    if not all_ and not kernels:
-        raise InputError("a kernel is needed, or --all; strapgen list kernels shows them")
-    if all_:
+    if not kernels:
         yield from subjects.standard()
     for kernel in kernels:
         if is_system(kernel):

@@ -10,6 +10,8 @@ class InputError(StrapgenError, ValueError):
 
     #: Whether a name is not known; a package that cannot be used may have it.
     unknown_name = False
+    #: Whether it is about what a file holds, whose keys are no options of a command.
+    in_file = False
 
 
 class InputTypeError(StrapgenError, TypeError):

@@ -104,10 +104,11 @@ def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
     likely = [name for name in SYNONYMS.get(what, {}).get(plain, ()) if name in names]
     if likely:
         return likely
-    alike = {name: difflib.SequenceMatcher(None, plain, name).ratio() for name in names}
+    dashed = {name: name.replace("_", "-") for name in names}
+    alike = {name: difflib.SequenceMatcher(None, plain, dashed[name]).ratio() for name in names}
     close = [name for name in names if alike[name] >= (_ALIKE if name[:1] == plain[:1] else _MORE_ALIKE)]
     close.sort(key=lambda name: -alike[name])
-    inside = [name for name in names if len(plain) > 2 and plain in name]
+    inside = [name for name in names if len(plain) > 2 and plain in dashed[name]]
     return list(dict.fromkeys([*close, *inside]))[:_MOST_SUGGESTIONS]
 
 

@@ -38,5 +38,6 @@ REGISTRATION = Registration(
         "study monte-carlo": Command(f"{__package__}.monte_carlo.monte_carlo_command:study_monte_carlo"),
     },
     motions=(f"{__package__}.motions.motion_names:TABLE",),
+    files={"sensor-errors": f"{__package__}.sensor_errors.error_file:ERRORS"},
     lists={"motions": f"{__package__}.motions.motions:titles"},
 )

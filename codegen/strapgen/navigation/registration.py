@@ -57,6 +57,13 @@ REGISTRATION = Registration(
         f"{__package__}.outputs.output_names:TWO_ROWS",
         f"{__package__}.loops.loop_names:LOOPS",
     ),
+    files={
+        "system": f"{__package__}.systems.system_file:SYSTEM",
+        "loops": f"{__package__}.loops.loop_schedule:SCHEDULE",
+        "layout": f"{__package__}.instruments.layout:LAYOUT",
+        "redundancy": f"{__package__}.redundancy.geometry_file:GEOMETRY",
+        "calibration": f"{__package__}.calibration.calibration_file:POSITIONS",
+    },
     lists={"systems": f"{__package__}.systems.built_in:names"},
     extensions={
         "lab.described": f"{__package__}.systems.described:SYSTEMS",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -10,18 +11,15 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, command_line, grouped
-from strapgen.cli.options import FastBackends, SeveralMethods, backends, listed, option
+from strapgen.cli.options import Duration, FastBackends, GyroRate, SeveralMethods, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
+from strapgen.cli.rules import Needs, Rule, rules
+from strapgen.cli.values import Positive
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.simulate.sample_source import (
-    MOTION_FILE,
-    RUN_MOTION_NAMES,
     MotionSettings,
-    check_motion,
-    pairs,
+    motion_option,
 )
 from strapgen.thesis.tables_command import runnable
 
@@ -32,8 +30,8 @@ if TYPE_CHECKING:
 
 #: The options of fixed point, for which the sampling rate is that of the runs.
 _FIXED = (
-    *("word", "max_rate_deg_s", "lsb", "lsb_rad", "input_bits", "max_angle_rad"),
-    *("rounding", "carry", "state", "drift_allowance"),
+    *("word", "max_rate_deg_s", "lsb", "lsb_rad", "input_bits", "largest_angle"),
+    *("rounding", "carry", "state", "allowance"),
 )
 
 #: The options that choose kernels.
@@ -50,20 +48,12 @@ class ReportRuns:
     """Options of the runs that a page shows."""
 
     panel: ClassVar[str] = "Input"
+    rules: ClassVar[tuple[Rule, ...]] = (Needs("--set", "--motion"),)
 
-    motion: Annotated[
-        str | None,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: coning]",
-        ),
-    ] = None
+    motion: Annotated[str | None, motion_option("coning")] = None
     settings: MotionSettings = None
-    sample_hz: Annotated[
-        str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
-    ] = "100"
-    duration: Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.")] = "20"
+    sample_hz: GyroRate = Positive("100")
+    duration: Duration = Positive("20")
 
     @property
     def files(self) -> list[str]:
@@ -72,18 +62,11 @@ class ReportRuns:
 
     def conditions(self) -> Conditions:
         """Return the motion, the sampling rate and the duration of the runs, checked."""
-        from strapgen.lab.motions.motion_names import MOTIONS
         from strapgen.report.conditions import Conditions
 
-        check_motion(self.motion, MOTIONS)
-        if self.motion is None and self.settings:
-            raise InputError("--set goes with --motion")
-        numbers = {"sample_hz": self.sample_hz, "duration": self.duration}
-        for name, value in numbers.items():
-            checks.number(name, value, positive=True)
-        conditions = Conditions(sample_hz=self.sample_hz, duration=self.duration)
+        conditions = Conditions(sample_hz=str(self.sample_hz), duration=str(self.duration))
         if self.motion is not None:
-            conditions = replace(conditions, motion=self.motion, settings=pairs(self.settings or []))
+            conditions = replace(conditions, motion=self.motion, settings=self.settings or {})
         conditions.profile()  # refuses what is not known
         return conditions
 
@@ -106,6 +89,7 @@ class ReportOutput(Output):
 
 
 @grouped
+@rules(Needs("@methods", "ALGORITHM..."))
 def report(
     kernels: Annotated[
         list[str] | None,
@@ -120,14 +104,14 @@ def report(
     methods: Annotated[SeveralMethods, Shown(only=_CHOOSING)],
     backend: FastBackends = None,
     beside: Annotated[
-        str,
+        tuple[str, ...],
         option(
             "--beside",
             metavar="NAME,...",
             help="Methods that accuracy against cost shows beside the algorithms, as --method of frontier.",
             panel="Algorithm",
         ),
-    ] = "all",
+    ] = ("all",),
     runs: ReportRuns,
     fixed: Annotated[FixedOptions, Shown(only=_FIXED)],
     output: Annotated[ReportOutput, Shown(only=("out",))],
@@ -143,24 +127,19 @@ def report(
     """
     names = kernels or []
     output.check(*names, *methods.files, *runs.files)
-    if not names and methods.stated:
-        raise InputError(
-            f"{methods.stated[0]} goes with an algorithm; without one, the page shows the catalogue"
-        )
-    places = tuple(runnable() if backend is None else backends("--backend", backend, ()))
     conditions = runs.conditions()
     choices = [choice for name in names for choice in methods.choices(name, step=False)]
-    stated = {"--backend": backend} if backend is not None else {}
-    stated |= {"--beside": beside} if beside != "all" else {}
+    options = {"--backend": backend} if backend is not None else {}
+    options |= {"--beside": beside} if beside != ("all",) else {}
     where = replace(output, out=Path(output.out.name))
-    command = command_line("report", names, stated, methods, runs, fixed, where)
-    others = listed("--beside", beside)
-    output.deliver(_page(list(dict.fromkeys(choices)), others, conditions, places, fixed, command))
+    command = command_line("report", *names, options, methods, runs, fixed, where)
+    places = backend or runnable()
+    output.deliver(_page(list(dict.fromkeys(choices)), beside, conditions, places, fixed, command))
 
 
 def _page(
     choices: list[Choice],
-    beside: list[str],
+    beside: Sequence[str],
     conditions: Conditions,
     places: tuple[str, ...],
     fixed: FixedOptions,
@@ -177,7 +156,7 @@ def _page(
 
     shown = choices or catalogue.standard()
     if fixed.max_rate_deg_s is not None or fixed.lsb is not None:
-        fixed = replace(fixed, sample_hz=conditions.sample_hz)
+        fixed = replace(fixed, sample_hz=Positive(conditions.sample_hz))
     cases = [
         gathering.DossierCase(choice, conditions, fixed.settings(choice.increments_per_step), places)
         for choice in shown

@@ -10,7 +10,6 @@ import inspect
 import pickle
 from collections.abc import Callable
 from functools import wraps
-from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from strapgen.ir.timing import from_cache
@@ -19,8 +18,8 @@ from strapgen.storage import cache
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: What this process has had last, by the folder of the cache and the key, whose content never changes.
-_results: dict[tuple[Path, str], Any] = {}
+#: What this process has had last, by the folder of the cache and all that it depends on.
+_results: dict[tuple[Any, ...], Any] = {}
 #: So many results are remembered; one takes some ten kilobytes.
 _MOST_RESULTS = 512
 
@@ -43,10 +42,10 @@ def cached(
         def recall(*args: P.args, **kwargs: P.kwargs) -> R:
             bound = signature.bind(*args, **kwargs)
             bound.apply_defaults()
-            more = depends(*bound.args[1:])
-            identities = [str(getattr(argument, "identity", argument)) for argument in bound.args]
-            key = cache.digest([cache.generator_digest(), *identities, more])
-            data = _remembered(kind, key, label.format(*bound.args), lambda: stage(*args, **kwargs), copies)
+            parts = [str(getattr(argument, "identity", argument)) for argument in bound.args]
+            parts.append(depends(*bound.args[1:]))
+            what = label.format(*bound.args)
+            data = _remembered(kind, parts, what, lambda: stage(*args, **kwargs), copies)
             result: R = pickle.loads(data) if copies else data
             return result
 
@@ -55,20 +54,13 @@ def cached(
     return decorate
 
 
-def _remembered(kind: str, key: str, what: str, work: Callable[[], Any], as_bytes: bool) -> Any:
+def _remembered(kind: str, parts: list[str], what: str, work: Callable[[], Any], as_bytes: bool) -> Any:
     """Return a result, or its pickle, which a process checks and reads once; the log has every use."""
-
-    def read() -> Any:
-        data = cache.read(cache.entry(kind, key, fill, what), "result.pickle")
-        return data if as_bytes else pickle.loads(data)
-
-    def fill(draft: Path) -> None:
-        (draft / "result.pickle").write_bytes(pickle.dumps(work()))
-
-    place = cache.root(), key
+    place = cache.root(), kind, cache.generator_digest(), *parts
     result = _results.pop(place, None)
     if result is None:
-        result = cache.persistently(read)
+        result = cache.stored(kind, parts, work, what)
+        result = pickle.dumps(result) if as_bytes else result
     else:
         from_cache(what)
     _results[place] = result  # the last one now

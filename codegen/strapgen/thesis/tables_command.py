@@ -2,40 +2,48 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import FastBackends, backends, option, whole
+from strapgen.cli.options import FastBackends, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
+from strapgen.cli.rules import Excludes, rules
+from strapgen.cli.values import Positive, whole
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.thesis.thesis_tables import TableEntry
 
 
 @grouped
+@rules(Excludes("--predict", "--backend --table --orthonormalize @fixed"))
 def tables(
     *,
     backend: FastBackends = None,
     table: Annotated[
-        str | None,
+        int | None,
         option(
             "--table",
             metavar="N",
             help="Number of the only table to compute.  [default: all five]",
             panel="Algorithm",
+            read=whole(1, 5),
         ),
     ] = None,
     orthonormalize: Annotated[
-        str,
+        Positive,
         option(
             "--orthonormalize",
             metavar="S",
             help="Time from one orthonormalization, and record, to the next in s; the thesis has 5 s and 10 s.",
             panel="Run",
         ),
-    ] = "5",
+    ] = Positive("5"),
     predict: Annotated[
         bool,
         option(
@@ -53,17 +61,19 @@ def tables(
     """
     output.check()
     if predict:
-        values = {"--backend": backend, "--table": table}
-        stated = [name for name, value in values.items() if value is not None]
-        stated += ["--orthonormalize"] if orthonormalize != "5" else []
-        for name in [*stated, *fixed.stated]:
-            raise InputError(f"--predict and {name} do not go together")
-        _predict(output)
-        return
-    from strapgen.ir import checks
-    from strapgen.run.backends import BACKENDS
+        return _predict(output)
     from strapgen.thesis.tables_plot import thesis_tables_image
     from strapgen.thesis.tables_report import thesis_tables_report
+
+    entries = _simulated(backend or runnable(), table, orthonormalize, fixed)
+    output.report(thesis_tables_report(entries), lambda path: thesis_tables_image(entries, path))
+
+
+def _simulated(
+    names: tuple[str, ...], table: int | None, orthonormalize: Positive, fixed: FixedOptions
+) -> list[TableEntry]:
+    """Return the entries of the tables, or of one of them, on some back ends."""
+    from strapgen.run.backends import BACKENDS
     from strapgen.thesis.thesis_tables import (
         ALGORITHMS,
         DURATION,
@@ -74,20 +84,17 @@ def tables(
         run_tables,
     )
 
-    names = runnable() if backend is None else tuple(backends("--backend", backend, ()))
     settings = fixed.settings(2)
     if settings is not None and not any(BACKENDS[name].fixed for name in names):
         raise InputError(f"--rounding and --carry are for fixed-point back ends, not for {', '.join(names)}")
-    number = None if table is None else checks.count("table", whole("table", table), largest=len(TABLES))
-    chosen = [each for each in TABLES if number in (None, each.number)]
-    interval = checks.number("orthonormalize", orthonormalize, positive=True)
-    checks.multiple("orthonormalize", interval, "step", STEP)
-    checks.multiple("duration", DURATION, "orthonormalize", interval)
+    chosen = [each for each in TABLES if table in (None, each.number)]
+    checks.multiple("orthonormalize", orthonormalize, "step", STEP)
+    checks.multiple("duration", DURATION, "orthonormalize", orthonormalize)
     cases = len(names) * len(ALGORITHMS) * len(ORDERS)
     for _ in track(build_all(names, settings, chosen), "building", cases):
         pass
-    entries = list(track(run_tables(names, settings, chosen, interval), "simulating", cases * len(chosen)))
-    output.report(thesis_tables_report(entries), lambda path: thesis_tables_image(entries, path))
+    runs = run_tables(names, settings, chosen, orthonormalize)
+    return list(track(runs, "simulating", cases * len(chosen)))
 
 
 def _predict(output: Output) -> None:

@@ -85,11 +85,15 @@ WRONG = {
     "powers": ("powers = 0", "powers = 1", "powers is 1, but the drift has the power 3 of the frequency"),
     "products": ("powers = 0", "products = 1", "products is 1, but a step is not exact for all products"),
     "count": ("previous = 8", "previous = 7", "coefficients has 8 numbers; 7 are needed for 1 samples and 7"),
-    "no coefficients": ("previous = 8", "previous = 0", "samples 1 and previous 0 have no coefficients"),
-    "float": (
+    "no coefficients": (
+        "previous = 8",
+        "previous = 0",
+        "coefficients has 8 numbers; 0 are needed for 1 samples",
+    ),
+    "rounded": (
         '"99157974445826439/576460752303423488"',
         "0.172",
-        "coefficient 1 is 0.172, which is not exact",
+        "level is 7.00799E-10; the coefficients have 1.64687e-05 over their band",
     ),
     "irrational": ('"99157974445826439/576460752303423488"', '"sqrt(2)"', "a rational number is needed"),
     "objective": (
@@ -98,9 +102,9 @@ WRONG = {
         "objective 'least' is not known; allowed: band",
     ),
     "no band": ('band = "1.3"\n', "", "key band goes with the objective band"),
-    "band": ('band = "1.3"', 'band = "3.5"', "band is 3.5 rad a sample"),
+    "band": ('band = "1.3"', 'band = "3.5"', "band is '3.5'; a number above 0 and below 3 in rad a sample"),
     "spectrum": ('objective = "band"', 'objective = "worst"', "key band goes with the objective band"),
-    "level text": ('level = "7.00799E-10"', 'level = "tiny"', "level is 'tiny'; a decimal number above 0"),
+    "level text": ('level = "7.00799E-10"', 'level = "tiny"', "level is 'tiny'; a text of a decimal number"),
     "key": ("powers = 0", "power = 0", "key 'power' is not known"),
     "name": (
         'name = "My Coning 1+8 to 1.3 rad"',

@@ -13,15 +13,15 @@ from strapgen.cli.options import (
     MethodOptions,
     OptionalStepAlgorithm,
     SeveralMethods,
-    listed,
     option,
-    whole,
 )
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.progress import track
+from strapgen.cli.rules import Excludes, Needs, OneOf, Rule, rules
+from strapgen.cli.values import Positive
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, pairs
+from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, in_words
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -36,6 +36,7 @@ class Versus:
     """Options of the second algorithm, with which the first one is compared."""
 
     panel: ClassVar[str] = "Second algorithm"
+    rules: ClassVar[tuple[Rule, ...]] = (Needs("--versus-method --versus-increments", "--versus"),)
 
     versus: Annotated[
         _Text,
@@ -54,7 +55,7 @@ class Versus:
         ),
     ] = None
     versus_increments: Annotated[
-        _Text,
+        int | None,
         option(
             "--versus-increments",
             metavar="N",
@@ -79,16 +80,16 @@ class DriftPlot:
 
     settings: MotionSettings = None
     steps: Annotated[
-        _Text,
+        tuple[Positive, ...] | None,
         option(
             *("--step", "--steps"),
             metavar="S,...",
             help="Step lengths of the plot in s.  [default: 1/8 to 1/64]",
         ),
     ] = None
-    duration: Duration = "2"
+    duration: Duration = Positive("2")
 
-    def draw(self, choice: Choice, motion: str, count: int | None, path: Path) -> bytes:
+    def draw(self, choice: Choice, motion: str, count: int, path: Path) -> bytes:
         """Return the image of the drift on a motion of the catalogue."""
         from strapgen.analysis.agreement import agreement
         from strapgen.analysis.agreement.agreement_plot import agreement_image
@@ -96,19 +97,16 @@ class DriftPlot:
         from strapgen.lab.motions import motions
 
         checks.choice("motion", motion, MOTIONS)
-        settings = pairs(self.settings) if self.settings else agreement.SETTINGS[motion]
-        ladder = agreement.default_steps(choice)
-        if self.steps is not None:
-            ladder = tuple(listed("--step", self.steps))
+        settings = self.settings or agreement.SETTINGS[motion]
+        ladder = self.steps or agreement.default_steps(choice)
         profile = motions.motion(motion, **settings)
         agreements = [
             agreement.agreement(choice, profile, ladder, self.duration, powers)
             for powers in ((1,) if count == 1 else (1, 3))  # every other power may be without drift
         ]
-        words = ", ".join(f"{key}={value}" for key, value in settings.items())
         title = (
             f"{agreements[0].kernel}: drift, predicted and simulated\n"
-            f"{self.duration} s of {motion} motion, {words}"
+            f"{self.duration} s of {motion} motion, {in_words(settings)}"
         )
         return agreement_image(agreements, title, path)
 
@@ -128,6 +126,17 @@ class SeriesOutput(Output):
 
 
 @grouped
+@rules(
+    OneOf("ALGORITHM --all", needed="an algorithm is needed, or --all", several=True),
+    Excludes(
+        "--all",
+        "--versus --plot --tableau --window --coning --increments --previous --ahead --rates --constant",
+    ),
+    Needs("--format=csv|markdown", "--all"),
+    Needs("--set --step", "--plot"),
+    Excludes("--plot", "--versus"),
+    Needs("--plot", "--motion"),
+)
 def series(
     algorithm: OptionalStepAlgorithm = None,
     *,
@@ -151,14 +160,14 @@ def series(
         ),
     ] = "general",
     terms: Annotated[
-        str,
+        int,
         option(
             "--terms",
             metavar="N",
             help="Number of nonzero terms to show of drift, scale and skew, 1 to 6.",
             panel="Output",
         ),
-    ] = "2",
+    ] = 2,
     versus: Versus,
     plot: DriftPlot,
     output: SeriesOutput,
@@ -179,36 +188,30 @@ def series(
     Example: strapgen series dcm --method rk1 --motion constant --versus euler
     """
     output.check(algorithm, *methods.files)
-    count = whole("terms", terms)
-    if all_of_them:
-        _overview(algorithm, methods, versus, output)
-        return
-    if algorithm is None:
-        raise InputError("an algorithm is needed, or --all")
-    if output.format in ("csv", "markdown"):
-        raise InputError(
-            f"--format {output.format} goes with --all; without it text, latex and json are allowed"
-        )
-    _check_plot(motion, versus, plot, output)
+    if all_of_them or algorithm is None:
+        return _overview(algorithm, methods, output)
+    if output.plot is not None and motion == "general":
+        raise InputError("--plot needs a --motion of the catalogue")
     choices = methods.choices(algorithm, step=not _may_be_velocity(algorithm))
     if choices[0].takes_velocity:
-        _of_velocity(choices, motion, count, versus, output)
-        return
+        return _of_velocity(choices, motion, terms, versus, output)
     if len(choices) > 1 and (output.plot is not None or versus.versus is not None):
         raise InputError("--plot and --versus go with one method")
-    most = 2 if count is None else count
     if versus.versus is not None:
-        from strapgen.analysis.ratios import ratios
-        from strapgen.analysis.ratios.ratios_report import ratio_report
-
-        second = versus.choose(versus.versus, methods)
-        output.report(ratio_report(ratios.versus(choices[0], second, motion, most)))
-        return
+        return _ratios(choices[0], versus.choose(versus.versus, methods.each()[0]), motion, terms, output)
     from strapgen.analysis.error_analysis.error_analysis import analyse
     from strapgen.analysis.error_analysis.series_report import series_report
 
-    image = None if output.plot is None else plot.draw(choices[0], motion, count, output.plot)
-    output.report(series_report([analyse(choice, motion, most) for choice in choices]), image)
+    image = None if output.plot is None else plot.draw(choices[0], motion, terms, output.plot)
+    output.report(series_report([analyse(choice, motion, terms) for choice in choices]), image)
+
+
+def _ratios(first: Choice, second: Choice, motion: str, terms: int, output: Output) -> None:
+    """Deliver the errors of two algorithms and their ratio."""
+    from strapgen.analysis.ratios import ratios
+    from strapgen.analysis.ratios.ratios_report import ratio_report
+
+    output.report(ratio_report(ratios.versus(first, second, motion, terms)))
 
 
 def _may_be_velocity(algorithm: str) -> bool:
@@ -218,9 +221,7 @@ def _may_be_velocity(algorithm: str) -> bool:
     return algorithm == VELOCITY_POSITION or algorithm.endswith(".py") or algorithm in loading.installed()
 
 
-def _of_velocity(
-    choices: list[Choice], motion: str, terms: int | None, versus: Versus, output: Output
-) -> None:
+def _of_velocity(choices: list[Choice], motion: str, terms: int, versus: Versus, output: Output) -> None:
     """Deliver the series of velocity and position, which hold for any smooth motion and specific force."""
     if motion != "general" or versus.versus is not None or output.plot is not None:
         raise InputError(
@@ -229,36 +230,11 @@ def _of_velocity(
     from strapgen.analysis.series import velocity_series
     from strapgen.analysis.series.velocity_series_report import velocity_series_report
 
-    most = 1 if terms is None else terms
-    output.report(velocity_series_report([velocity_series.series(choice, most) for choice in choices]))
+    output.report(velocity_series_report([velocity_series.series(choice, terms) for choice in choices]))
 
 
-def _check_plot(motion: str, versus: Versus, plot: DriftPlot, output: Output) -> None:
-    """Check that the options of a plot and of another algorithm go together."""
-    if versus.versus is None and (versus.versus_method or versus.versus_increments):
-        raise InputError("--versus-method and --versus-increments need --versus")
-    if output.plot is None and (plot.settings or plot.steps):
-        raise InputError("--set and --step are for --plot")
-    if output.plot is not None and (versus.versus is not None or motion == "general"):
-        raise InputError("--plot needs a --motion of the catalogue, and no --versus")
-
-
-def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: Output) -> None:
+def _overview(algorithm: _Text, methods: SeveralMethods, output: Output) -> None:
     """Deliver the table of all algorithms and methods side by side."""
-    for name, value in {
-        "--versus": versus.versus,
-        "--plot": output.plot,
-        "--tableau": method.tableau,
-        "--window": method.window,
-        "--coning": method.coning,
-        "--increments": method.increments,
-        "--previous": method.previous,
-        "--ahead": method.ahead,
-        "--rates": method.rates or None,
-        "--constant": method.constant or None,
-    }.items():
-        if value is not None:
-            raise InputError(f"--all and {name} do not go together")
     from strapgen import catalogue
     from strapgen.analysis.error_analysis import overview
     from strapgen.analysis.error_analysis.overview_report import overview_report
@@ -266,10 +242,6 @@ def _overview(algorithm: _Text, method: MethodOptions, versus: Versus, output: O
     algorithms = list(catalogue.ALGORITHMS)
     if algorithm is not None:
         algorithms = [checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)]
-    names = None
-    if method.method is not None:
-        names = [
-            checks.choice("method", name, catalogue.METHODS) for name in listed("--method", method.method)
-        ]
+    names = methods.method and [checks.choice("method", name, catalogue.METHODS) for name in methods.method]
     choices = overview.choices(algorithms, names)
     output.report(overview_report(list(track(overview.overview(choices), "deriving", len(choices)))))

@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, SeveralMethods, StepAlgorithm, option
+from strapgen.cli.options import STEP_OPTIONS, Samples, SeveralMethods, StepAlgorithm, option, samples
 from strapgen.cli.output import Output
-
-_Text = str | None
 
 
 @dataclass(frozen=True)
@@ -17,7 +15,7 @@ class SteppedMethods(SeveralMethods):
     """Options that choose the methods whose growth is shown side by side."""
 
     method: Annotated[
-        _Text,
+        tuple[str, ...] | None,
         option(
             "--method",
             metavar="NAME,...",
@@ -26,12 +24,13 @@ class SteppedMethods(SeveralMethods):
         ),
     ] = None
     increments: Annotated[
-        _Text,
+        tuple[Samples, ...] | None,
         option(
             "--increments",
             metavar="N,...",
             help="Numbers of angle increments in a step, 1 to 8; enough: as many as each method needs.  "
             "[default: enough]",
+            read=samples,
         ),
     ] = None
 
@@ -55,9 +54,9 @@ def stability(
 
     if algorithm in catalogue.ALGORITHMS:
         if methods.method is None and not any(methods.files):
-            methods = replace(methods, method=",".join(catalogue.STANDARD_METHODS))
+            methods = replace(methods, method=tuple(catalogue.STANDARD_METHODS))
         if methods.increments is None:
-            methods = replace(methods, increments="enough")
+            methods = replace(methods, increments=("enough",))
     choices = methods.choices(algorithm)
     from strapgen.analysis.growth import growth
     from strapgen.analysis.growth.growth_plot import stability_image

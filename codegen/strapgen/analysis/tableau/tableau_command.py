@@ -14,7 +14,6 @@ from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
 from strapgen.cli.progress import waiting
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import pairs
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.tableau import Tableau
@@ -39,7 +38,7 @@ def tableau(
     ],
     *,
     settings: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -48,8 +47,8 @@ def tableau(
         ),
     ] = None,
     family: Annotated[
-        str, option("--family", metavar="N", help="Number of the family for --set.", panel="Input")
-    ] = "1",
+        int, option("--family", metavar="N", help="Number of the family for --set.", panel="Input")
+    ] = 1,
     output: Annotated[TableauOutput, Shown(only=TEXT_OUTPUT)],
 ) -> None:
     """Show a Butcher tableau with its order, checked exactly.
@@ -106,7 +105,7 @@ def _families(method: str, output: Output) -> None:
     output.report(families_report(unknown, solutions))
 
 
-def _member(method: str, settings: list[str], family: str) -> Tableau:
+def _member(method: str, settings: dict[str, str], family: int) -> Tableau:
     """Return a member of a family of a tableau with unknowns."""
     from strapgen.analysis.unknowns import unknown_tableau
 
@@ -115,5 +114,5 @@ def _member(method: str, settings: list[str], family: str) -> Tableau:
         solution = unknown.solve()
     if not solution.families:
         raise InputError(f"{method} has no solution of order {unknown.order}: {solution.reason}")
-    number = checks.count("family", checks.whole("--family", family), largest=len(solution.families))
-    return unknown.member(solution.families[number - 1], pairs(settings))
+    number = checks.count("family", family, largest=len(solution.families))
+    return unknown.member(solution.families[number - 1], settings)

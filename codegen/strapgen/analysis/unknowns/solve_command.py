@@ -8,12 +8,11 @@ from typing import Annotated, ClassVar
 import typer
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import MethodOptions, listed, option
+from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import Output, format_option
 from strapgen.cli.progress import waiting
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import pairs
 
 _Text = str | None
 
@@ -38,7 +37,7 @@ def solve(
     ],
     *,
     order: Annotated[
-        str,
+        int,
         option(
             "--order",
             metavar="N",
@@ -47,7 +46,7 @@ def solve(
         ),
     ],
     on: Annotated[
-        str,
+        tuple[str, ...],
         option(
             "--on",
             metavar="MOTION=N,...",
@@ -56,9 +55,9 @@ def solve(
             "hold to products of two vectors. velocity or position: any smooth motion, and that change alone.",
             panel="Input",
         ),
-    ] = "general",
+    ] = ("general",),
     settings: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -67,8 +66,8 @@ def solve(
         ),
     ] = None,
     family: Annotated[
-        str, option("--family", metavar="N", help="Number of the family for --set.", panel="Input")
-    ] = "1",
+        int, option("--family", metavar="N", help="Number of the family for --set.", panel="Input")
+    ] = 1,
     method: Annotated[MethodOptions, Shown(only=("method", "tableau", "increments", "previous", "ahead"))],
     output: Annotated[SolutionOutput, Shown(only=("out", "format"))],
 ) -> None:
@@ -85,7 +84,7 @@ def solve(
     Example: strapgen solve examples/three_samples.py --order 4 --set a=57/80
     """
     output.check(algorithm, *method.files)
-    orders = _orders(on, checks.whole("--order", order))
+    orders = _orders(on, order)
     choice = method.choose(algorithm, step=False)
     from strapgen.analysis.unknowns import solving
     from strapgen.analysis.unknowns.unknowns_report import solved_report
@@ -96,15 +95,15 @@ def solve(
     if settings:
         if not solved.families:
             raise InputError(f"--set: {solved.solution.reason}; there is no solution")
-        number = checks.count("family", checks.whole("--family", family), largest=len(solved.families))
-        chosen = solved.values(pairs(settings), number - 1)
+        number = checks.count("family", family, largest=len(solved.families))
+        chosen = solved.values(settings, number - 1)
     output.report(solved_report(solved, chosen))
 
 
-def _orders(on: str, order: int) -> dict[str, int]:
+def _orders(on: tuple[str, ...], order: int) -> dict[str, int]:
     """Return the motions of the option --on, each with its order."""
     orders: dict[str, int] = {}
-    for text in listed("--on", on):
+    for text in on:
         name, equals, number = text.partition("=")
         if name in orders:
             raise InputError(f"--on has {name} twice; one order is needed")

@@ -6,25 +6,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import sympy as sp
 
 from strapgen.analysis.unknowns import elimination, families
 from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
-from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files, tableaux
-from strapgen.catalogue.methods.coefficient_files import entries
+from strapgen.catalogue.methods.coefficient_files import Source, Title
 from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text, word_text, words
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key, parse, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel import reading, unknown_values
 from strapgen.kernel.power_series import field
 
-#: Keys of a file; all but the last are those of a tableau with known coefficients.
-KEYS = ("name", "source", "order", "nodes", "matrix", "weights", "unknowns")
 #: Highest order for which conditions with unknowns are solved, and most stages.
 MOST_ORDER, MOST_STAGES = 6, 8
 #: The equations for which a method has an order: any, and x' = A(t) x.
@@ -157,12 +156,82 @@ class UnknownTableau:
             "matrix": [known(row) for row in self.matrix],
             "weights": known(self.weights),
         }
-        return tableaux.from_data(data)
+        return tableaux.verified(parse(tableaux.TableauFile, data))
+
+
+class Coefficient(str):
+    """A coefficient as a text with numbers, unknowns, + - * /, whole powers, parentheses and sqrt."""
+
+    __slots__ = ()
+    WORDS = 'a whole number, or a text such as "1 - a/2",'
+    SCHEMA: ClassVar = {"type": ["integer", "string"]}
+
+    @classmethod
+    def from_toml(cls, where: str, value: Any) -> Coefficient:
+        """Return the text of an entry."""
+        if isinstance(value, bool) or not isinstance(value, int | str):
+            raise refused(where, value, cls.WORDS)
+        return cls(value)
+
+
+Row = tuple[Coefficient, ...]
+#: Names that an unknown cannot have.
+_TAKEN = {*reading.FUNCTIONS, *reading.CONSTANTS, *"IESNOQ", "and", "or", "not", "lambda"}
+
+
+@dataclass(frozen=True)
+class UnknownTableauFile:
+    """An explicit Runge-Kutta method whose coefficients hold unknowns; strapgen solves for them."""
+
+    name: Title
+    source: Source
+    order: Annotated[int, Key("Order that the method is to have", "1", least=1, most=MOST_ORDER)]
+    unknowns: Annotated[
+        tuple[str, ...], Key("Names; where there is a choice, the first ones express the last", least=1)
+    ]
+    nodes: Annotated[Row, Key("c_i, parts of the step", least=1, most=MOST_STAGES)]
+    matrix: Annotated[tuple[Row, ...], Key("a_ij left of the diagonal; the first row is empty")]
+    weights: Annotated[Row, Key("b_i")]
+
+    def __post_init__(self) -> None:
+        tableaux.check_shape(self.nodes, self.matrix, weights=self.weights)
+        for name in self.unknowns:
+            if not name.isascii() or not name.isidentifier():
+                raise InputError(
+                    f"unknowns holds {repr(name)[:40]}; names of letters, digits and underscores are needed"
+                )
+            if name in _TAKEN:
+                raise InputError(f"unknowns holds {name}, which means something else; another name is needed")
+            if self.unknowns.count(name) > 1:
+                raise InputError(f"unknowns holds {name} twice")
+
+    def tableau(self) -> UnknownTableau:
+        """Return the tableau in expressions."""
+        symbols = {name: sp.Symbol(name, real=True) for name in self.unknowns}
+
+        def numbers(what: str, row: Row) -> tuple[sp.Expr, ...]:
+            return tuple(
+                reading.expression(f"{what}[{k}]", str(value), symbols, {"sqrt": sp.sqrt})
+                for k, value in enumerate(row, 1)
+            )
+
+        nodes, weights = numbers("nodes", self.nodes), numbers("weights", self.weights)
+        matrix = tuple(numbers(f"matrix[{k}]", row) for k, row in enumerate(self.matrix, 1))
+        if nodes[0] != 0:
+            raise InputError(f"nodes[1] is {nodes[0]}; the first stage of an explicit method is at 0")
+        used = {s.name for row in (nodes, weights, *matrix) for value in row for s in value.free_symbols}
+        if idle := [name for name in self.unknowns if name not in used]:
+            raise InputError(f"unknowns: no coefficient holds {', '.join(idle)}")
+        name = coefficient_files.slug(self.name)
+        return UnknownTableau(name, self.name, self.source, self.order, self.unknowns, nodes, matrix, weights)
+
+
+UNKNOWN_TABLEAU = UserFile("a tableau", UnknownTableauFile, tableaux.TABLEAU.most_bytes)
 
 
 def has_unknowns(path: str | Path) -> bool:
     """Tell whether the file of a tableau declares unknowns."""
-    return "unknowns" in toml_files.content(path, "a tableau", tableaux.MOST_BYTES)
+    return "unknowns" in UNKNOWN_TABLEAU.content(path)
 
 
 def read(path: str | Path) -> UnknownTableau:
@@ -171,8 +240,7 @@ def read(path: str | Path) -> UnknownTableau:
     Parameters
     ----------
     path : path
-        A TOML file with the keys of `KEYS`; every coefficient is a text with numbers, unknowns, + - * /, whole powers,
-        parentheses and sqrt.
+        A TOML file with the keys of `UnknownTableauFile`.
 
     Returns
     -------
@@ -183,11 +251,7 @@ def read(path: str | Path) -> UnknownTableau:
     InputError
         If the file cannot be read, or a key or a coefficient is wrong; the message names it.
     """
-    data = toml_files.content(path, "a tableau", tableaux.MOST_BYTES)
-    try:
-        return from_data(data)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return UNKNOWN_TABLEAU.convert(path, UnknownTableauFile.tableau)
 
 
 def from_data(data: Mapping[str, Any]) -> UnknownTableau:
@@ -202,61 +266,5 @@ def from_data(data: Mapping[str, Any]) -> UnknownTableau:
     >>> unknown.substitute({"c": "2/3", "b": "3/4"}).weights
     (Fraction(1, 4), Fraction(3, 4))
     """
-    coefficient_files.check_keys(data, KEYS, ())
-    order = data["order"]
-    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
-        raise InputError(
-            f"order is {repr(order)[:40]}; a whole number from 1 to {MOST_ORDER} is needed with unknowns"
-        )
-    unknowns = _unknowns(data["unknowns"])
-    symbols = {name: sp.Symbol(name, real=True) for name in unknowns}
-
-    def numbers(what: str, values: Any) -> tuple[sp.Expr, ...]:
-        return tuple(
-            reading.expression(f"{what}, entry {k}", value, symbols, {"sqrt": sp.sqrt})
-            for k, value in enumerate(entries(what, values), 1)
-        )
-
-    nodes = numbers("nodes", data["nodes"])
-    tableaux.check_shape(data, len(nodes), MOST_STAGES)
-    title = str(data["name"])
-    matrix = tuple(numbers(f"matrix row {number}", row) for number, row in enumerate(data["matrix"], 1))
-    weights = numbers("weights", data["weights"])
-    if nodes[0] != 0:
-        raise InputError(f"nodes, entry 1 is {nodes[0]}; the first stage of an explicit method is at 0")
-    used = {s.name for row in (nodes, weights, *matrix) for value in row for s in value.free_symbols}
-    if idle := [name for name in unknowns if name not in used]:
-        raise InputError(f"unknowns: no coefficient holds {', '.join(idle)}")
-    return UnknownTableau(
-        coefficient_files.slug(title), title, str(data["source"]), order, unknowns, nodes, matrix, weights
-    )
-
-
-def _unknowns(value: Any) -> tuple[str, ...]:
-    """Return the names of the unknowns, checked."""
-    names = entries("unknowns", value)
-    for name in names:
-        if not isinstance(name, str) or not name.isascii() or not name.isidentifier():
-            raise InputError(
-                f"unknowns holds {repr(name)[:40]}; names of letters, digits and underscores are needed"
-            )
-        if name in (
-            *reading.FUNCTIONS,
-            *reading.CONSTANTS,
-            "I",
-            "E",
-            "S",
-            "N",
-            "O",
-            "Q",
-            "and",
-            "or",
-            "not",
-            "lambda",
-        ):
-            raise InputError(f"unknowns holds {name}, which means something else; another name is needed")
-    if repeated := next((name for name in names if names.count(name) > 1), None):
-        raise InputError(f"unknowns holds {repeated} twice")
-    if not names:
-        raise InputError("unknowns is empty; a tableau without unknowns has no such key")
-    return tuple(names)
+    file: UnknownTableauFile = parse(UnknownTableauFile, data)
+    return file.tableau()

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from strapgen.analysis.vibration.band_options import GyroDamping
-from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import ANY_STEP_OPTIONS, MethodOptions, SeveralMethods, option, whole
+from strapgen.analysis.vibration.band_options import GYRO_DAMPING, GYRO_RULES
+from strapgen.cli.option_groups import Shown, grouped, stated
+from strapgen.cli.options import ANY_STEP_OPTIONS, MethodOptions, Samples, SeveralMethods, option, samples
 from strapgen.cli.output import Output, plot_option
+from strapgen.cli.rules import Excludes, Needs, Rule, rules
+from strapgen.cli.values import Number, Positive, written
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -34,12 +36,13 @@ class AssessedMethods(SeveralMethods):
     """Options that choose the methods to assess side by side, and the numbers of increments of each."""
 
     increments: Annotated[
-        _Text,
+        tuple[Samples, ...] | None,
         option(
             "--increments",
             metavar="N,...",
             help="Numbers of angle increments in a step, 1 to 8; enough: as many as each method needs; of a fast loop "
             "and of two-speed, the fast cycles in a slow cycle.  [default: 2]",
+            read=samples,
         ),
     ] = None
 
@@ -49,9 +52,10 @@ class VibrationSource:
     """Options of the vibration: at one frequency, or random with a spectrum from a file."""
 
     panel: ClassVar[str] = "Input"
+    rules: ClassVar[tuple[Rule, ...]] = GYRO_RULES
 
     step: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--step",
             metavar="S",
@@ -59,19 +63,19 @@ class VibrationSource:
         ),
     ] = None
     frequency: Annotated[
-        _Text, option("--frequency-hz", metavar="HZ", help="Frequency f of the vibration in Hz.")
+        Positive | None, option("--frequency-hz", metavar="HZ", help="Frequency f of the vibration in Hz.")
     ] = None
     theta_x: Annotated[
-        _Text, option("--theta-x-rad", metavar="RAD", help="Amplitude X of the angle about x in rad.")
+        Number | None, option("--theta-x-rad", metavar="RAD", help="Amplitude X of the angle about x in rad.")
     ] = None
     theta_y: Annotated[
-        _Text, option("--theta-y-rad", metavar="RAD", help="Amplitude Y of the angle about y in rad.")
+        Number | None, option("--theta-y-rad", metavar="RAD", help="Amplitude Y of the angle about y in rad.")
     ] = None
     phase: Annotated[
-        _Text, option("--phase-rad", metavar="RAD", help="Phase P in rad by which y leads x.")
+        Number | None, option("--phase-rad", metavar="RAD", help="Phase P in rad by which y leads x.")
     ] = None
     acceleration: Annotated[
-        _Text,
+        Number | None,
         option(
             "--acceleration-y",
             metavar="M_S2",
@@ -89,7 +93,7 @@ class VibrationSource:
     ] = None
 
     gyro_bandwidth_hz: Annotated[
-        _Text,
+        tuple[Positive, ...] | None,
         option(
             "--gyro-bandwidth-hz",
             metavar="HZ",
@@ -97,7 +101,7 @@ class VibrationSource:
             "one about each axis.",
         ),
     ] = None
-    gyro_damping: GyroDamping = None
+    gyro_damping: Annotated[tuple[Positive, ...] | None, GYRO_DAMPING] = None
 
     def through_gyro(self, assessment: Assessment) -> Assessment:
         """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
@@ -105,22 +109,18 @@ class VibrationSource:
             return assessment
         from strapgen.analysis import vibration
 
-        frequencies, dampings = (
-            self._two(name, text)
-            for name, text in (
-                ("--gyro-bandwidth-hz", self.gyro_bandwidth_hz),
-                ("--gyro-damping", self.gyro_damping),
-            )
-        )
+        frequencies = self._two("--gyro-bandwidth-hz", self.gyro_bandwidth_hz)
+        dampings = self._two("--gyro-damping", self.gyro_damping)
         x, y = zip(frequencies, dampings, strict=True)
         return vibration.through_gyros(assessment, x, y)
 
     @staticmethod
-    def _two(name: str, text: str) -> list[str]:
+    def _two(name: str, numbers: tuple[Positive, ...]) -> tuple[Positive, ...]:
         """Return the numbers of the gyros about x and y; one number is that of both."""
-        numbers = text.split(",")
         if len(numbers) > 2:
-            raise InputError(f"{name} is {text!r}; one number or two with a comma between are needed")
+            raise InputError(
+                f"{name} is {written(numbers)!r}; one number or two with a comma between are needed"
+            )
         return numbers * (3 - len(numbers))
 
     @property
@@ -128,39 +128,26 @@ class VibrationSource:
         """The gyro for a reader; empty without one."""
         if self.gyro_bandwidth_hz is None:
             return ""
-        return f", through a gyro of {self.gyro_bandwidth_hz} Hz, damping {self.gyro_damping}"
+        return (
+            f", through a gyro of {written(self.gyro_bandwidth_hz)} Hz, damping {written(self.gyro_damping)}"
+        )
 
-    def check(self, output: VibrationOutput) -> None:
-        """Check that there is one frequency or a spectrum, with all that goes with it."""
-        if (self.gyro_bandwidth_hz is None) != (self.gyro_damping is None):
-            missing = "--gyro-damping" if self.gyro_damping is None else "--gyro-bandwidth-hz"
-            raise InputError(f"--gyro-bandwidth-hz and --gyro-damping go together; {missing} is missing")
+    def check(self) -> None:
+        """Check that there is one frequency or a spectrum, with all that it needs."""
         if self.step is None:
             raise InputError("--step in s is needed")
+        if self.spectrum is not None:
+            return
         needed = {
             "--frequency-hz": self.frequency,
             "--theta-x-rad": self.theta_x,
             "--phase-rad": self.phase,
         }
-        if self.spectrum is not None:
-            amplitudes = {"--theta-y-rad": self.theta_y, "--acceleration-y": self.acceleration}
-            plot = {"--plot": output.plot, "--plot-hz": output.span}
-            for name, value in {**needed, **amplitudes, **plot}.items():
-                if value is not None:
-                    raise InputError(f"{name} goes with one frequency, not with --spectrum")
-            if output.format == "latex":
-                raise InputError(
-                    "--format latex writes closed forms of one frequency; "
-                    "with --spectrum text, json, csv and markdown are allowed"
-                )
-            return
         for name, value in needed.items():
             if value is None:
                 raise InputError(f"{name} is needed, or a --spectrum")
         if self.theta_y is None and self.acceleration is None:
             raise InputError("--theta-y-rad is needed for the drift, or --acceleration-y for sculling")
-        if output.span is not None and output.plot is None:
-            raise InputError("--plot-hz goes with --plot")
 
     @property
     def amplitudes(self) -> dict[str, Any]:
@@ -185,13 +172,13 @@ class VibrationSource:
         from strapgen.analysis import vibration
         from strapgen.analysis.vibration.vibration_report import CaseRates
 
-        step = self.step or ""
+        step = self.step
+        assert step is not None, "it is needed"
         if self.spectrum is None:
+            assert self.frequency is not None, "it is needed without a spectrum"
             outcomes = []
             for case in cases:
-                rates = case.assessment.rates(
-                    self.frequency or "", step, cycles=case.cycles, **self.amplitudes
-                )
+                rates = case.assessment.rates(self.frequency, step, cycles=case.cycles, **self.amplitudes)
                 outcomes.append(CaseRates(case, rates))
             return outcomes, f"{self.frequency} Hz, {self.words}"
         shaken = vibration.read_spectrum(self.spectrum)
@@ -217,7 +204,7 @@ class VibrationOutput(Output):
 
     plot: Annotated[Path | None, plot_option("the errors over frequency")] = None
     span: Annotated[
-        _Text,
+        tuple[Positive, Positive] | None,
         option(
             "--plot-hz",
             metavar="LOW,HIGH",
@@ -229,10 +216,7 @@ class VibrationOutput(Output):
         """Return the ends of the plot in Hz, checked like the marked frequency against the sampling frequency."""
         low, high = sampling / 200, sampling / 2
         if self.span is not None:
-            ends = self.span.split(",")
-            if len(ends) != 2:
-                raise InputError(f"--plot-hz is {self.span!r}; two frequencies, LOW,HIGH, are needed")
-            low, high = (float(checks.number("--plot-hz", end, positive=True)) for end in ends)
+            low, high = map(float, self.span)
         lowest, highest = (times * sampling for times in _PLOTTED)
         for name, end in (("--plot-hz", low), ("--plot-hz", high), ("--frequency-hz", marked)):
             if not lowest <= end <= highest < math.inf:
@@ -244,6 +228,13 @@ class VibrationOutput(Output):
 
 
 @grouped
+@rules(
+    Excludes(
+        "--spectrum",
+        "--frequency-hz --theta-x-rad --phase-rad --theta-y-rad --acceleration-y --plot --plot-hz --format=latex",
+    ),
+    Needs("--plot-hz", "--plot"),
+)
 def vibration(
     algorithm: Annotated[
         str,
@@ -280,7 +271,7 @@ def vibration(
     if cases := _cases_with_unknowns(algorithm, methods, source, output):
         output.report(closed_forms_report(cases))
         return
-    source.check(output)
+    source.check()
     cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
     outcomes, words = source.rates(cases)
     output.report(
@@ -302,7 +293,7 @@ def _cases_with_unknowns(
         raise InputError(
             f"{algorithm} holds unknowns: its rates have closed forms, as text or json, and no numbers"
         )
-    source = replace(source, theta_y=source.theta_y or "0")
+    source = replace(source, theta_y=source.theta_y or Number("0"))
     return [case for method in methods.each() for case in _assessed(algorithm, method, source)]
 
 
@@ -328,7 +319,8 @@ def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) ->
     _check_known(algorithm, (*systems.NAMES, _TWO_SPEED))
     if algorithm == _TWO_SPEED:
         cycles = _cycles(algorithm, method, "is in two speeds")
-        _check_plain(algorithm, method)
+        for name in stated(method).keys() - {"--increments"}:
+            raise InputError(f"{algorithm} takes no {name}")
         quantities = _quantities(algorithm, ("drift", "sculling"), source)
         return [
             AssessedCase(source.through_gyro(assessment.two_speed(quantity)), cycles, cycles)
@@ -349,22 +341,7 @@ def _cycles(algorithm: str, method: MethodOptions, loop: str) -> int:
     """Return the fast cycles in a step."""
     if method.increments is None:
         raise InputError(f"{algorithm} {loop}: --increments must say how many of its cycles make a step")
-    return checks.count("increments", whole("increments", method.increments), largest=checks.MOST)
-
-
-def _check_plain(algorithm: str, method: MethodOptions) -> None:
-    """Refuse the options of a method for an algorithm that has its own."""
-    for name, value in (
-        ("--method", method.method),
-        ("--tableau", method.tableau),
-        ("--window", method.window),
-        ("--coning", method.coning),
-        ("--previous", method.previous),
-        ("--ahead", method.ahead),
-        ("--rates", method.rates or None),
-    ):
-        if value is not None:
-            raise InputError(f"{algorithm} takes no {name}")
+    return checks.count("increments", method.increments, largest=checks.MOST)
 
 
 def _quantities(algorithm: str, possible: tuple[str, ...], source: VibrationSource) -> list[str]:
@@ -383,9 +360,9 @@ def _image(cases: list[AssessedCase], source: VibrationSource, output: Vibration
     from strapgen.analysis.vibration import curves
     from strapgen.analysis.vibration.vibration_plot import vibration_image
 
-    step = source.step or ""
-    sampling = max(case.samples for case in cases) / float(checks.number("step", step, positive=True))
-    marked = float(checks.number("--frequency-hz", source.frequency or ""))
+    assert source.step and source.frequency, "the source is checked"
+    step, marked = source.step, float(source.frequency)
+    sampling = max(case.samples for case in cases) / float(step)
     hertz = curves.frequencies(*output.frequencies(sampling, marked))
     drawn = [
         (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))

@@ -9,9 +9,9 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import rate_fit
-from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Window

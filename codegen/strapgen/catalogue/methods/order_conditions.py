@@ -25,7 +25,7 @@ from itertools import combinations_with_replacement, groupby, product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coefficients import Number
+    from strapgen.catalogue.coefficients import Number
     from strapgen.catalogue.methods.tableau import Tableau
 
 #: A rooted tree as the tuple of the subtrees of its root, in a fixed order.

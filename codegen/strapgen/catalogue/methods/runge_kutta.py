@@ -7,9 +7,9 @@ from functools import cache
 
 import sympy as sp
 
+from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import tableaux
-from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.method import Method, combination
 from strapgen.catalogue.methods.order_conditions import attitude_order
 from strapgen.catalogue.methods.samples import Samples

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import sympy as sp
 
+from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.methods import rate_fit
-from strapgen.catalogue.methods.coefficients import Number
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.ir.attitude_step import Order
 from strapgen.ir.notebook_display import short_repr

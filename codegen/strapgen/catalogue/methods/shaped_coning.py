@@ -7,32 +7,24 @@ form, the newest sample times a weighted sum of older ones. It suits coning, and
 from __future__ import annotations
 
 import shlex
-import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from strapgen.catalogue import toml_files
 from strapgen.catalogue.methods import coefficient_files
-from strapgen.catalogue.methods.coefficient_files import CoefficientFiles, band, entries, gyro, rational
+from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles, Gyro, Source, Title
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.ir.suggestions import counted
 from strapgen.registry import Merged, Registry, Titles
-
-#: Keys of a file, and those of them that are optional.
-KEYS = (
-    *("name", "source", "samples", "previous", "objective", "powers", "products", "band", "level", "gyro"),
-    "coefficients",
-)
-OPTIONAL = ("powers", "products", "band", "level", "gyro")
 
 #: What the coefficients are best at: the largest drift over a band, or the drift under a spectrum whose phases are
 #: unknown, or random.
@@ -40,8 +32,8 @@ OBJECTIVES = ("band", "worst", "random")
 
 #: Most samples of a step, and most from before it.
 MOST_SAMPLES, MOST_KEPT = 8, 32
-#: Most bytes of a file, and most digits of a level.
-MOST_BYTES, MOST_DIGITS = 100_000, 12
+#: Most digits of a level.
+MOST_DIGITS = 12
 #: How far the largest drift may be missed, by itself, by the parabola through three of many points.
 _MISSED = Decimal("1e-6")
 
@@ -137,9 +129,67 @@ class ShapedConing:
         return {(newest - s, newest): c for s, c in reversed([*enumerate(self.coefficients, 1)])}
 
 
+@dataclass(frozen=True)
+class ShapeFile:
+    """Coning coefficients for a band or a spectrum of vibration; strapgen verifies what they are said to be."""
+
+    name: Title
+    source: Source
+    samples: Annotated[int, Key("Samples of the step", "1", least=1, most=MOST_SAMPLES)]
+    previous: Annotated[int, Key("Samples from before it", "1", least=0, most=MOST_KEPT)]
+    objective: Annotated[str, Key("What the coefficients are best at", choices=OBJECTIVES)]
+    coefficients: Annotated[
+        tuple[Fraction, ...], Key("K_1, K_2, ... of the samples before the newest one", least=1)
+    ]
+    powers: Annotated[
+        int, Key("Powers of the frequency, from the third on, that the drift has not", "1", least=0)
+    ] = 0
+    products: Annotated[
+        int,
+        Key(
+            "Highest degree of products of powers of time for which a step is exact; 0 for none", "1", least=0
+        ),
+    ] = 0
+    band: Band | None = None
+    level: Annotated[
+        str | None,
+        Key(
+            f"Largest drift over the band, in at most {MOST_DIGITS} digits, as a text",
+            "rad a step, for each squared radian of the half-angle",
+            pattern=r"[0-9]*\.?[0-9]*([eE][-+]?[0-9]{1,3})?",
+            form="a text of a decimal number",
+        ),
+    ] = None
+    gyro: Gyro | None = None
+
+    def __post_init__(self) -> None:
+        count = self.samples + self.previous - 1
+        if len(self.coefficients) != count:
+            raise InputError(
+                f"coefficients has {counted(len(self.coefficients), 'number')}; {count} are needed for {self.samples} "
+                f"samples and {self.previous} from before them"
+            )
+        for key in ("powers", "products"):
+            checks.count(key, getattr(self, key), smallest=0, largest=count)
+        for key in ("band", "level"):
+            if (getattr(self, key) is not None) != (self.objective == "band"):
+                raise InputError(f"key {key} goes with the objective band, and that needs it")
+
+    def shape(self, name: str) -> ShapedConing:
+        """Return the coefficients under a name, not verified."""
+        level = None if self.level is None else _level(self.level)
+        return ShapedConing(
+            *(name, self.name, self.source, self.samples, self.previous, self.objective, self.coefficients),
+            *(self.powers, self.products, self.band, self.gyro, level),
+        )
+
+
+SHAPE = UserFile("a file of coning coefficients", ShapeFile, 100_000)
+
+
 def _shipped(path: Path, name: str) -> ShapedConing:
     """Read coefficients of strapgen, whose file the tests verify."""
-    return _shape(tomllib.loads(path.read_text("utf-8")), name)
+    return SHAPE.read(path).shape(name)
 
 
 def _installed(path: Path, name: str) -> ShapedConing:
@@ -154,25 +204,22 @@ _INSTALLED = CoefficientFiles(_FILES, _installed, without=_FILES.own)
 #: The coefficients of strapgen and of installed packages, by name, and their titles.
 SHAPES: Merged[ShapedConing] = Merged(_BUILT_IN, _INSTALLED)
 SHAPE_TITLES: Merged[str] = Merged(
-    {name: str(tomllib.loads(path.read_text("utf-8"))["name"]) for name, path in _FILES.own.items()},
+    {name: str(SHAPE.content(path)["name"]) for name, path in _FILES.own.items()},
     Titles(_INSTALLED),
 )
 
 
 def read(path: str | Path) -> ShapedConing:
-    """Read coefficients from a TOML file with the keys of `KEYS`, and check what they are said to be."""
-    data = toml_files.content(path, "a file of coning coefficients", MOST_BYTES)
-    try:
-        coefficient_files.check_keys(data, KEYS, OPTIONAL)
-        name = coefficient_files.slug(data["name"])
+    """Read coefficients from a TOML file with the keys of `ShapeFile`, and check what they are said to be."""
+
+    def shape(stated: ShapeFile) -> ShapedConing:
+        name = coefficient_files.slug(stated.name)
         if name in _BUILT_IN or name in WINDOWS:
-            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
-        shape = _shape(data, name)
-        verify(shape)
-        file = checks.text("the name of the file", str(path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return replace(shape, file=file)
+            raise InputError(f"name {stated.name!r} is that of the method {name}; another one is needed")
+        verify(one := stated.shape(name))
+        return replace(one, file=checks.text("the name of the file", str(path)))
+
+    return SHAPE.convert(path, shape)
 
 
 def verify(shape: ShapedConing) -> None:
@@ -202,42 +249,9 @@ def verify(shape: ShapedConing) -> None:
             raise InputError(f"level is {shape.level}; the coefficients have {largest:.6g} over their band")
 
 
-def _shape(data: Mapping[str, Any], name: str) -> ShapedConing:
-    """Return coefficients from the content of a file with all keys, after a check of its numbers and its shape."""
-    samples = checks.count("samples", data["samples"], largest=MOST_SAMPLES)
-    previous = checks.count("previous", data["previous"], smallest=0, largest=MOST_KEPT)
-    count = samples + previous - 1
-    if not count:
-        raise InputError("samples 1 and previous 0 have no coefficients; more samples are needed")
-    numbers = entries("coefficients", data["coefficients"])
-    if len(numbers) != count:
-        raise InputError(
-            f"coefficients has {counted(len(numbers), 'number')}; {count} are needed for {samples} samples "
-            f"and {previous} from before them"
-        )
-    objective = checks.choice("objective", data["objective"], OBJECTIVES)
-    for key in ("band", "level"):
-        if (key in data) != (objective == "band"):
-            raise InputError(f"key {key} goes with the objective band, and that needs it")
-    return ShapedConing(
-        name,
-        data["name"],
-        data["source"],
-        samples,
-        previous,
-        objective,
-        tuple(rational(f"coefficient {k}", number) for k, number in enumerate(numbers, 1)),
-        checks.count("powers", data.get("powers", 0), smallest=0, largest=count),
-        checks.count("products", data.get("products", 0), smallest=0, largest=count),
-        band(data["band"]) if "band" in data else None,
-        gyro(data.get("gyro")),
-        _level(data["level"]) if "level" in data else None,
-    )
-
-
-def _level(value: Any) -> Decimal:
+def _level(value: str) -> Decimal:
     try:
-        level = Decimal(checks.text("level", value))
+        level = Decimal(value)
     except InvalidOperation:
         level = Decimal("nan")
     if not (level.is_finite() and level > 0 and len(level.as_tuple().digits) <= MOST_DIGITS):

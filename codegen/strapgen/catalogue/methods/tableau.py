@@ -11,7 +11,7 @@ from strapgen.catalogue.methods.method_spec import Asked, StepSamples, through_s
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coefficients import Number
+    from strapgen.catalogue.coefficients import Number
 
 
 @dataclass(frozen=True)

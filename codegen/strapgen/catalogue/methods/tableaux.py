@@ -6,38 +6,64 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any
 
-from strapgen.catalogue import toml_files
-from strapgen.catalogue.methods import coefficient_files, coefficients, order_conditions
-from strapgen.catalogue.methods.coefficient_files import CoefficientFiles, entries
-from strapgen.catalogue.methods.coefficients import short_text
+from strapgen.catalogue import coefficients
+from strapgen.catalogue.coefficients import Number, short_text
+from strapgen.catalogue.methods import coefficient_files, order_conditions
+from strapgen.catalogue.methods.coefficient_files import CoefficientFiles, Source, Title
 from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.suggestions import counted, needed
 from strapgen.registry import Merged, Registry, Titles
 
-if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coefficients import Number
-
-#: Keys of a file, and those of them that are optional.
-KEYS = ("name", "source", "order", "nodes", "matrix", "weights", "embedded_weights", "tolerance")
-OPTIONAL = ("embedded_weights", "tolerance")
-
 #: Highest order and most stages. The number of trees grows nearly threefold from order to order.
 MOST_ORDER = 10
 MOST_STAGES = 20
 
-#: Largest tolerance of a user's file; rounding to double precision stays below it, a wrong coefficient does not.
-MOST_TOLERANCE = Fraction(1, 10**12)
+Numbers = tuple[Number, ...]
 
-#: Most bytes of a file; twenty stages of long expressions take far less.
-MOST_BYTES = 200_000
+
+@dataclass(frozen=True)
+class TableauFile:
+    """An explicit Runge-Kutta method in exact numbers; strapgen verifies its order."""
+
+    name: Title
+    source: Source
+    order: Annotated[int, Key("Order of the method, or a lower one", "1", least=1, most=MOST_ORDER)]
+    nodes: Annotated[Numbers, Key("c_i, parts of the step", least=1, most=MOST_STAGES)]
+    matrix: Annotated[tuple[Numbers, ...], Key("a_ij left of the diagonal; the first row is empty")]
+    weights: Annotated[Numbers, Key("b_i")]
+    embedded_weights: Annotated[Numbers | None, Key("Weights of a second method on the same stages")] = None
+    tolerance: Annotated[
+        Fraction,
+        Key(
+            "Largest residual of a condition that the rounding of published numbers explains",
+            "1",
+            least=0,
+            most=1e-12,
+        ),
+    ] = Fraction(0)
+
+    def __post_init__(self) -> None:
+        check_shape(self.nodes, self.matrix, weights=self.weights, embedded_weights=self.embedded_weights)
+
+    def tableau(self, name: str) -> Tableau:
+        """Return the tableau under a name, its conditions not checked."""
+        return Tableau(
+            *(name, self.name, self.source, self.order, self.nodes, self.matrix, self.weights),
+            *(self.embedded_weights, self.tolerance),
+        )
+
+
+TABLEAU = UserFile("a tableau", TableauFile, 200_000)
 
 
 def _titles(files: Mapping[str, Path]) -> dict[str, str]:
@@ -52,7 +78,7 @@ def _titles(files: Mapping[str, Path]) -> dict[str, str]:
 
 def _shipped(path: Path, name: str) -> Tableau:
     """Read a tableau of strapgen, whose file the tests verify."""
-    return _tableau(tomllib.loads(path.read_text("utf-8")), name)
+    return TABLEAU.read(path).tableau(name)
 
 
 def _installed(path: Path, name: str) -> Tableau:
@@ -78,7 +104,7 @@ def read(path: str | Path) -> Tableau:
     Parameters
     ----------
     path : path
-        A TOML file with the keys of `KEYS`; every number is a whole number or a string, see `coefficients.number`.
+        A TOML file with the keys of `TableauFile`.
 
     Returns
     -------
@@ -90,96 +116,45 @@ def read(path: str | Path) -> Tableau:
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
     """
-    data = toml_files.content(path, "a tableau", MOST_BYTES)
-    try:
-        if "unknowns" in data:
-            raise InputError(
-                "its coefficients hold unknowns; strapgen tableau solves for them, and --set sets them"
-            )
-        return from_data(data, checks.text("the name of the file", str(path)))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    if "unknowns" in TABLEAU.content(path):
+        raise InputError(
+            f"{path}: its coefficients hold unknowns; strapgen tableau solves for them, and --set sets them"
+        )
+    return TABLEAU.convert(path, lambda file: verified(file, checks.text("the name of the file", str(path))))
 
 
-def from_data(data: Mapping[str, Any], file: str = "") -> Tableau:
-    """Return the tableau of a file's content, checked; errors are those of `read`."""
-    _check_keys(data)
-    name = coefficient_files.slug(data["name"])
+def verified(stated: TableauFile, file: str = "") -> Tableau:
+    """Return the tableau of a file, its conditions checked; errors are those of `read`."""
+    name = coefficient_files.slug(stated.name)
     if name in _BUILT_IN:
-        raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
-    tableau = replace(_tableau(data, name), file=file)
+        raise InputError(f"name {stated.name!r} is that of the method {name}; another one is needed")
+    tableau = replace(stated.tableau(name), file=file)
+    if not tableau.rational:
+        _check_roots(tableau)
     verify(tableau)
     # A file may state less than the actual order.
     return replace(tableau, order=order_conditions.order(tableau, MOST_ORDER, known=tableau.order))
 
 
-def _check_keys(data: Mapping[str, Any]) -> None:
-    coefficient_files.check_keys(data, KEYS, OPTIONAL)
-    order = data["order"]
-    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= MOST_ORDER:
-        raise InputError(
-            f"order is {repr(order)[:40]}; a whole number from 1 to {MOST_ORDER} is needed, "
-            "beyond it there are too many conditions to check"
-        )
-
-
-def _tableau(data: Mapping[str, Any], name: str) -> Tableau:
-    """Return a tableau from the content of a file with all keys, after a check of its numbers and its shape."""
-    nodes = _numbers("nodes", entries("nodes", data["nodes"]))
+def check_shape(
+    nodes: Sequence[Any], matrix: Sequence[Sequence[Any]], **weights: Sequence[Any] | None
+) -> None:
+    """Check that a matrix and weights go with the number of nodes."""
     stages = len(nodes)
-    check_shape(data, stages)
-    embedded = data.get("embedded_weights")
-    tableau = Tableau(
-        name,
-        data["name"],
-        data["source"],
-        data["order"],
-        nodes,
-        tuple(_numbers(f"matrix row {number}", row) for number, row in enumerate(data["matrix"], 1)),
-        _numbers("weights", data["weights"]),
-        None if embedded is None else _numbers("embedded_weights", embedded),
-        _tolerance(data.get("tolerance", 0)),
-    )
-    if not tableau.rational:
-        _check_roots(tableau)
-    return tableau
-
-
-def check_shape(data: Mapping[str, Any], stages: int, most: int = MOST_STAGES) -> None:
-    """Check that matrix and weights of a file go with its number of stages, `most` at most."""
-    if not 1 <= stages <= most:
-        raise InputError(f"nodes has {stages} entries; from 1 to {most} are allowed")
-    rows = entries("matrix", data["matrix"])
-    if len(rows) != stages:
-        raise InputError(f"matrix has {counted(len(rows), 'row')}; as many as nodes are needed: {stages}")
-    for number, row in enumerate(rows, 1):
-        length = len(entries(f"matrix row {number}", row))
-        if length != number - 1:
-            why = "not explicit, " if length >= number else ""
+    if len(matrix) != stages:
+        raise InputError(f"matrix has {counted(len(matrix), 'row')}; as many as nodes are needed: {stages}")
+    for number, row in enumerate(matrix, 1):
+        if len(row) != number - 1:
+            why = "not explicit, " if len(row) >= number else ""
             raise InputError(
-                f"matrix row {number} has {counted(length, 'entry', 'entries')}: "
+                f"matrix[{number}] has {counted(len(row), 'entry', 'entries')}: "
                 f"{why}{needed(number - 1)}, left of the diagonal"
             )
-    for what in ("weights", "embedded_weights"):
-        weights = entries(what, data.get(what, [None] * stages))
-        if len(weights) != stages:
+    for what, some in weights.items():
+        if some is not None and len(some) != stages:
             raise InputError(
-                f"{what} has {counted(len(weights), 'entry', 'entries')}; as many as nodes are needed: {stages}"
+                f"{what} has {counted(len(some), 'entry', 'entries')}; as many as nodes are needed: {stages}"
             )
-
-
-def _numbers(what: str, values: list[Any]) -> tuple[Number, ...]:
-    return tuple(coefficients.number(f"{what}, entry {k}", value) for k, value in enumerate(values, 1))
-
-
-def _tolerance(value: Any) -> Fraction:
-    tolerance = coefficients.number("tolerance", value)
-    if not isinstance(tolerance, Fraction) or not 0 <= tolerance <= MOST_TOLERANCE:
-        raise InputError(
-            f"tolerance is {value}; from 0 to {float(MOST_TOLERANCE):g} is needed: "
-            "it explains the rounding of published coefficients, no more"
-        )
-    return tolerance
 
 
 def _check_roots(tableau: Tableau) -> None:

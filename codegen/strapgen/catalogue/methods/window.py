@@ -5,9 +5,10 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -17,12 +18,13 @@ from strapgen.ir.suggestions import counted
 Taps = tuple[Fraction, ...]
 
 
-class GyroResponse(NamedTuple):
+@dataclass(frozen=True)
+class GyroResponse:
     """A gyro of second order, whose transfer function is 1/(1 + 2 zeta s/w + s^2/w^2)."""
 
-    bandwidth_hz: Fraction  # natural frequency w/(2 pi) in Hz
-    damping: Fraction  # zeta
-    sample_hz: Fraction  # sampling frequency in Hz
+    bandwidth_hz: Annotated[Fraction, Key("Natural frequency w/(2 pi)", "Hz", above=0)]
+    damping: Annotated[Fraction, Key("Damping ratio zeta", "1", above=0)]
+    sample_hz: Annotated[Fraction, Key("Sampling frequency", "Hz", above=0)]
 
 
 @dataclass(frozen=True)

@@ -7,39 +7,23 @@ that commit an attitude, and one-sided filters for the same samples.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from strapgen.catalogue import toml_files
+from strapgen.catalogue.coefficients import short_text
 from strapgen.catalogue.methods import coefficient_files, window_conditions
-from strapgen.catalogue.methods.coefficient_files import (
-    CoefficientFiles,
-    band,
-    entries,
-    gyro,
-    not_negative,
-    rational,
-)
-from strapgen.catalogue.methods.coefficients import short_text
+from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles, Gyro, Source, Title
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.suggestions import counted
 from strapgen.registry import Merged, Registry, Titles
-
-#: Keys of a file, and those of them that are optional.
-KEYS = (
-    *("name", "source", "previous", "ahead", "increments", "conditions", "band", "objective", "noise"),
-    *("gyro", "rotation", "terms", "filters", "one_sided", "start"),
-)
-OPTIONAL = ("increments", "noise", "gyro", "rotation", "terms", "start")
-#: Keys of one-sided filters and of those of the start, and those of them that are optional.
-ONE_SIDED_KEYS = ("previous", "ahead", "objective", "noise", "band", "filters")
-ONE_SIDED_OPTIONAL = ("noise", "band")
 
 OBJECTIVES = ("minimax", "mean square")
 ROTATIONS = ("fourth", "exact")
@@ -51,8 +35,103 @@ MOST_CONDITIONS = 12
 MOST_DEGREE = 8
 MOST_TERMS = 40
 
-#: Most bytes of a file; the longest family takes less.
-MOST_BYTES = 4_000_000
+Filters = Annotated[
+    tuple[tuple[Fraction, ...], ...],
+    Key("Rows of c_0, c_1, ...: a tap for each sample, the oldest first", least=2, most=MOST_DEGREE + 1),
+]
+Previous = Annotated[int, Key("Samples before the step", "1", least=0, most=MOST_SAMPLES - 1)]
+Ahead = Annotated[int, Key("Samples ahead of the step", "1", least=0, most=MOST_SAMPLES - 1)]
+Objective = Annotated[str, Key("What the filters minimize over the band", choices=OBJECTIVES)]
+Noise = Annotated[
+    Fraction,
+    Key(
+        "Standard deviation of the noise of an increment, by that of the rate times the sampling interval",
+        "1",
+        least=0,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class SideFile:
+    """Filters of a family for other samples before and ahead of the step."""
+
+    previous: Previous
+    ahead: Ahead
+    objective: Objective
+    filters: Filters
+    noise: Noise = Fraction(0)
+    #: By default that of the family
+    band: Band | None = None
+
+
+@dataclass(frozen=True)
+class WindowFile:
+    """A family of filters that estimate the rate over a step; strapgen verifies their conditions."""
+
+    name: Title
+    source: Source
+    previous: Previous
+    ahead: Ahead
+    conditions: Annotated[
+        int,
+        Key(
+            "The filters are exact for polynomials in time of a lower degree",
+            "1",
+            least=1,
+            most=MOST_CONDITIONS,
+        ),
+    ]
+    band: Band
+    objective: Objective
+    filters: Filters
+    one_sided: Annotated[
+        tuple[SideFile, ...], Key("Filters for the same samples with fewer ahead, or fewer before")
+    ]
+    increments: Annotated[int, Key("Samples of the step", "1", least=1, most=MOST_SAMPLES)] = 1
+    noise: Noise = Fraction(0)
+    gyro: Gyro | None = None
+    rotation: Annotated[
+        str, Key("Rotation of a step: to fourth order, or by a power series", choices=ROTATIONS)
+    ] = "fourth"
+    terms: Annotated[int, Key("Terms of that power series", "1", least=1, most=MOST_TERMS)] = 16
+    start: Annotated[
+        tuple[SideFile, ...] | None,
+        Key("Filters of the first intervals of a recording, designed for less noise"),
+    ] = None
+
+    def __post_init__(self) -> None:
+        samples = self.previous + self.increments + self.ahead
+        if samples > MOST_SAMPLES:
+            raise InputError(f"the window has {samples} samples; at most {MOST_SAMPLES} are allowed")
+        checks.count("conditions", self.conditions, largest=min(samples, MOST_CONDITIONS))
+        _check_taps("filters", self.filters, len(self.filters), samples)
+
+    def family(self, name: str) -> Window:
+        """Return the family under a name, not verified."""
+        window = Window(
+            *(
+                name,
+                self.name,
+                self.source,
+                self.increments,
+                self.previous,
+                self.ahead,
+                self.conditions,
+                self.band,
+            ),
+            *(self.objective, self.filters, self.gyro, self.noise, self.rotation, self.terms),
+        )
+        one_sided = _all_one_sided(window, self.one_sided)
+        start: tuple[Window, ...] = ()
+        if self.start is not None:
+            sizes = start_sizes(self.previous, self.ahead)
+            start = _in_order("start", _stored("start", window, self.start, sizes), sizes)
+        return replace(window, one_sided=one_sided, start=start)
+
+
+#: The longest family takes less.
+WINDOW = UserFile("a family of filters", WindowFile, 4_000_000)
 
 
 def one_sided_sizes(previous: int, ahead: int) -> list[tuple[int, int]]:
@@ -104,7 +183,7 @@ def _title(path: Path) -> str:
 @cache
 def _shipped_family(path: Path) -> dict[str, Window]:
     """Return the windows of a family of strapgen, whose file the tests verify, by name."""
-    window = _family(tomllib.loads(path.read_text("utf-8")), path.stem)
+    window = WINDOW.read(path).family(path.stem)
     return {one.name: one for one in (window, *window.one_sided)}
 
 
@@ -155,7 +234,7 @@ def read(path: str | Path) -> Window:
     Parameters
     ----------
     path : path
-        A TOML file with the keys of `KEYS`; every tap is a whole number or a string, see `coefficients.number`.
+        A TOML file with the keys of `WindowFile`.
 
     Returns
     -------
@@ -177,17 +256,15 @@ def read(path: str | Path) -> Window:
 
 def _read(path: str | Path, name: str = "") -> Window:
     """Return the family of a file under its own name or another one."""
-    data = toml_files.content(path, "a family of filters", MOST_BYTES)
-    try:
-        coefficient_files.check_keys(data, KEYS, OPTIONAL)
-        name = name or coefficient_files.slug(data["name"])
-        if name in _BUILT_IN:
-            raise InputError(f"name {data['name']!r} is that of the method {name}; another one is needed")
-        window = _family(data, name)
+
+    def family(file: WindowFile) -> Window:
+        window = file.family(name or coefficient_files.slug(file.name))
+        if window.name in _BUILT_IN:
+            raise InputError(f"name {file.name!r} is that of the method {window.name}; another one is needed")
         verify(window)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return window
+        return window
+
+    return WINDOW.convert(path, family)
 
 
 def verify(window: Window) -> None:
@@ -221,43 +298,7 @@ def _sum_of_step(window: Window) -> Taps:
     return zero * window.previous + one * window.increments + zero * window.ahead
 
 
-def _family(data: Mapping[str, Any], name: str) -> Window:
-    """Return a family from the content of a file with all keys, after a check of its numbers and its shape."""
-    previous, ahead = (_count(key, data[key], 0, MOST_SAMPLES - 1) for key in ("previous", "ahead"))
-    increments = _count("increments", data.get("increments", 1), 1, MOST_SAMPLES)
-    samples = previous + increments + ahead
-    if samples > MOST_SAMPLES:
-        raise InputError(f"the window has {samples} samples; at most {MOST_SAMPLES} are allowed")
-    filters = entries("filters", data["filters"])
-    if not 2 <= len(filters) <= MOST_DEGREE + 1:
-        raise InputError(
-            f"filters has {counted(len(filters), 'row')}; from 2 to {MOST_DEGREE + 1} are allowed, of c_0, c_1, ..."
-        )
-    window = Window(
-        name,
-        data["name"],
-        data["source"],
-        increments,
-        previous,
-        ahead,
-        _count("conditions", data["conditions"], 1, min(samples, MOST_CONDITIONS)),
-        band(data["band"]),
-        checks.choice("objective", data["objective"], OBJECTIVES),
-        _filters("filters", filters, len(filters), samples),
-        gyro(data.get("gyro")),
-        not_negative("noise", data.get("noise", 0)),
-        checks.choice("rotation", data.get("rotation", "fourth"), ROTATIONS),
-        _count("terms", data.get("terms", 16), 1, MOST_TERMS),
-    )
-    one_sided = _all_one_sided(window, entries("one_sided", data["one_sided"]))
-    start: tuple[Window, ...] = ()
-    if "start" in data:
-        sizes = start_sizes(previous, ahead)
-        start = _in_order("start", _stored("start", window, entries("start", data["start"]), sizes), sizes)
-    return replace(window, one_sided=one_sided, start=start)
-
-
-def _all_one_sided(window: Window, tables: list[Any]) -> tuple[Window, ...]:
+def _all_one_sided(window: Window, tables: Sequence[SideFile]) -> tuple[Window, ...]:
     """Return the one-sided filters of a family, those with fewer samples before the step mirrored where possible."""
     sizes = one_sided_sizes(window.previous, window.ahead)
     stored = _stored("one_sided", window, tables, sizes)
@@ -280,60 +321,42 @@ def _in_order(
 
 
 def _stored(
-    key: str, window: Window, tables: list[Any], sizes: list[tuple[int, int]]
+    key: str, window: Window, tables: Sequence[SideFile], sizes: list[tuple[int, int]]
 ) -> dict[tuple[int, int], Window]:
     """Return the filters of the tables under a key, by the samples before and ahead of their step."""
     stored: dict[tuple[int, int], Window] = {}
     for number, table in enumerate(tables, 1):
-        what = f"{key}, table {number}"
-        if not isinstance(table, dict):
-            raise InputError(f"{what} is of type {type(table).__name__}; a table is needed")
-        try:
-            coefficient_files.check_keys(table, ONE_SIDED_KEYS, ONE_SIDED_OPTIONAL)
-            one = _one_sided(window, table)
-            size = one.previous, one.ahead
-            if size not in sizes or size in stored:
-                twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
-                raise InputError(f"{counted(size[0], 'sample')} before and {size[1]} ahead are {twice}")
-        except InputError as error:
-            raise InputError(f"{what}: {error}") from None
-        stored[size] = one
+        size = table.previous, table.ahead
+        if size not in sizes or size in stored:
+            twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
+            raise InputError(
+                f"{key}[{number}]: {counted(size[0], 'sample')} before and {size[1]} ahead are {twice}"
+            )
+        _check_taps(
+            f"{key}[{number}].filters", table.filters, window.degree + 1, window.increments + sum(size)
+        )
+        stored[size] = replace(
+            window,
+            sibling=True,
+            name=sibling_name(window.name, window.previous, window.ahead, *size),
+            title=sibling_title(window.title, *size),
+            previous=table.previous,
+            ahead=table.ahead,
+            band=table.band or window.band,
+            objective=table.objective,
+            noise=table.noise,
+            filters=table.filters,
+        )
     return stored
 
 
-def _one_sided(window: Window, table: Mapping[str, Any]) -> Window:
-    """Return one-sided filters, which take from their family what they do not state."""
-    previous, ahead = (_count(key, table[key], 0, MOST_SAMPLES - 1) for key in ("previous", "ahead"))
-    samples = previous + window.increments + ahead
-    return replace(
-        window,
-        sibling=True,
-        name=sibling_name(window.name, window.previous, window.ahead, previous, ahead),
-        title=sibling_title(window.title, previous, ahead),
-        previous=previous,
-        ahead=ahead,
-        band=band(table["band"]) if "band" in table else window.band,
-        objective=checks.choice("objective", table["objective"], OBJECTIVES),
-        noise=not_negative("noise", table.get("noise", 0)),
-        filters=_filters("filters", entries("filters", table["filters"]), window.degree + 1, samples),
-    )
-
-
-def _filters(what: str, rows: list[Any], count: int, samples: int) -> tuple[Taps, ...]:
+def _check_taps(what: str, rows: Sequence[Taps], count: int, samples: int) -> None:
     if len(rows) != count:
         raise InputError(
             f"{what} has {counted(len(rows), 'row')}; {count} are needed, of c_0 to c_{count - 1}"
         )
-    result = []
     for number, row in enumerate(rows, 1):
-        taps = entries(f"{what} row {number}", row)
-        if len(taps) != samples:
+        if len(row) != samples:
             raise InputError(
-                f"{what} row {number} has {counted(len(taps), 'tap')}; as many as samples are needed: {samples}"
+                f"{what}[{number}] has {counted(len(row), 'tap')}; as many as samples are needed: {samples}"
             )
-        result.append(tuple(rational(f"{what} row {number}, tap {k}", tap) for k, tap in enumerate(taps, 1)))
-    return tuple(result)
-
-
-def _count(what: str, value: Any, smallest: int, largest: int) -> int:
-    return checks.count(what, value, smallest=smallest, largest=largest)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 from strapgen.catalogue import Choice
@@ -37,9 +39,9 @@ def propagate_whole(
     choice: Choice,
     backend: str,
     recording: Recording,
-    orthonormalize: float | str | None = None,
-    record: float | str | None = None,
-    pulse: float | str | None = None,
+    orthonormalize: float | str | Fraction | None = None,
+    record: float | str | Fraction | None = None,
+    pulse: float | str | Fraction | None = None,
 ) -> History:
     """Run a window over all recorded increments, from zero rotation.
 

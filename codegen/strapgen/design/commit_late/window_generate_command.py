@@ -10,10 +10,12 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.help import PlainCommand
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import option
+from strapgen.cli.options import CTarget, option
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.progress import waiting
+from strapgen.cli.rules import Needs, rules
 from strapgen.cli.source_options import SourceOptions
+from strapgen.cli.values import Positive
 from strapgen.design.windows.window_argument import WindowArgument, window_of
 from strapgen.design.windows.window_command import app
 
@@ -25,6 +27,7 @@ __all__ = ["app", "generate"]
 
 @app.command("generate", cls=PlainCommand)
 @grouped
+@rules(Needs("--max-rate-deg-s --lsb", "--sample-hz"))
 def generate(
     window: WindowArgument,
     *,
@@ -32,12 +35,9 @@ def generate(
         str,
         option("--algorithm", metavar="NAME", help="Attitude: euler or dcm.", panel="Algorithm"),
     ] = "euler",
-    target: Annotated[
-        str,
-        option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm"),
-    ] = "c",
+    target: CTarget = "c",
     sample_hz: Annotated[
-        str | None,
+        Positive | None,
         option(
             "--sample-hz",
             metavar="HZ",
@@ -49,8 +49,8 @@ def generate(
         FixedOptions,
         Shown(
             only=(
-                *("word", "max_rate_deg_s", "max_angle_rad", "lsb", "lsb_rad"),
-                *("rounding", "carry", "drift_allowance"),
+                *("word", "max_rate_deg_s", "largest_angle", "lsb", "lsb_rad"),
+                *("rounding", "carry", "allowance"),
             )
         ),
     ],
@@ -88,7 +88,12 @@ def generate(
 
 
 def generated(
-    window: str, algorithm: str, target: str, sample_hz: str | None, fixed: FixedOptions, name: str | None
+    window: str,
+    algorithm: str,
+    target: str,
+    sample_hz: Positive | None,
+    fixed: FixedOptions,
+    name: str | None,
 ) -> Sources:
     """Return the sources that the options ask for."""
     from strapgen.design.commit_late import commit_late_sources

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.analysis.vibration.band_options import BandOptions, command_line, not_negative
-from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import option, whole
+from strapgen.analysis.vibration.band_options import BandOptions
+from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.options import option
 from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
 from strapgen.cli.progress import waiting
+from strapgen.cli.rules import Excludes, Needs, Rule, rules
+from strapgen.cli.values import NotNegative, names, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -30,6 +33,18 @@ class ConingDesign(BandOptions):
     """Options of the band or the spectrum for which coefficients are designed."""
 
     panel: ClassVar[str] = "Design"
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Needs(
+            "--band --band-hz --sample-hz --gyro-bandwidth-hz --gyro-damping --spectrum --powers --products "
+            "--noise-rad --pulse-rad --name",
+            "--objective=band|worst|random",
+        ),
+        Needs("--band --band-hz", "--objective=band"),
+        Needs("--spectrum", "--objective=worst|random"),
+        Needs("--noise-rad --pulse-rad", "--objective=random"),
+        Needs("--objective=worst|random", "--spectrum"),
+        *BandOptions.rules,
+    )
 
     objective: Annotated[
         _Text,
@@ -38,6 +53,7 @@ class ConingDesign(BandOptions):
             metavar="NAME",
             help="Design for a band (band: least largest drift) or a spectrum (worst: least drift at the worst phases, "
             "random: least mean square for random ones).  [default: annul powers of the frequency]",
+            read=names("strapgen.catalogue.methods.shaped_coning:OBJECTIVES"),
         ),
     ] = None
     spectrum: Annotated[
@@ -45,7 +61,7 @@ class ConingDesign(BandOptions):
         option("--spectrum", metavar="FILE", help="CSV file of the vibration, as for strapgen vibration."),
     ] = None
     powers: Annotated[
-        _Text,
+        int | None,
         option(
             "--powers",
             metavar="N",
@@ -53,7 +69,7 @@ class ConingDesign(BandOptions):
         ),
     ] = None
     products: Annotated[
-        _Text,
+        int | None,
         option(
             "--products",
             metavar="N",
@@ -62,7 +78,7 @@ class ConingDesign(BandOptions):
         ),
     ] = None
     noise_rad: Annotated[
-        _Text,
+        NotNegative | None,
         option(
             "--noise-rad",
             metavar="RAD",
@@ -70,7 +86,8 @@ class ConingDesign(BandOptions):
         ),
     ] = None
     pulse_rad: Annotated[
-        _Text, option("--pulse-rad", metavar="RAD", help="Pulse of the gyro, with --objective random.")
+        NotNegative | None,
+        option("--pulse-rad", metavar="RAD", help="Pulse of the gyro, with --objective random."),
     ] = None
     name: Annotated[
         _Text,
@@ -81,35 +98,6 @@ class ConingDesign(BandOptions):
         ),
     ] = None
 
-    def check(self) -> None:
-        """Refuse options that do not go with the objective, or with none."""
-        stated = {part.name for part in fields(self) if getattr(self, part.name) is not None}
-        if self.objective is None:
-            for name in sorted(stated):
-                raise InputError(f"--{name.replace('_', '-')} goes with --objective band, worst or random")
-            return
-        from strapgen.catalogue.methods.shaped_coning import OBJECTIVES
-
-        checks.choice("objective", self.objective, OBJECTIVES)
-        allowed = {
-            "objective",
-            "powers",
-            "products",
-            "name",
-            "sample_hz",
-            "gyro_bandwidth_hz",
-            "gyro_damping",
-        }
-        allowed |= {"band", "band_hz"} if self.objective == "band" else {"spectrum"}
-        allowed |= {"noise_rad", "pulse_rad"} if self.objective == "random" else set()
-        for name in sorted(stated - allowed):
-            raise InputError(f"--{name.replace('_', '-')} does not go with --objective {self.objective}")
-        if self.objective != "band" and self.spectrum is None:
-            raise InputError(f"--objective {self.objective} needs a --spectrum")
-        needs = (self.band_hz, self.gyro_bandwidth_hz, self.spectrum)
-        if self.sample_hz is not None and all(value is None for value in needs):
-            raise InputError("--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum")
-
     def brief(self, samples: int, previous: int) -> ConingBrief:
         """Return what the options say."""
         from strapgen.analysis.vibration.spectrum import read_spectrum
@@ -118,10 +106,11 @@ class ConingDesign(BandOptions):
 
         lines = None
         if self.spectrum is not None:
-            lines = of_spectrum(read_spectrum(self.spectrum), self.sampling("--spectrum"))
+            assert self.sample_hz is not None, "a spectrum goes with it"
+            lines = of_spectrum(read_spectrum(self.spectrum), self.sample_hz)
         unknowns = max(0, samples + previous - 1)
         powers, products = (
-            checks.count(f"--{what}", whole(f"--{what}", value or "0"), smallest=0, largest=unknowns)
+            checks.count(f"--{what}", value or 0, smallest=0, largest=unknowns)
             for what, value in (("powers", self.powers), ("products", self.products))
         )
         return ConingBrief(
@@ -132,8 +121,8 @@ class ConingDesign(BandOptions):
             lines,
             powers,
             self.gyro(),
-            not_negative("--noise-rad", self.noise_rad or "0"),
-            not_negative("--pulse-rad", self.pulse_rad or "0"),
+            Fraction(self.noise_rad or 0),
+            Fraction(self.pulse_rad or 0),
             self.name or "",
             products,
         )
@@ -148,25 +137,31 @@ class ConingOutput(Output):
 
 
 @grouped
+@rules(
+    Excludes("--objective", "--terms --form", reason="--objective designs the compressed form"),
+    Needs("--format=toml", "--objective"),
+)
 def coning(
     samples: Annotated[
-        str,
+        int,
         option(
             *("--samples", "--increments"),
             metavar="N",
             help="Number of gyro samples in a slow cycle, 1 to 8.",
             panel="Algorithm",
+            read=whole(1, 8),
         ),
     ],
     previous: Annotated[
-        str,
+        int,
         option(
             "--previous",
             metavar="N",
             help="Number of samples from before the slow cycle that it uses as well, 0 to 32.",
             panel="Algorithm",
+            read=whole(0, 32),
         ),
-    ] = "0",
+    ] = 0,
     form: Annotated[
         str,
         option(
@@ -174,6 +169,7 @@ def coning(
             metavar="NAME",
             help="Form of the correction: compressed suits coning, uncompressed polynomial rates, combined both.",
             panel="Algorithm",
+            read=names("strapgen.catalogue.methods.coning_coefficients:FORMS"),
         ),
     ] = "compressed",
     terms: Annotated[
@@ -204,30 +200,17 @@ def coning(
     Example: strapgen coning --samples 1 --previous 8 --objective band --band 1.3 --out out/shaped.toml --format toml
     """
     output.check(design.spectrum)
-    from strapgen import catalogue
+    if design.objective is not None:
+        return _deliver_design(design, samples, previous, output)
+    if terms and samples + previous > _MOST_SAMPLES:
+        raise InputError(
+            f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; "
+            f"{samples + previous} are given"
+        )
     from strapgen.catalogue.methods import coning_coefficients
     from strapgen.design.coning.coning_report import coning_data, coning_report
 
-    count = checks.count("samples", whole("samples", samples), largest=catalogue.MOST_INCREMENTS)
-    before = checks.count(
-        "previous", whole("previous", previous), smallest=0, largest=coning_coefficients.MOST_KEPT
-    )
-    checks.choice("form", form, coning_coefficients.FORMS)
-    design.check()
-    if design.objective is not None:
-        if terms or form != "compressed":
-            raise InputError(
-                "--objective designs the compressed form, without terms of third and fourth order"
-            )
-        _deliver_design(design, count, before, output)
-        return
-    if output.format == _FILE_FORMAT:
-        raise InputError(f"--format {_FILE_FORMAT} writes a design; it goes with --objective")
-    if terms and count + before > _MOST_SAMPLES:
-        raise InputError(
-            f"terms of third and fourth order are listed for up to {_MOST_SAMPLES} samples; {count + before} are given"
-        )
-    coefficients = coning_coefficients.design(count, before, form)
+    coefficients = coning_coefficients.design(samples, previous, form)
     output.report(coning_report(coefficients, coning_data(coefficients, terms)))
 
 
@@ -246,11 +229,7 @@ def _deliver_design(options: ConingDesign, samples: int, previous: int, output: 
             output.report(shaped_report(drift))
             return
         figures = figure_lines(drift)
-    out = None if output.file is None else output.file.name
-    command = command_line(
-        ("strapgen", "coning", "--samples", str(samples), "--previous", str(previous)),
-        (options,),
-        format=_FILE_FORMAT,
-        out=out,
-    )
+    numbers = {"--samples": samples, "--previous": previous}
+    place = {"--format": _FILE_FORMAT, "--out": output.file and output.file.name}
+    command = command_line("coning", numbers, options, place, files_by_name=True)
     output.deliver(coning_file.written(shape, command, figures))

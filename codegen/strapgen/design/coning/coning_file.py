@@ -38,5 +38,5 @@ def written(shape: ShapedConing, command: str, figures: Sequence[str] = ()) -> s
     lines += ["coefficients = [", *(f'  "{value}",' for value in shape.coefficients), "]"]
     if shape.gyro is not None:
         lines += ["", "[gyro]"]
-        lines += [f'{key} = "{number(value)}"' for key, value in shape.gyro._asdict().items()]
+        lines += [f'{key} = "{number(value)}"' for key, value in vars(shape.gyro).items()]
     return "\n".join(lines) + "\n"

@@ -208,7 +208,7 @@ def shaped_data(drift: ShapedDrift) -> dict[str, Any]:
         "band_rad_sample": None if shape.band is None else float(shape.band),
         "gyro": None
         if shape.gyro is None
-        else {key: float(value) for key, value in shape.gyro._asdict().items()},
+        else {key: float(value) for key, value in vars(shape.gyro).items()},
         "coefficients": [str(c) for c in shape.coefficients],
         **drift.figures(),
         "drift": [

@@ -7,22 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import listed, option
+from strapgen.cli.options import Duration, GyroRate, option
 from strapgen.cli.output import Output
-from strapgen.ir import checks
+from strapgen.cli.rules import Needs, rules
+from strapgen.cli.values import Positive
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.simulate.sample_source import (
-    MOTION_FILE,
-    RUN_MOTION_NAMES,
     MotionSettings,
-    check_motion,
-    pairs,
+    motion_option,
 )
 from strapgen.lab.study.worker_options import WorkerOptions
 
 if TYPE_CHECKING:
-    from strapgen.design.frontier.frontier import Motions
+    pass
 
 
 @dataclass(frozen=True)
@@ -31,10 +29,8 @@ class StudyRun:
 
     panel: ClassVar[str] = "Run"
 
-    sample_hz: Annotated[
-        str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
-    ] = "100"
-    duration: Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.")] = "60"
+    sample_hz: GyroRate = Positive("100")
+    duration: Duration = Positive("60")
     results: Annotated[
         Path | None,
         option(
@@ -52,10 +48,11 @@ class StudyRun:
 
 
 @grouped
+@rules(Needs("--set", "--motion"))
 def frontier(
     *,
     methods: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             *("--method", "--methods"),
             metavar="NAME,...",
@@ -64,15 +61,7 @@ def frontier(
             panel="Algorithm",
         ),
     ] = None,
-    motion: Annotated[
-        str | None,
-        option(
-            "--motion",
-            metavar="NAME",
-            help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.  [default: cones, random rates and slews]",
-            panel="Input",
-        ),
-    ] = None,
+    motion: Annotated[str | None, motion_option("cones, random rates and slews")] = None,
     settings: MotionSettings = None,
     run: StudyRun,
     workers: WorkerOptions,
@@ -96,21 +85,18 @@ def frontier(
     """
     output.check(run.results, motion if motion and is_file(motion) else None)
     run.check(output)
-    motions = _motions(motion, settings)
-    jobs, cluster = workers.count(), workers.workers()
     from strapgen.cli.progress import track
     from strapgen.design.frontier import frontier as study
 
-    several = study.candidates(None if methods is None else listed("--method", methods))
-    runs = study.frontier(several, run.sample_hz, run.duration, run.results, jobs, cluster, motions)
+    motions = study.MOTIONS if motion is None else {motion: (motion, settings or {})}
+    rates, cluster = (str(run.sample_hz), str(run.duration)), workers.workers()
+    several = study.candidates(methods)
+    runs = study.frontier(several, *rates, run.results, workers.jobs, cluster, motions)
     standings = study.in_order(track(runs, "running", len(several)), several)
     from strapgen.design.frontier.frontier_plot import frontier_image
     from strapgen.design.frontier.frontier_report import frontier_report
 
-    hertz, seconds = (
-        float(checks.number("sample_hz", run.sample_hz)),
-        float(checks.number("duration", run.duration)),
-    )
+    hertz, seconds = float(run.sample_hz), float(run.duration)
     title = (
         f"drift over {seconds:g} s at {hertz:g} Hz; a line joins what halves the drift of all that costs less"
     )
@@ -118,14 +104,3 @@ def frontier(
         frontier_report(standings, hertz, seconds, motions),
         lambda path: frontier_image(standings, hertz, title, path),
     )
-
-
-def _motions(name: str | None, settings: list[str] | None) -> Motions:
-    """Return the motion of the options by its name; those of the study without one."""
-    from strapgen.design.frontier import frontier as study
-    from strapgen.lab.motions.motion_names import MOTIONS
-
-    check_motion(name, MOTIONS)
-    if name is None and settings:
-        raise InputError("--set goes with --motion")
-    return study.MOTIONS if name is None else {name: (name, pairs(settings or []))}

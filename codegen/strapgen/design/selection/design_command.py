@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import listed, option, whole
+from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track, waiting
-from strapgen.ir import checks
+from strapgen.cli.values import whole
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.study.worker_options import WorkerOptions
 
@@ -29,7 +29,7 @@ def design(
     ],
     *,
     methods: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             *("--method", "--methods"),
             metavar="NAME,...",
@@ -39,12 +39,13 @@ def design(
         ),
     ] = None,
     simulate: Annotated[
-        str | None,
+        int | None,
         option(
             "--simulate",
             metavar="N",
             help="Run the cheapest N algorithms in time, and show their drift beside the predicted one.",
             panel="Run",
+            read=whole(1),
         ),
     ] = None,
     generate: Annotated[
@@ -82,10 +83,7 @@ def design(
     for name, path in (("--out", output.file), ("--plot", output.plot)):
         if path is not None and results is not None and path.resolve() == results.resolve():
             raise InputError(f"{name} and --results are both {path}; two files are needed")
-    shown = whole("simulate", simulate)
-    if shown is not None:
-        checks.count("simulate", shown)
-    count, cluster = workers.count(), workers.workers()
+    count, cluster = workers.jobs, workers.workers()
     from strapgen.design.brief import read_brief
     from strapgen.design.selection.answer import in_order, judgements
     from strapgen.design.selection.candidates import contenders
@@ -94,11 +92,11 @@ def design(
     from strapgen.design.selection.simulated import confirmed
 
     brief = read_brief(file)
-    several = contenders(brief, None if methods is None else listed("--method", methods))
+    several = contenders(brief, methods)
     rows = track(judgements(file, several, results, count, cluster), "judging", len(several))
     with waiting("running the answer"):
         ordered = confirmed(brief, file, in_order(one for row in rows for one in row))
-    runs = None if shown is None else _simulated(brief, file, ordered[:shown], count)
+    runs = None if simulate is None else _simulated(brief, file, ordered[:simulate], count)
     report = selection_report(brief, ordered, runs)
     if generate is not None:
         _write(brief, file, ordered, generate, report.written("text"))

@@ -25,7 +25,7 @@ def written(family: Window, command: str) -> str:
     lines += _filters(family.filters)
     if family.gyro is not None:
         lines += ["", "[gyro]"]
-        lines += [f'{key} = "{number(value)}"' for key, value in family.gyro._asdict().items()]
+        lines += [f'{key} = "{number(value)}"' for key, value in vars(family.gyro).items()]
     sizes = stored_sizes(family.previous, family.ahead, family.gyro is None)
     tables = [("one_sided", family.one_sided_with(ahead)) for _, ahead in sizes]
     for key, one in tables + [("start", one) for one in family.start]:

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from strapgen.analysis.vibration.band_options import BandOptions, command_line, not_negative
+from strapgen.analysis.vibration.band_options import BandOptions
 from strapgen.cli.help import PlainCommand, PlainGroup
-from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import option, whole
+from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import waiting
+from strapgen.cli.rules import Needs, OneOf, Rule
+from strapgen.cli.values import NotNegative, names
 from strapgen.design.windows.window_argument import WindowArgument, window_of
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -38,40 +40,46 @@ class WindowSize:
     """Options of the samples that filters take, and of what they estimate."""
 
     panel: ClassVar[str] = "Window"
+    rules: ClassVar[tuple[Rule, ...]] = (
+        OneOf("--previous", needed="--previous is needed, a number of samples"),
+        OneOf("--ahead", needed="--ahead is needed, a number of samples"),
+        Needs("--series-terms", "--rotation=exact"),
+    )
 
     samples: Annotated[
-        str,
+        int,
         option("--samples", metavar="N", help="Number of samples in a step; several take --rotation exact."),
-    ] = "1"
+    ] = 1
     previous: Annotated[
-        _Text,
+        int | None,
         option(*("--previous", "--kept"), metavar="N", help="Number of samples from before the step."),
     ] = None
-    ahead: Annotated[_Text, option("--ahead", metavar="N", help="Number of samples ahead of the step.")] = (
-        None
-    )
+    ahead: Annotated[
+        int | None, option("--ahead", metavar="N", help="Number of samples ahead of the step.")
+    ] = None
     powers: Annotated[
-        str,
+        int,
         option(
             "--powers",
             metavar="N",
             help="Powers of time, from 0 on, on which the filters are exact; 4 is exact on cubic rates.",
         ),
-    ] = "4"
+    ] = 4
     coefficients: Annotated[
-        str,
+        int,
         option("--coefficients", metavar="N", help="Highest Legendre coefficient of the rate, 1 to 8."),
-    ] = "4"
+    ] = 4
     rotation: Annotated[
         str,
         option(
             "--rotation",
             metavar="NAME",
             help="How the rotation follows: fourth, the rotation vector to fourth order, or exact, a power series.",
+            read=names("strapgen.catalogue.methods.windows:ROTATIONS"),
         ),
     ] = "fourth"
     series_terms: Annotated[
-        _Text,
+        int | None,
         option("--series-terms", metavar="N", help="Terms of that power series.  [default: 16]"),
     ] = None
 
@@ -81,14 +89,14 @@ class Band(BandOptions):
     """Options of the motion and the gyro for which filters are designed."""
 
     noise: Annotated[
-        str,
+        NotNegative,
         option(
             "--noise",
             metavar="RATIO",
             help="Noise of an increment by the rate times the sampling interval; above 0, the committed filters are "
             "those of the least mean square error.",
         ),
-    ] = "0"
+    ] = NotNegative("0")
     now_noise: Annotated[
         str,
         option(
@@ -99,9 +107,9 @@ class Band(BandOptions):
         ),
     ] = "3e-4"
     start_noise: Annotated[
-        str,
+        NotNegative,
         option("--start-noise", metavar="RATIO", help="The same for the first intervals of a recording."),
-    ] = "0"
+    ] = NotNegative("0")
     spectrum: Annotated[
         Path | None,
         option(
@@ -119,13 +127,8 @@ class Band(BandOptions):
         from strapgen.analysis.vibration.spectrum import read_spectrum
         from strapgen.design.filters import spectra
 
-        return spectra.weights(read_spectrum(self.spectrum), band, self.sampling("--spectrum"))
-
-    def check(self) -> None:
-        """Refuse a sampling frequency that nothing needs."""
-        needs = (self.band_hz, self.gyro_bandwidth_hz, self.gyro_damping, self.spectrum)
-        if self.sample_hz is not None and all(value is None for value in needs):
-            raise InputError("--sample-hz goes with --band-hz, --gyro-bandwidth-hz or --spectrum")
+        assert self.sample_hz is not None, "a spectrum goes with it"
+        return spectra.weights(read_spectrum(self.spectrum), band, self.sample_hz)
 
 
 @app.command("design", cls=PlainCommand)
@@ -161,7 +164,11 @@ def design(
     with waiting("designing"):
         window = family.design(brief)
         windows.verify(window)
-        text = family_file.written(window, _command(size, band, name, output.file))
+        out = output.file and output.file.name
+        command = command_line(
+            "window design", size, band, {"--name": name, "--out": out}, files_by_name=True
+        )
+        text = family_file.written(window, command)
         warnings = window_warnings(window)
     output.deliver(text)
     for warning in warnings:
@@ -173,15 +180,12 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
     from strapgen.catalogue.methods import windows
     from strapgen.design.windows.family import FamilyBrief
 
-    counts = {"--previous": size.previous, "--ahead": size.ahead}
-    for stated, value in counts.items():
-        if value is None:
-            raise InputError(f"{stated} is needed, a number of samples")
+    assert size.previous is not None and size.ahead is not None, "they are needed"
     previous, ahead = (
-        checks.count(stated, whole(stated, value), smallest=0, largest=windows.MOST_SAMPLES - 1)
-        for stated, value in counts.items()
+        checks.count(stated, value, smallest=0, largest=windows.MOST_SAMPLES - 1)
+        for stated, value in (("--previous", size.previous), ("--ahead", size.ahead))
     )
-    increments = checks.count("--samples", whole("--samples", size.samples), largest=windows.MOST_SAMPLES)
+    increments = checks.count("--samples", size.samples, largest=windows.MOST_SAMPLES)
     samples = previous + increments + ahead
     if samples > windows.MOST_SAMPLES:
         step = "" if increments == 1 else f" with --samples {increments}"
@@ -189,31 +193,25 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
             f"--previous {previous} and --ahead {ahead}{step} make {samples} samples; "
             f"at most {windows.MOST_SAMPLES} are allowed"
         )
-    rotation = checks.choice("rotation", size.rotation, windows.ROTATIONS)
-    if size.series_terms is not None and rotation != "exact":
-        raise InputError("--series-terms goes with --rotation exact")
     radians, gyro = band.radians(), band.gyro()
-    band.check()
     return FamilyBrief(
         previous,
         ahead,
         radians,
-        checks.count(
-            "--powers", whole("--powers", size.powers), largest=min(samples, windows.MOST_CONDITIONS)
-        ),
-        checks.count(
-            "--coefficients", whole("--coefficients", size.coefficients), largest=windows.MOST_DEGREE
-        ),
+        checks.count("--powers", size.powers, largest=min(samples, windows.MOST_CONDITIONS)),
+        checks.count("--coefficients", size.coefficients, largest=windows.MOST_DEGREE),
         gyro,
-        not_negative("--noise", band.noise),
+        Fraction(band.noise),
         _now_noise(band.now_noise),
         band.densities(radians),
-        rotation,
+        size.rotation,
         checks.count(
-            "--series-terms", whole("--series-terms", size.series_terms or "16"), largest=windows.MOST_TERMS
+            "--series-terms",
+            16 if size.series_terms is None else size.series_terms,
+            largest=windows.MOST_TERMS,
         ),
         _title(name),
-        not_negative("--start-noise", band.start_noise),
+        Fraction(band.start_noise),
         increments,
     )
 
@@ -221,7 +219,7 @@ def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
 def _now_noise(value: str) -> Fraction:
     """Return the noise of an increment by the rate times the sampling interval: a ratio, or that of a brief's gyro."""
     if not value.endswith(".toml"):
-        return not_negative("--now-noise", value)
+        return Fraction(NotNegative.read("--now-noise", value))
     from strapgen.design.brief import read_brief
 
     brief = read_brief(Path(value))
@@ -243,12 +241,6 @@ def _title(name: str | None) -> str:
     if coefficient_files.slug(checks.text("--name", name)) in windows.WINDOWS:
         raise InputError(f"--name {name} is that of a window of the catalogue; another one is needed")
     return name
-
-
-def _command(size: WindowSize, band: Band, name: str | None, out: Path | None) -> str:
-    """Return the command that designs the filters, with what differs from its defaults."""
-    out_name = None if out is None else out.name
-    return command_line(("strapgen", "window", "design"), (size, band), name=name, out=out_name)
 
 
 @app.command("show", cls=PlainCommand)

@@ -28,7 +28,7 @@ def window_data(window: Window) -> dict[str, Any]:
         "increments": window.increments,
         "conditions": window.conditions,
         "band_rad_sample": float(window.band),
-        "gyro": None if gyro is None else {key: float(value) for key, value in gyro._asdict().items()},
+        "gyro": None if gyro is None else {key: float(value) for key, value in vars(gyro).items()},
         "rotation": window.rotation,
         "terms": window.terms if window.rotation == "exact" else None,
         **_side(window),
@@ -108,7 +108,7 @@ def _objective(window: Window) -> str:
 def _gyro(window: Window) -> str:
     if window.gyro is None:
         return "ideal: increments are integrals of the rate"
-    bandwidth, damping, sample = map(number, window.gyro)
+    bandwidth, damping, sample = map(number, vars(window.gyro).values())
     return f"second order, {bandwidth} Hz, damping {damping}, {sample} samples in a second"
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import typer
 
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.firmware.check_code.foreign_options import ForeignOptions
@@ -38,20 +39,20 @@ def check(
     from strapgen.firmware.check_code.foreign_arguments import FOREIGN_SUFFIXES, is_foreign
 
     if is_foreign(algorithm):
-        _refuse(method.stated, f"goes with an algorithm of strapgen; {algorithm} is a file in C or C++")
+        _refuse(stated(method), f"goes with an algorithm of strapgen; {algorithm} is a file in C or C++")
         _check_foreign(algorithm, foreign, output)
     else:
         _refuse(
-            foreign.stated,
+            stated(foreign),
             f"goes with a file in C or C++ ({', '.join(FOREIGN_SUFFIXES)}); {algorithm} is none",
         )
         _check_step(algorithm, method, output)
 
 
-def _refuse(options: list[str], reason: str) -> None:
+def _refuse(options: Iterable[str], reason: str) -> None:
     """Refuse options that do not go with what is checked."""
-    if options:
-        raise InputError(f"{options[0]} {reason}")
+    for option in options:
+        raise InputError(f"{option} {reason}")
 
 
 def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:

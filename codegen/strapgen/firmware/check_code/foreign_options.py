@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.options import option
-from strapgen.ir import checks
+from strapgen.cli.values import Positive
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ class ForeignOptions:
         ),
     ] = None
     sample_hz: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--sample-hz",
             metavar="HZ",
@@ -76,12 +75,6 @@ class ForeignOptions:
     precision: Annotated[
         _Text, option("--precision", metavar="NAME", help="Its numbers: float or double.  [default: double]")
     ] = None
-
-    @property
-    def stated(self) -> list[str]:
-        """The options that the command line has."""
-        names = [part.name for part in dataclasses.fields(self) if getattr(self, part.name) is not None]
-        return [f"--{name.replace('_', '-')}" for name in names]
 
     def step(self, file: str) -> ForeignStep:
         """Return the function of a file, compiled."""
@@ -107,5 +100,4 @@ class ForeignOptions:
         )
         if self.sample_hz is None:
             return ForeignStep(source, convention, takes)
-        rate = checks.number("--sample-hz", self.sample_hz, positive=True)
-        return ForeignStep(source, convention, takes, 1 / rate)
+        return ForeignStep(source, convention, takes, 1 / self.sample_hz)

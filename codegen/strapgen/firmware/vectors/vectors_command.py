@@ -9,7 +9,7 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import Algorithm, MethodOptions, option, whole
+from strapgen.cli.options import Algorithm, MethodOptions, option
 from strapgen.cli.output import Folder, Format, check_format, print_json
 from strapgen.ir.exceptions import InputError
 
@@ -25,14 +25,14 @@ def vectors(
     ] = "c-fixed",
     fixed: FixedOptions,
     count: Annotated[
-        str,
+        int,
         option(
             "--count", metavar="N", help="Number of vectors: corners first, then random ones.", panel="Input"
         ),
-    ] = "200",
+    ] = 200,
     seed: Annotated[
-        str, option("--seed", metavar="N", help="Seed of the random vectors.", panel="Input")
-    ] = "1",
+        int, option("--seed", metavar="N", help="Seed of the random vectors.", panel="Input")
+    ] = 1,
     out: Folder = None,
     format: Format = "text",
 ) -> None:
@@ -56,7 +56,7 @@ def vectors(
     if settings is not None and target in BUILT_IN and not BUILT_IN[target].fixed:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     fixed.check_increments(choice)
-    table = vectors_of_choice(choice, target, settings, whole("count", count) or 0, whole("seed", seed) or 0)
+    table = vectors_of_choice(choice, target, settings, count, seed)
     fixed.check_feedback(table.sources)
     files = table_files(table)
     refuse_changed(out or Path(), files)

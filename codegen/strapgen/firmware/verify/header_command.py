@@ -5,16 +5,13 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
-from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
-
-from typer.models import OptionInfo
+from typing import TYPE_CHECKING, Any
 
 from strapgen.cli import generate_command
 from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.option_groups import CommandOptions, Option
 from strapgen.cli.options import MethodOptions
-from strapgen.cli.source_options import SourceOptions
 from strapgen.design.commit_late import window_generate_command
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.suggestions import alternatives
@@ -26,8 +23,6 @@ if TYPE_CHECKING:
     from strapgen.navigation.systems.fitting import Fitted
     from strapgen.run.generation import Request
 
-Group = TypeVar("Group")
-
 #: The commands that generate C; a header can state these alone.
 COMMANDS: dict[str, Callable[..., Any]] = {
     "generate": generate_command.generate,
@@ -37,7 +32,8 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 }
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
-    *("algorithm", "file", "window", "target", "sculling", "sample_hz", "cpu", "name", "prefix"),
+    *("algorithm", "file", "window", "target", "targets"),
+    *("sculling", "sample_hz", "cpu", "name", "prefix"),
     *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 
@@ -50,25 +46,23 @@ class HeaderCommand:
     text: str
     #: A key of `COMMANDS`
     name: str
-    #: Values by parameter; those that are not stated have their defaults
+    #: The arguments of the command
     values: Mapping[str, Any]
 
     def request(self, algorithms: Iterable[str] = ()) -> Request:
         """Return the request of a command that generates one function."""
-        if self.name != "generate":
+        values = self.values
+        targets = values.get("targets") or ("numpy",)
+        if self.name != "generate" or len(targets) > 1:
             raise InputError(f"'{self.text}' does not generate one function")
-        _require_named(self.values["algorithm"], algorithms)
+        _require_named(values["algorithm"], algorithms)
         return generate_command.request(
-            self.values["algorithm"],
-            self._group(MethodOptions),
-            self.values["target"],
-            self._group(FixedOptions),
-            self._group(SourceOptions),
+            values["algorithm"], values["method"], targets[0], values["fixed"], values["output"]
         )
 
     def whole(self, algorithms: Iterable[str] = ()) -> Sources:
         """Return the files of a command that generates several functions; see `request`."""
-        values, fixed = self.values, self._group(FixedOptions)
+        values = self.values
         if self.name == "two-speed":
             from strapgen.navigation.two_speed import two_speed_sources
 
@@ -79,8 +73,8 @@ class HeaderCommand:
                 values["algorithm"],
                 values["target"],
                 values["sample_hz"],
-                fixed,
-                values["name"],
+                values["fixed"],
+                values["output"].name,
             )
         return self.system(algorithms)[1]
 
@@ -93,21 +87,14 @@ class HeaderCommand:
         for stage in system_file.read(built_in.file_of(values["file"])).stages:
             _require_named(stage.kernel, algorithms)
         fit, needs, command = system.fitted_stages(
-            values["file"], values["target"], values["sample_hz"], values["cpu"], self._group(FixedOptions)
+            values["file"], values["target"], values["sample_hz"], values["cpu"], values["fixed"]
         )
         return fit, system.unit(fit, needs, bounds(fit), command)
 
     def two_speed(self) -> two_speed.TwoSpeedRequest:
         """Return what a command of two speeds generates: algorithm, form of sculling, target and settings."""
         values = self.values
-        return two_speed.request(
-            values["algorithm"], values["sculling"], values["target"], self._group(FixedOptions)
-        )
-
-    def _group(self, kind: type[Group]) -> Group:
-        """Return a group of options with the values that are stated."""
-        names = {field.name for field in fields(kind)}  # type: ignore[arg-type]
-        return kind(**{name: value for name, value in self.values.items() if name in names})
+        return two_speed.request(values["algorithm"], values["sculling"], values["target"], values["fixed"])
 
 
 def read(text: str) -> HeaderCommand:
@@ -126,49 +113,44 @@ def read(text: str) -> HeaderCommand:
 
 
 def _values(name: str, words: list[str], text: str) -> dict[str, Any]:
-    """Return the values of the words behind the name of a command."""
-    parameters = signature(COMMANDS[name]).parameters
-    values = {key: parameter.default for key, parameter in parameters.items() if key in _VALUES}
-    (argument,) = (key for key in values if not _spellings(parameters[key].annotation))
-    by_option = {spelling: key for key in values for spelling in _spellings(parameters[key].annotation)}
+    """Return the arguments of a command from the words behind its name."""
+    options: CommandOptions = COMMANDS[name].__dict__["options"]
+    known = {
+        spelling: one for key, one in options.options.items() if key in _VALUES for spelling in one.spellings
+    }
+    (argument,) = (one for one in options.options.values() if one.is_argument)
     stated: dict[str, list[str]] = {}
     rest = iter(words)
     for word in rest:
-        option, equals, value = word.partition("=")
-        if not word.startswith("-"):
-            key, value = argument, word
-        elif option not in by_option:
-            raise InputError(f"{option} is no option that says what strapgen {name} generates: {text}")
-        else:
-            key = by_option[option]
-            if _kind(parameters[key].annotation) is not bool:
-                value = value if equals else next(rest, "")
-                if not value or (not equals and value.startswith("--")):
-                    raise InputError(f"{option} has no value in the header's command: {text}")
-        stated.setdefault(key, []).append(value)
-    if argument not in stated:
+        spelling, equals, value = word.partition("=")
+        option = known.get(spelling) if word.startswith("-") else argument
+        if option is None:
+            raise InputError(f"{spelling} is no option that says what strapgen {name} generates: {text}")
+        if option is argument:
+            value = word
+        elif option.kind is not bool:
+            value = value if equals else next(rest, "")
+            if not value or (not equals and value.startswith("--")):
+                raise InputError(f"{spelling} has no value in the header's command: {text}")
+        stated.setdefault(option.parameter.name, []).append(value)
+    if argument.parameter.name not in stated:
         raise InputError(f"the header's command names nothing to generate: {text}")
-    for key, words_of in stated.items():
-        values[key] = _value(_kind(parameters[key].annotation), key, words_of, text)
-    _require_file(name, values)
-    return values
+    given = {key: _value(options.options[key], values, text) for key, values in stated.items()}
+    if name == "window generate":
+        _regular(given["window"])
+    return options.typed(given)
 
 
-def _value(kind: Any, key: str, words: list[str], text: str) -> Any:
-    """Return the words of one parameter as a value of its type."""
-    if kind is list:
+def _value(option: Option, words: list[str], text: str) -> Any:
+    """Return the words of one option or argument as Typer has them."""
+    if option.kind in (list, dict):
         return words
     if len(words) > 1:
-        raise InputError(f"the header's command states {key.replace('_', '-')} {len(words)} times: {text}")
-    if kind is bool:
+        name = option.parameter.name.replace("_", "-")
+        raise InputError(f"the header's command states {name} {len(words)} times: {text}")
+    if option.kind is bool:
         return True
-    return _regular(words[0]) if kind is Path else words[0]
-
-
-def _require_file(name: str, values: Mapping[str, Any]) -> None:
-    """Refuse an argument that is a device or a pipe where a file may stand."""
-    if name == "window generate":
-        _regular(values["window"])
+    return _regular(words[0]) if option.kind is Path else words[0]
 
 
 def _regular(word: str) -> Path:
@@ -180,25 +162,6 @@ def _regular(word: str) -> Path:
     if path.exists() and not (path.is_file() and path.stat().st_size):
         raise InputError(f"{word} in the header's command is no regular file, or empty")
     return path
-
-
-def _spellings(annotation: Any) -> tuple[str, ...]:
-    """Return the spellings of an option; none for an argument."""
-    info = annotation.__metadata__[0]
-    if not isinstance(info, OptionInfo):
-        return ()
-    return str(info.default), *(info.param_decls or ())
-
-
-def _kind(annotation: Any) -> Any:
-    """Return the type of a parameter: list, bool, Path or str."""
-    hint = annotation.__origin__
-    for candidate in (hint, *get_args(hint)):
-        if get_origin(candidate) is list:
-            return list
-        if candidate in (bool, Path):
-            return candidate
-    return str
 
 
 def _require_named(algorithm: str, algorithms: Iterable[str]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.ir.exceptions import InputError
@@ -60,13 +60,13 @@ def verify(
 
     header = whole_header(file)
     if header is not None:
-        if source.stated:
+        if stated(source):
             raise InputError("a motion or a recording goes with the file of one function")
         output.check(header)
         return _verify_whole(header, algorithms or [], run_differing, output)
     request = header_command_of(file).request(algorithms or [])
     increments = None
-    if source.stated:
+    if stated(source):
         source.check()
         choice = request.choice
         increments = source.read(choice.increments_per_step, choice.previous, choice.ahead).increments

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,21 +10,22 @@ import typer
 
 from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import (
     STEP_OPTIONS,
     FastBackends,
     RunAlgorithm,
     SeveralMethods,
-    backends,
-    limit,
-    one,
+    a_backend,
+    default_backends,
     option,
 )
 from strapgen.cli.output import Output
+from strapgen.cli.rules import rules
+from strapgen.cli.values import NotNegative
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.described import described
-from strapgen.lab.simulate.sample_source import SampleSource
+from strapgen.lab.simulate.sample_source import ONE_SCALE, SOURCE_NEEDED, SampleSource
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
@@ -44,6 +45,7 @@ RunDiffering = Annotated[
 
 
 @grouped
+@rules(SOURCE_NEEDED, ONE_SCALE)
 def compare(
     algorithm: RunAlgorithm,
     *,
@@ -56,6 +58,7 @@ def compare(
             metavar="NAME",
             help="Back end to compare with; exact computes with 40 digits.",
             panel="Algorithm",
+            read=a_backend,
         ),
     ] = "numpy",
     files: Annotated[
@@ -71,7 +74,7 @@ def compare(
     source: SampleSource,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     fail_above: Annotated[
-        str | None,
+        NotNegative | None,
         option(
             "--fail-above",
             metavar="RAD",
@@ -95,47 +98,62 @@ def compare(
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
     output.check(algorithm, *methods.files, *source.files)
-    names = _backends(backend, reference, files)
+    # A file alone is compared with the reference.
+    names = backend or (() if files else default_backends())
     if (system := described(algorithm)) is not None:
         limits = {"--fail-above": fail_above, "--plot": output.plot}
-        stated = [name for name in limits if limits[name]]
+        refused = [name for name, value in limits.items() if value is not None]
         to_run = (names, reference), (files, run_differing)
-        return system.compare(algorithm, methods, stated, *to_run, source, fixed, output)
+        return system.compare(algorithm, methods, refused, *to_run, source, fixed, output)
     choices = _taking_increments(methods.choices(algorithm))
     requests = {path: _source_files().header_command_of(path).request([algorithm]) for path in files or ()}
-    counts = {path: request.settings for path, request in requests.items()}
-    most = limit("--fail-above", fail_above)
     source.check()
-    _check_fixed(fixed, {*names, reference}, source.pulse_arcsec)
+    _check_fixed(fixed, {*names, reference})
 
-    import numpy as np
-
-    from strapgen.lab.compare import comparison
     from strapgen.lab.compare.comparison_plot import comparison_image
-    from strapgen.lab.compare.comparison_report import ComparedKernel, comparison_report
-    from strapgen.lab.compare.file_counts import counted
+    from strapgen.lab.compare.comparison_report import comparison_report
 
-    kernels = []
-    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        for choice in choices:
-            inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
-            rows = comparison.compare(
-                choice,
-                backends=[*names, *_of_files(requests, choice, run_differing)],
-                increments=inputs.increments,
-                reference=reference,
-                truth=inputs.truth,
-                settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
-            )
-            kernels.append(
-                ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
-            )
+    kernels = [
+        _compared(
+            choice, [*names, *_of_files(requests, choice, run_differing)], reference, source, fixed, requests
+        )
+        for choice in choices
+    ]
     drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
     output.report(
         comparison_report(kernels, reference, drift),
         lambda path: comparison_image(kernels, reference, path),
     )
-    _fail_above(kernels, most, f"further from {reference} than {fail_above} rad")
+    _fail_above(kernels, fail_above, f"further from {reference} than {fail_above} rad")
+
+
+def _compared(
+    choice: Choice,
+    backends: Sequence[str | Backend],
+    reference: str,
+    source: SampleSource,
+    fixed: FixedOptions,
+    requests: Mapping[Path, Request],
+) -> ComparedKernel:
+    """Run one step on all back ends."""
+    import numpy as np
+
+    from strapgen.lab.compare import comparison
+    from strapgen.lab.compare.comparison_report import ComparedKernel
+    from strapgen.lab.compare.file_counts import counted
+
+    counts = {path: request.settings for path, request in requests.items()}
+    with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
+        inputs = source.read(choice.increments_per_step, choice.previous, choice.ahead)
+        rows = comparison.compare(
+            choice,
+            backends=backends,
+            increments=inputs.increments,
+            reference=reference,
+            truth=inputs.truth,
+            settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
+        )
+    return ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
 
 
 def _taking_increments(choices: list[Choice]) -> list[Choice]:
@@ -163,7 +181,7 @@ def _source_files() -> Any:
     return registration.extension("lab.source-files", "--source")
 
 
-def _fail_above(kernels: list[ComparedKernel], most: float | None, said: str) -> None:
+def _fail_above(kernels: list[ComparedKernel], most: NotNegative | None, said: str) -> None:
     """Exit with 1 if a back end is further from the reference than allowed, where a limit is stated."""
     if most is None:
         return
@@ -178,25 +196,13 @@ def _fail_above(kernels: list[ComparedKernel], most: float | None, said: str) ->
         raise typer.Exit(1)
 
 
-def _backends(text: str | None, reference: str, files: list[Path] | None) -> list[str]:
-    from strapgen.ir import checks
-    from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
-
-    one("--reference", reference)
-    # A file alone is compared with the reference.
-    names = [] if files and text is None else backends("--backend", text, DEFAULT_BACKENDS)
-    checks.choice("reference", reference, BACKENDS)
-    return names
-
-
-def _check_fixed(fixed: FixedOptions, backends: set[str], pulse: str | None) -> None:
-    """Refuse options of fixed point that no back end of the run uses, and two scales of a gyro."""
+def _check_fixed(fixed: FixedOptions, backends: set[str]) -> None:
+    """Refuse options of fixed point that no back end of the run uses."""
     from strapgen.run.backends import BACKENDS
 
-    fixed.check_pulse(pulse)
     fixed_point = [name for name, entry in BACKENDS.items() if entry.fixed]
     if not backends & {*fixed_point}:
-        for name in fixed.stated:
+        for name in stated(fixed):
             raise InputError(f"{name} is for fixed-point back ends, and none is named")
     any_word = [name for name in fixed_point if BACKENDS[name].word is None]
     if fixed.word is not None and not backends & {*any_word}:

@@ -15,19 +15,16 @@ from strapgen.cli.options import (
     SeveralBackends,
     SeveralMethods,
     StepAlgorithm,
-    backends,
-    limit,
-    listed,
     option,
 )
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
+from strapgen.cli.values import NotNegative, Positive
 from strapgen.lab.simulate.sample_source import (
-    MOTION_FILE,
     MOTION_NAMES,
     MotionSettings,
-    check_motion,
-    pairs,
+    a_motion,
+    in_words,
 )
 from strapgen.lab.study.worker_options import WorkerOptions
 
@@ -38,6 +35,10 @@ if TYPE_CHECKING:
 _Text = str | None
 
 
+#: Steps in s
+_STEPS = tuple(Positive(f"1/{2**halvings}") for halvings in range(1, 8))
+
+
 @dataclass(frozen=True)
 class Ladder:
     """Options of the motion, the ladder of steps and the duration of the runs."""
@@ -46,42 +47,46 @@ class Ladder:
 
     motion: Annotated[
         _Text,
-        option("--motion", metavar="NAME", help=f"Motion: {MOTION_NAMES}{MOTION_FILE}.  [default: coning]"),
+        option(
+            "--motion",
+            metavar="NAME",
+            help=f"Motion: {MOTION_NAMES}, or a Python file of your own.  [default: coning]",
+            read=a_motion,
+        ),
     ] = None
     settings: MotionSettings = None
     steps: Annotated[
-        str,
+        tuple[Positive, ...],
         option(
             *("--step", "--steps"),
             metavar="S,...",
             help="Step lengths in s; each must divide the duration.",
         ),
-    ] = "1/2,1/4,1/8,1/16,1/32,1/64,1/128"
-    duration: Duration = "2"
+    ] = _STEPS
+    duration: Duration = Positive("2")
 
     @property
     def parameters(self) -> Mapping[str, str]:
         """The parameters of the motion."""
         from strapgen.lab.motions import motions
 
-        return motions.GENERAL if self.motion is None and not self.settings else pairs(self.settings or [])
+        return motions.GENERAL if self.motion is None and not self.settings else self.settings or {}
 
     def words(self) -> str:
         """Return a description of the runs, whose motion is checked."""
         from strapgen.lab.motions import users_motions
 
         profile = users_motions.any_motion(self.motion or "coning", self.duration, self.parameters)
-        words = ", ".join(f"{key}={value}" for key, value in self.parameters.items())
+        words = in_words(self.parameters)
         return f"{self.duration} s of {profile.name} motion" + (f", {words}" if words else "")
 
     def cases(self, choices: Sequence[Choice], names: Sequence[str]) -> list[LadderCase]:
         """Return a case for each algorithm on each back end."""
         from strapgen.lab.converge.convergence import LadderCase
 
-        steps = tuple(listed("--step", self.steps))
-        motion, settings = self.motion or "coning", dict(self.parameters)
+        motion, settings, steps = self.motion or "coning", dict(self.parameters), tuple(map(str, self.steps))
         return [
-            LadderCase(choice, name, motion, settings, steps, self.duration)
+            LadderCase(choice, name, motion, settings, steps, str(self.duration))
             for choice in choices
             for name in names
         ]
@@ -92,10 +97,10 @@ def converge(
     algorithm: StepAlgorithm,
     *,
     methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
-    backend: SeveralBackends = "exact",
+    backend: SeveralBackends = ("exact",),
     ladder: Ladder,
     fail_beyond: Annotated[
-        _Text,
+        NotNegative | None,
         option(
             "--fail-beyond",
             metavar="D",
@@ -115,30 +120,27 @@ def converge(
     Example: strapgen converge euler --method rk1,rk2,rk4,butcher6 --increments enough --plot out/orders.png
     """
     output.check(algorithm, *methods.files)
-    names = backends("--backend", backend, ())
-    most = limit("--fail-beyond", fail_beyond)
-    check_motion(ladder.motion)
-    choices = methods.choices(algorithm)
-    count, cluster = workers.count(), workers.workers()
-    words, cases = ladder.words(), ladder.cases(choices, names)
+    choices, cluster = methods.choices(algorithm), workers.workers()
+    words, cases = ladder.words(), ladder.cases(choices, backend)
 
     from strapgen.lab.converge import convergence
     from strapgen.lab.converge.convergence_plot import convergence_image
     from strapgen.lab.converge.convergence_report import convergence_report
 
-    runs = track(convergence.converge_all(cases, count, cluster), "running", len(cases))
+    runs = track(convergence.converge_all(cases, workers.jobs, cluster), "running", len(cases))
     orders = [outcome for _, outcome in sorted(runs, key=lambda run: run[0])]
-    title = f"{words}; {', '.join(names)}"
+    title = f"{words}; {', '.join(backend)}"
     output.report(convergence_report(orders, title), lambda path: convergence_image(orders, title, path))
-    far = [order.kernel for order in orders if most is not None and not _within(order, most)]
-    if far:
+    if fail_beyond is not None and (
+        far := [order.kernel for order in orders if not _within(order, fail_beyond)]
+    ):
         typer.echo(
             f"strapgen: the observed order is off by more than {fail_beyond}: {', '.join(far)}", err=True
         )
         raise typer.Exit(1)
 
 
-def _within(order: Convergence, limit: float) -> bool:
+def _within(order: Convergence, limit: NotNegative) -> bool:
     """Tell whether the observed order is within the limit of the predicted one; False if either is missing."""
     return (
         order.observed is not None

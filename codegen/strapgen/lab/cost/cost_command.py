@@ -11,10 +11,15 @@ from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import waiting
+from strapgen.cli.rules import Excludes, OneOf, rules
 from strapgen.ir.exceptions import InputError
 
 
 @grouped
+@rules(
+    OneOf("NAME... --all", needed="a kernel is needed, or --all; strapgen list kernels shows them"),
+    Excludes("--all", "@method --target @fixed", reason="--all measures the whole catalogue in fixed point"),
+)
 def cost(
     kernels: Annotated[
         list[str] | None,
@@ -55,7 +60,7 @@ def cost(
         ),
     ] = None,
     cpu: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             "--cpu",
             metavar="NAME,...",
@@ -74,14 +79,13 @@ def cost(
     Example: strapgen cost euler dcm --cross arm-none-eabi-gcc --cpu cortex-m3 --max-rate-deg-s 400 --step 0.01
     """
     output.check(*(kernels or ()))
-    _check_alone(kernels, all_, [*method.stated, *(["--target"] if target else []), *fixed.stated])
     from strapgen import pipeline
     from strapgen.ir import checks
     from strapgen.lab.cost import cost as costs
     from strapgen.lab.cost.cost_report import catalogue_report, cost_report
     from strapgen.targets import TARGETS
 
-    processors = costs.processors(cross, [] if cpu is None else [name.strip() for name in cpu.split(",")])
+    processors = costs.processors(cross, cpu or ())
     if all_:
         with waiting("measuring"):
             rows = [*costs.catalogue_costs(processors)]
@@ -98,12 +102,3 @@ def cost(
         sources = pipeline.compile(choice, target, settings)
         rows += [costs.cost(sources, name) for name in processors]
     output.report(cost_report(rows))
-
-
-def _check_alone(kernels: list[str] | None, all_: bool, stated: list[str]) -> None:
-    """Refuse kernels or options beside --all, and a command without either."""
-    if all_ and (kernels or stated):
-        name = stated[0] if stated else kernels[0] if kernels else ""
-        raise InputError(f"--all measures the whole catalogue in fixed point; {name} does not go with it")
-    if not all_ and not kernels:
-        raise InputError("a kernel is needed, or --all; strapgen list kernels shows them")

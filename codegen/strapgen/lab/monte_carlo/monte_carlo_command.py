@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, StepAlgorithm, option
+from strapgen.cli.options import STEP_OPTIONS, GyroRate, MethodOptions, StepAlgorithm, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
+from strapgen.cli.values import NotNegative, Number, Positive, names, whole
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.study.worker_options import WorkerOptions
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from strapgen.catalogue import Choice
     from strapgen.lab.monte_carlo.random_runs import SteadyRuns
 
-#: Most runs, and most steps of each.
-_MOST = 10**9
+#: Reads a number of runs, or of steps of each.
+_A_COUNT = whole(1, 10**9)
 
 
 @dataclass(frozen=True)
@@ -30,27 +30,38 @@ class RandomRunOptions:
 
     panel: ClassVar[str] = "Run"
 
-    sample_hz: Annotated[
-        str, option("--sample-hz", metavar="HZ", help="Sampling rate of the gyro in Hz.")
-    ] = "100"
+    sample_hz: GyroRate = Positive("100")
     rate: Annotated[
-        str, option("--turn-deg-s", metavar="DEG_S", help="Rate of the steady turn about z in deg/s.")
-    ] = "10"
+        Number, option("--turn-deg-s", metavar="DEG_S", help="Rate of the steady turn about z in deg/s.")
+    ] = Number("10")
     pulse: Annotated[
-        str, option("--pulse-arcsec", metavar="ARCSEC", help="Angle of a pulse of the gyro; 0 for none.")
-    ] = "0"
+        NotNegative,
+        option("--pulse-arcsec", metavar="ARCSEC", help="Angle of a pulse of the gyro; 0 for none."),
+    ] = NotNegative("0")
     noise: Annotated[
-        str,
+        NotNegative,
         option("--noise-deg-sqrt-h", metavar="N", help="Random walk of the gyro in deg per root of an hour."),
-    ] = "0.01"
-    runs: Annotated[str, option("--runs", metavar="N", help="Number of runs.")] = "1000"
-    steps: Annotated[str, option("--length", metavar="N", help="Number of steps of each run.")] = "1000"
+    ] = NotNegative("0.01")
+    runs: Annotated[int, option("--runs", metavar="N", help="Number of runs.", read=_A_COUNT)] = 1000
+    steps: Annotated[
+        int, option("--length", metavar="N", help="Number of steps of each run.", read=_A_COUNT)
+    ] = 1000
     of: Annotated[
+        int,
+        option(
+            "--of",
+            metavar="N",
+            help="Runs of the whole sweep, for which the time is extrapolated.",
+            read=_A_COUNT,
+        ),
+    ] = 1_000_000
+    seed: Annotated[
+        int, option("--seed", metavar="N", help="Where the random numbers begin.", read=whole(0, 10**9))
+    ] = 0
+    backend: Annotated[
         str,
-        option("--of", metavar="N", help="Runs of the whole sweep, for which the time is extrapolated."),
-    ] = "1000000"
-    seed: Annotated[str, option("--seed", metavar="N", help="Where the random numbers begin.")] = "0"
-    backend: Annotated[str, option("--backend", metavar="NAME", help="Back end: numpy or c.")] = "c"
+        option("--backend", metavar="NAME", help="Back end: numpy or c.", read=names(("numpy", "c"))),
+    ] = "c"
     results: Annotated[
         Path | None,
         option(
@@ -64,33 +75,16 @@ class RandomRunOptions:
         """Return the runs, checked."""
         from strapgen.lab.monte_carlo.random_runs import Errors, SteadyRuns
 
-        checks.choice("backend", self.backend, ("numpy", "c"))
         if choice.increments is None:
             raise InputError(f"{choice.kernel} takes rates; a step that takes increments is needed")
-        hertz = checks.number("sample-hz", self.sample_hz, positive=True)
-        noise, pulse = (
-            self._at_least_0("noise-deg-sqrt-h", self.noise),
-            self._at_least_0("pulse-arcsec", self.pulse),
-        )
         errors = Errors(
-            math.radians(pulse / 3600),
-            math.radians(noise) / 60 / math.sqrt(hertz),
-            math.radians(float(checks.number("turn-deg-s", self.rate) / hertz)),
+            math.radians(float(self.pulse) / 3600),
+            math.radians(float(self.noise)) / 60 / math.sqrt(self.sample_hz),
+            math.radians(float(self.rate / self.sample_hz)),
         )
         if not errors.pulse and not errors.noise:
             raise InputError("pulse-arcsec and noise-deg-sqrt-h are both 0; an error above 0 is needed")
-        steps, runs = (
-            checks.count(name, checks.whole(name, text), largest=_MOST)
-            for name, text in (("length", self.steps), ("runs", self.runs))
-        )
-        seed = checks.count("seed", checks.whole("seed", self.seed), smallest=0, largest=_MOST)
-        return SteadyRuns(choice, errors, steps, runs, (seed,), self.backend)
-
-    def _at_least_0(self, name: str, text: str) -> float:
-        number = checks.number(name, text)
-        if number < 0:
-            raise InputError(f"{name} is {text}; 0 for none, or a number above 0 is needed")
-        return float(number)
+        return SteadyRuns(choice, errors, self.steps, self.runs, (self.seed,), self.backend)
 
 
 @grouped
@@ -116,9 +110,7 @@ def study_monte_carlo(
     output.check(algorithm, run.results, *method.files)
     if run.results is not None and output.file is not None and run.results.resolve() == output.file.resolve():
         raise InputError(f"--out and --results are both {run.results}; two files are needed")
-    jobs, cluster = workers.count(), workers.workers()
-    whole = checks.count("of", checks.whole("of", run.of), largest=_MOST)
-    sweep, hertz = run.sweep(method.choose(algorithm)), float(checks.number("sample-hz", run.sample_hz))
+    cluster, sweep = workers.workers(), run.sweep(method.choose(algorithm))
     from strapgen.lab.monte_carlo.random_runs import MeanSquare, cases, predicted, random_runs
     from strapgen.lab.monte_carlo.random_runs_report import RandomStudy, random_report
     from strapgen.run.backends import backend
@@ -126,7 +118,8 @@ def study_monte_carlo(
     backend(sweep.algorithm, backend=sweep.backend)  # generated and compiled before the time counts
     resumed = run.results is not None and run.results.exists()
     begin = time.monotonic()
-    parts = list(track(random_runs(sweep, run.results, jobs, cluster), "running", len(cases(sweep))))
+    parts = list(track(random_runs(sweep, run.results, workers.jobs, cluster), "running", len(cases(sweep))))
     seconds = None if resumed else time.monotonic() - begin
     mean = predicted(sweep.algorithm, sweep.errors, sweep.steps)
-    output.report(random_report(RandomStudy(sweep, MeanSquare.of(parts), mean, hertz, seconds, whole)))
+    study = RandomStudy(sweep, MeanSquare.of(parts), mean, float(run.sample_hz), seconds, run.of)
+    output.report(random_report(study))

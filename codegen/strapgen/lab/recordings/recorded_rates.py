@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ def gap_remarks(rows: RecordedRows, median: float) -> list[str]:
     ]
 
 
-def grid_points(path: Path, time: Array, resample_hz: float | str, interval: float) -> int:
+def grid_points(path: Path, time: Array, resample_hz: float | str | Fraction, interval: float) -> int:
     """Return the number of intervals of an even grid over a recording."""
     ratio = (float(time[-1]) - float(time[0])) / interval * (1 + 1e-12)
     if ratio > checks.MOST:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -213,11 +214,11 @@ def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, flo
 def read_rates(
     path: str | Path,
     unit: str | None = None,
-    resample_hz: float | str | None = None,
+    resample_hz: float | str | Fraction | None = None,
     *,
     columns: str | None = None,
     time_unit: str | None = None,
-    sample_hz: float | str | None = None,
+    sample_hz: float | str | Fraction | None = None,
     bridge_gaps: bool = False,
     drop_repeated: bool = False,
 ) -> Recording:
@@ -304,9 +305,9 @@ def read_rates(
 def propagate(
     backend: Backend,
     recording: Recording,
-    orthonormalize: float | str | None = None,
-    record: float | str | None = None,
-    pulse: float | str | None = None,
+    orthonormalize: float | str | Fraction | None = None,
+    record: float | str | Fraction | None = None,
+    pulse: float | str | Fraction | None = None,
 ) -> History:
     """Run an algorithm over recorded increments, from zero rotation.
 
@@ -374,7 +375,7 @@ def propagate(
     return History(time, states, step, unused, backend.elements)
 
 
-def record_interval(what: str, value: float | str, step: float) -> int:
+def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
     """Return how many steps an interval in s is, to a hundredth of a step."""
     ratio = float(checks.number(what, value, positive=True)) / step
     if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:

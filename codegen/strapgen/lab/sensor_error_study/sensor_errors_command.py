@@ -9,12 +9,13 @@ import typer
 
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, one, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepName, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
+from strapgen.cli.rules import OneOf, rules
+from strapgen.cli.values import whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.sensor_errors.sensor_options import force_of
 from strapgen.lab.simulate.sample_source import SampleSource
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ _MOST_RUNS, _MOST_INCREMENTS = 100_000, 2_000_000
 
 
 @grouped
+@rules(OneOf("--motion", needed="--motion is needed"))
 def study_sensor_errors(
     file: Annotated[
         str,
@@ -37,23 +39,22 @@ def study_sensor_errors(
         ),
     ],
     *,
-    algorithm: Annotated[
-        str,
-        option(
-            "--algorithm", metavar="NAME", help="Algorithm: dcm, euler or cayley-klein.", panel="Algorithm"
-        ),
-    ] = "euler",
+    algorithm: StepName = "euler",
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
     backend: OneBackend = "numpy",
     source: Annotated[SampleSource, Shown(only=("motion", "settings", "step", "duration", "specific_force"))],
     runs: Annotated[
-        str,
+        int,
         option("--runs", metavar="N", help="Runs of each cause, each with numbers of its own.", panel="Run"),
-    ] = "100",
+    ] = 100,
     seed: Annotated[
-        str | None,
+        int | None,
         option(
-            "--seed", metavar="N", help="Seed of the random numbers, in place of the file's.", panel="Run"
+            "--seed",
+            metavar="N",
+            help="Seed of the random numbers, in place of the file's.",
+            panel="Run",
+            read=whole(0),
         ),
     ] = None,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
@@ -69,32 +70,23 @@ def study_sensor_errors(
     """
     source = replace(source, errors=file)
     output.check(*source.files)
-    count = checks.whole("runs", runs)
     choice = method.choose(algorithm)
     source.check()
-    one("--backend", backend)
     fixed.check_backend(backend)
-    errors = _errors(source, seed)
+    errors = source.sensor_errors()
+    assert errors is not None, "the command names a file"
+    errors = errors if seed is None else replace(errors, seed=seed)
 
     from strapgen.lab.sensor_error_study.sensor_error_report import sensor_image, sensor_report
     from strapgen.lab.sensor_error_study.sensor_error_study import FEWEST_RUNS
 
-    checks.count("runs", count, smallest=FEWEST_RUNS, largest=_MOST_RUNS)
+    checks.count("runs", runs, smallest=FEWEST_RUNS, largest=_MOST_RUNS)
     study = _study(choice, backend, source, errors, fixed)
     causes = len([*errors.causes])
-    rows = list(track(study.rows(count), "running", 1 + causes if causes > 1 else 1))
+    rows = list(track(study.rows(runs), "running", 1 + causes if causes > 1 else 1))
     facts: dict[str, Any] = {"errors": file, "algorithm": choice.name, "method": choice.method_name}
-    facts |= {"backend": backend, "motion": source.described(source.motion or ""), "step_s": source.step}
+    facts |= {"backend": backend, "motion": source.described(source.motion or ""), "step_s": str(source.step)}
     output.report(sensor_report(rows, facts), lambda path: sensor_image(rows, path))
-
-
-def _errors(source: SampleSource, seed: str | None) -> InstrumentErrors:
-    """Return the errors of the file, with the seed of the command line if there is one."""
-    errors = source.sensor_errors()
-    assert errors is not None, "the command names a file"
-    if seed is None:
-        return errors
-    return replace(errors, seed=checks.count("seed", checks.whole("seed", seed), smallest=0))
 
 
 def _study(
@@ -106,15 +98,16 @@ def _study(
     from strapgen.run import backends as run
 
     motion = replace(source, errors=None).profile()
-    step, duration = source.times()
-    steps, force = checks.multiple("duration", duration, "step", step), force_of(source.specific_force)
+    assert source.step and source.duration, "the source is checked"
+    step = source.step
+    steps = checks.multiple("duration", source.duration, "step", step)
     if choice.increments is None:
         raise InputError("sensor errors go with increments, and the algorithm takes rates")
     if steps * choice.increments_per_step > _MOST_INCREMENTS:
         raise InputError(
             f"{steps * choice.increments_per_step} increments are too many, a run holds up to {_MOST_INCREMENTS}"
         )
-    path = Path(motion, choice, step, steps, records_of(steps), force)
+    path = Path(motion, choice, step, steps, records_of(steps), source.force)
     settings = fixed.settings_for_run(
         name, choice.increments_per_step, float(step), lambda: reach(path, errors)
     )

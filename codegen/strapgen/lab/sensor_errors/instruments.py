@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir.notebook_display import short_repr
 
 Array = NDArray[np.float64]
@@ -76,9 +78,17 @@ class Sampling:
         sample before, or "zero".
     """
 
-    jitter: float = 0.0
-    lost: float = 0.0
-    lost_as: str = "late"
+    jitter: Annotated[
+        float, Key("Standard deviation of the instant", "s", least=0, most=1, name="jitter_s")
+    ] = 0.0
+    lost: Annotated[float, Key("Probability that a sample is lost", "1", least=0, most=0.99)] = 0.0
+    lost_as: Annotated[
+        str,
+        Key(
+            "A lost sample: its increment comes late, with the next one, or repeats the one before, or is zero",
+            choices=("late", "repeat", "zero"),
+        ),
+    ] = "late"
 
     __repr__ = short_repr
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from strapgen.cli.options import option
-from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.lab.recordings.recording import Recording
@@ -42,14 +40,3 @@ def with_errors(data: Recorded, errors: InstrumentErrors | None) -> Recorded:
     from strapgen.lab.sensor_errors.measured_motions import measured_recording
 
     return measured_recording(data, errors)
-
-
-def force_of(text: str | None) -> tuple[float, float, float]:
-    """Return a specific force of the command line in m/s^2."""
-    from strapgen.ir import checks
-
-    parts = ["0"] * 3 if text is None else text.split(",")
-    if len(parts) != 3:
-        raise InputError(f"--specific-force is {text!r}; three numbers with commas between are needed")
-    x, y, z = (Fraction(checks.number("specific-force", part)) for part in parts)
-    return float(x), float(y), float(z)

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar
 
 from strapgen.cli.options import option
 from strapgen.cli.output import Output, format_option, plot_option
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
+from strapgen.cli.rules import Excludes, Needs, Rule
+from strapgen.cli.values import Positive, Vector, line
 
 _Text = str | None
 
@@ -21,7 +21,7 @@ class RunOptions:
     panel: ClassVar[str] = "Run"
 
     orthonormalize: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--orthonormalize",
             metavar="S",
@@ -37,7 +37,7 @@ class RunOptions:
         ),
     ] = None
     record: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--record",
             metavar="S",
@@ -45,7 +45,7 @@ class RunOptions:
         ),
     ] = None
     initial: Annotated[
-        _Text,
+        Vector | None,
         option(
             "--initial-deg",
             metavar="R,P,H",
@@ -61,25 +61,25 @@ class RunOptions:
 
         from strapgen.run.backends import evaluator
 
-        angles = [checks.number("initial-deg", part) for part in self.initial.split(",")]
-        if len(angles) != 3:
-            raise InputError(
-                f"--initial-deg is {self.initial!r}; three numbers with commas between are needed"
-            )
-        return evaluator("dcm-from-euler-angles")(np.radians([float(angle) for angle in angles]))
+        return evaluator("dcm-from-euler-angles")(np.radians([*map(float, self.initial)]))
 
 
 @dataclass(frozen=True)
 class RunOutput(Output):
     """Where the result of a run goes; without --format, the attitude along a recording is CSV."""
 
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Needs("--matrices", "--format=json"),
+        Excludes("--print", "--format=json|csv|markdown|latex"),
+    )
+
     plot: Annotated[Path | None, plot_option("the plots")] = None
     format: Annotated[_Text, format_option(Output.formats, "  [default: text; csv for recorded data]")] = None
     title: Annotated[
-        _Text, option("--title", metavar="TEXT", help="Title of the text, and of the plots.")
+        _Text, option("--title", metavar="TEXT", help="Title of the text, and of the plots.", read=line)
     ] = None
     print_every: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--print",
             metavar="S",
@@ -89,15 +89,3 @@ class RunOutput(Output):
     matrices: Annotated[
         bool, option("--matrices", help="Add the computed and the true matrices to the JSON output.")
     ] = False
-
-    def check_motion(self, motion: _Text) -> None:
-        """Check the options that go with a motion, and with one format."""
-        stated = {"--matrices": self.matrices, "--print": self.print_every is not None}
-        for name in (name for name, value in stated.items() if value and motion is None):
-            raise InputError(f"{name} goes with --motion")
-        if self.matrices and self.format != "json":
-            raise InputError("--matrices goes with --format json; --format csv has the matrices")
-        if self.print_every is not None and self.format not in (None, "text"):
-            raise InputError(f"--print goes with text, not with --format {self.format}")
-        if self.title is not None and not self.title.isprintable():
-            raise InputError(f"--title is {self.title!r}; one line of text is needed")

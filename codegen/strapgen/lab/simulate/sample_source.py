@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from fractions import Fraction
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -13,9 +12,12 @@ import typer
 
 from strapgen.cli.options import option
 from strapgen.cli.progress import say_unused, waiting
+from strapgen.cli.rules import Needs, OneOf, Rule
+from strapgen.cli.values import Positive, Vector, names
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.sensor_errors.sensor_options import SensorFile, force_of, read_errors, with_errors
+from strapgen.lab.sensor_errors.sensor_options import SensorFile, read_errors, with_errors
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,11 +30,27 @@ _Text = str | None
 
 #: Names of motions with a closed-form attitude, and of all that a run can have, for the help.
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
-RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
-#: What --motion takes beside these names.
-MOTION_FILE = ", or a Python file of your own"
+_RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
+
+
+def a_motion(option: str, text: str) -> str:
+    """Read a motion with a closed form, or the file of one."""
+    return text if is_file(text) else names("strapgen.catalogue:MOTIONS")(option, text)
+
+
+def _motion_of_a_run(option: str, text: str) -> str:
+    return text if is_file(text) else names("strapgen.lab.motions.motion_names:MOTIONS")(option, text)
+
+
+def motion_option(default: str = "") -> Any:
+    """Return the option of a motion that a run can have; `default` is what is run without one, in words."""
+    remark = f"  [default: {default}]" if default else ""
+    text = f"Motion: {_RUN_MOTION_NAMES}, or a Python file of your own.{remark}"
+    return option("--motion", metavar="NAME", help=text, panel="Input", read=_motion_of_a_run)
+
+
 MotionSettings = Annotated[
-    list[str] | None,
+    dict[str, str] | None,
     option(
         "--set",
         metavar="KEY=VALUE...",
@@ -40,6 +58,14 @@ MotionSettings = Annotated[
         panel="Input",
     ),
 ]
+
+
+#: Rules of the commands that run an algorithm: where its increments come from, and the angle of a count.
+SOURCE_NEEDED = OneOf(
+    "--motion --increments-csv --rates-csv",
+    needed="one of --motion, --increments-csv, --rates-csv is needed; none given",
+)
+ONE_SCALE = OneOf("--pulse-arcsec --lsb --lsb-rad")
 
 
 @dataclass(frozen=True)
@@ -61,13 +87,23 @@ class SampleSource:
     """Options that say where a run takes its increments from."""
 
     panel: ClassVar[str] = "Input"
+    rules: ClassVar[tuple[Rule, ...]] = (
+        OneOf("--motion --increments-csv --rates-csv"),
+        Needs("--set --step --duration --specific-force", "--motion"),
+        Needs("--motion", "--duration"),
+        Needs("--pulse-arcsec --errors", "--motion --increments-csv --rates-csv"),
+        Needs(
+            "--rate-unit --resample-hz --columns --time-unit --sample-hz --bridge-gaps --drop-repeated",
+            "--rates-csv",
+        ),
+    )
 
-    motion: Annotated[
-        _Text, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.")
-    ] = None
+    motion: Annotated[_Text, motion_option()] = None
     settings: MotionSettings = None
-    step: Annotated[_Text, option("--step", metavar="S", help="Step length in s.")] = None
-    duration: Annotated[_Text, option("--duration", metavar="S", help="Duration of each run in s.")] = None
+    step: Annotated[Positive | None, option("--step", metavar="S", help="Step length in s.")] = None
+    duration: Annotated[
+        Positive | None, option("--duration", metavar="S", help="Duration of each run in s.")
+    ] = None
     increments_csv: Annotated[
         Path | None,
         option(
@@ -110,7 +146,7 @@ class SampleSource:
         ),
     ] = None
     sample_hz: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--sample-hz",
             metavar="HZ",
@@ -132,7 +168,7 @@ class SampleSource:
         ),
     ] = False
     resample_hz: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--resample-hz",
             metavar="HZ",
@@ -140,7 +176,7 @@ class SampleSource:
         ),
     ] = None
     pulse_arcsec: Annotated[
-        _Text,
+        Positive | None,
         option(
             "--pulse-arcsec",
             metavar="ARCSEC",
@@ -149,7 +185,7 @@ class SampleSource:
     ] = None
 
     specific_force: Annotated[
-        _Text,
+        Vector | None,
         option(
             "--specific-force",
             metavar="X,Y,Z",
@@ -159,46 +195,12 @@ class SampleSource:
     ] = None
     errors: SensorFile = None
 
-    @property
-    def stated(self) -> bool:
-        """Whether any of the options is stated."""
-        return any(getattr(self, field.name) not in (None, False) for field in fields(self))
-
-    def check(self, of_system: bool = False) -> None:
-        """Check that there is one source of increments, with the options that go with it and no others."""
-        felt = of_system or self.errors is not None
-        if self.specific_force is not None and not (felt and self.motion is not None):
-            raise InputError("--specific-force goes with a described system or --errors, and with --motion")
-        from strapgen.lab.motions.motion_names import MOTIONS
-
-        check_motion(self.motion, MOTIONS)
-        sources = {
-            "--motion": self.motion,
-            "--increments-csv": self.increments_csv,
-            "--rates-csv": self.rates_csv,
-        }
-        chosen = [name for name, value in sources.items() if value is not None]
-        if len(chosen) != 1:
-            raise InputError(f"one of {', '.join(sources)} is needed; {' and '.join(chosen) or 'none'} given")
-        times = {"--step": self.step, "--duration": self.duration}
-        if self.motion is None:
-            _refuse({"--set": self.settings, **times}, "--motion", chosen[0])
-        elif missing := [
-            name for name, value in times.items() if value is None and not (of_system and name == "--step")
-        ]:
-            raise InputError(f"--motion needs {missing[0]} in s")
-        if self.rates_csv is None:
-            names = (
-                "rate_unit",
-                "resample_hz",
-                "columns",
-                "time_unit",
-                "sample_hz",
-                "bridge_gaps",
-                "drop_repeated",
-            )
-            rates = {f"--{name.replace('_', '-')}": getattr(self, name) or None for name in names}
-            _refuse(rates, "--rates-csv", chosen[0])
+    def check(self) -> None:
+        """Check what an algorithm needs that no file describes."""
+        if self.specific_force is not None and self.errors is None:
+            raise InputError("--specific-force goes with a described system or --errors")
+        if self.motion is not None and self.step is None:
+            raise InputError("--motion needs --step in s")
 
     @property
     def file(self) -> Path:
@@ -208,11 +210,13 @@ class SampleSource:
     @property
     def pulse(self) -> float | None:
         """The angle of a gyro pulse in rad."""
-        from strapgen.ir import checks
+        return None if self.pulse_arcsec is None else math.radians(float(self.pulse_arcsec) / 3600)
 
-        if self.pulse_arcsec is None:
-            return None
-        return math.radians(float(checks.number("pulse_arcsec", self.pulse_arcsec, positive=True)) / 3600)
+    @property
+    def force(self) -> tuple[float, float, float]:
+        """The specific force in m/s^2, in reference axes."""
+        x, y, z = map(float, self.specific_force or (0, 0, 0))
+        return x, y, z
 
     def profile(self, start: Any = None) -> Motion:
         """Return the motion with its parameters, as sensors measure it if they have errors.
@@ -223,13 +227,13 @@ class SampleSource:
         """
         from strapgen.lab.motions.users_motions import any_motion
 
-        true = any_motion(self.motion or "", self.duration or "", pairs(self.settings or []))
+        true = any_motion(self.motion or "", self.duration or "", self.settings or {})
         errors = self.sensor_errors()
         if errors is None:
             return true
         from strapgen.lab.sensor_errors.measured_motions import measured
 
-        force = None if self.specific_force is None else force_of(self.specific_force)
+        force = None if self.specific_force is None else self.force
         return measured(true, errors, force=force, start=start)
 
     def sensor_errors(self) -> InstrumentErrors | None:
@@ -246,7 +250,7 @@ class SampleSource:
 
     def described(self, name: str, noun: str = "") -> str:
         """Return the name of the motion with its parameters, for a title."""
-        words = ", ".join(self.settings or [])
+        words = in_words(self.settings or {})
         return f"{name}{noun} ({words})" if words else f"{name}{noun}"
 
     @property
@@ -254,15 +258,6 @@ class SampleSource:
         """The files that the options name."""
         of_motion = Path(self.motion) if self.motion is not None and is_file(self.motion) else None
         return self.increments_csv, self.rates_csv, of_motion, Path(self.errors) if self.errors else None
-
-    def times(self) -> tuple[Fraction, Fraction]:
-        """Return the step and the duration of a run on a motion in s."""
-        from strapgen.ir import checks
-
-        return (
-            checks.number("step", self.step or "", positive=True),
-            checks.number("duration", self.duration or "", positive=True),
-        )
 
     def recording(self) -> Recording:
         """Read the recorded data."""
@@ -301,10 +296,7 @@ class SampleSource:
     def _computed(self, samples: int, previous: int, ahead: int) -> Inputs:
         import numpy as np
 
-        from strapgen.ir import checks
-
-        profile = self.profile()
-        step, duration = self.times()
+        profile, step, duration = self.profile(), self.step or Positive("1"), self.duration or Positive("1")
         steps = checks.multiple("duration", duration, "step", step)
         increments, length = profile.increments(step, steps, samples, previous, ahead), float(step)
         truth = profile.attitude(np.arange(1 + steps) * length)
@@ -331,30 +323,6 @@ class SampleSource:
         return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
 
 
-def _refuse(options: dict[str, Any], owner: str, chosen: str) -> None:
-    for name, value in options.items():
-        if value is not None:
-            raise InputError(f"{name} goes with {owner}, not with {chosen}")
-
-
-def check_motion(name: str | None, among: Mapping[str, Any] | None = None) -> None:
-    """Check that a motion, if one is named, is among some, by default those with a closed form, or a file."""
-    from strapgen.ir import checks
-
-    if name is not None and not is_file(name):
-        from strapgen.catalogue import MOTIONS
-
-        checks.choice("motion", name, MOTIONS if among is None else among)
-
-
-def pairs(settings: list[str], option: str = "--set") -> dict[str, str]:
-    """Read settings of the form key=value."""
-    values: dict[str, str] = {}
-    for setting in settings:
-        key, equals, value = setting.partition("=")
-        if not equals or not key:
-            raise InputError(f"{option} {setting!r} is no setting; key=value is needed")
-        if key in values:
-            raise InputError(f"{option} {key} is given twice")
-        values[key] = value
-    return values
+def in_words(settings: Mapping[str, str]) -> str:
+    """Return settings for a reader."""
+    return ", ".join(f"{key}={value}" for key, value in settings.items())

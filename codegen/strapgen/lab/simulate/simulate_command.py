@@ -9,22 +9,23 @@ from typing import TYPE_CHECKING, Annotated
 from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm, one
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm
 from strapgen.cli.progress import say_unused
+from strapgen.cli.rules import Needs, rules
+from strapgen.cli.values import Positive, written
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.described import described
 from strapgen.lab.simulate.run_options import RunOptions, RunOutput
-from strapgen.lab.simulate.sample_source import SampleSource
+from strapgen.lab.simulate.sample_source import ONE_SCALE, SOURCE_NEEDED, SampleSource
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
     from strapgen.run.backends import Backend
 
-_Text = str | None
-
 
 @grouped
+@rules(SOURCE_NEEDED, Needs("--rates --initial-deg --matrices --print", "--motion"), ONE_SCALE)
 def simulate(
     algorithm: RunAlgorithm,
     *,
@@ -62,19 +63,9 @@ def simulate(
     if (others := described(algorithm)) is not None:
         return others.simulate(algorithm, method, backend, source, intervals, fixed, output)
     choice = method.choose(algorithm)
-    from strapgen.run.backends import BACKENDS
-
-    one("--backend", backend)
-    checks.choice("backend", backend, BACKENDS)
     output.check(algorithm, *method.files, *source.files)
     source.check()
-    output.check_motion(source.motion)
-    if source.motion is None:
-        stated = {"--rates": method.rates, "--initial-deg": intervals.initial is not None}
-        for name in (name for name, value in stated.items() if value):
-            raise InputError(f"{name} goes with --motion")
     fixed.check_backend(backend)
-    fixed.check_pulse(source.pulse_arcsec)
 
     import numpy as np
 
@@ -87,20 +78,17 @@ def simulate(
         )
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        if source.motion is None:
-            _on_recording(build, choice, source, intervals, output)
-        else:
-            _on_motion(build, choice, source, intervals, output)
+        run = _on_recording if source.motion is None else _on_motion
+        run(build, choice, source, intervals, output)
 
 
 #: Most records that are written: the text of one takes some hundred bytes.
 _MOST_RECORDS = 2_000_000
 
 
-def _refuse_many(steps: float, step: float, record: _Text) -> None:
+def _refuse_many(steps: float, step: float, record: Positive | None) -> None:
     """Refuse a run of more records than can be written, before it begins."""
-    interval = 0.0 if record is None else float(checks.number("record", record, positive=True))
-    records = steps / max(1.0, interval / step)
+    records = steps / max(1.0, float(record or 0) / step)
     if _MOST_RECORDS < records <= checks.MOST:  # more steps than that are refused as such
         raise InputError(
             f"{records:.0f} records are too many, up to {_MOST_RECORDS} are written; --record S thins them"
@@ -123,10 +111,14 @@ def _on_motion(
     from strapgen.lab.simulate.runs_plot import run_image
     from strapgen.lab.simulate.runs_report import RunLayout, run_report, step_facts
 
-    pulse, step, duration = source.pulse, source.step or "", source.duration or ""
-    length = float(checks.number("step", step, positive=True))
-    _refuse_many(float(checks.number("duration", duration, positive=True)) / length, length, intervals.record)
-    every = _prints(output.print_every, intervals.record or step)
+    assert source.step and source.duration, "the source is checked"
+    pulse, step, duration = source.pulse, source.step, source.duration
+    length = float(step)
+    _refuse_many(float(duration) / length, length, intervals.record)
+    every = None
+    if output.print_every is not None:
+        record = intervals.record or step
+        every = checks.multiple("print", output.print_every, "record interval", record)
     start = intervals.start()
     profile = source.profile(start)
     samples, beside = choice.increments_per_step, (choice.previous, choice.ahead)
@@ -147,24 +139,14 @@ def _on_motion(
         )
     facts = step_facts(backend, choice) | {
         "motion": profile.name,
-        "step_s": float(checks.number("step", step)),
-        "duration_s": float(checks.number("duration", duration)),
+        "step_s": length,
+        "duration_s": float(duration),
     }
-    facts |= {} if intervals.initial is None else {"initial_deg": intervals.initial}
+    facts |= {} if intervals.initial is None else {"initial_deg": written(intervals.initial)}
     facts |= source.facts
     title = f"{backend.kernel}, {backend.name}: {source.described(profile.name, ' motion')}, step {step} s"
     shown = RunLayout(source.described(profile.name), output.title, output.matrices, every)
     output.report(run_report(run, facts, shown), lambda path: run_image(run, output.title or title, path))
-
-
-def _prints(every: _Text, record: str) -> int | None:
-    """Return how many records lie between two prints of the matrices."""
-    if every is None:
-        return None
-    interval = checks.number("print", every, positive=True)
-    return checks.multiple(
-        "print", interval, "record interval", checks.number("record", record, positive=True)
-    )
 
 
 def _on_recording(

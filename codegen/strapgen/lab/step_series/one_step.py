@@ -15,7 +15,7 @@ import sympy as sp
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
-from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.coefficients import Number
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.kernel import evaluation, rotations
 from strapgen.kernel.covariants import Frame

@@ -7,7 +7,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.coefficients import Number
 from strapgen.kernel import evaluation
 from strapgen.kernel.power_series import Powers
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.options import option, whole
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
+from strapgen.cli.options import option
+from strapgen.cli.rules import OneOf, Rule
+from strapgen.cli.values import whole
 
 if TYPE_CHECKING:
     from strapgen.lab.study.clusters import Cluster
@@ -21,13 +21,15 @@ class WorkerOptions:
     """Where the cases of a study run."""
 
     panel: ClassVar[str] = "Run"
+    rules: ClassVar[tuple[Rule, ...]] = (OneOf("--jobs --scheduler --cluster"),)
 
     jobs: Annotated[
-        str | None,
+        int | None,
         option(
             "--jobs",
             metavar="N",
             help="Number of processes that run side by side.  [default: one for each processor]",
+            read=whole(1, _MOST),
         ),
     ] = None
     scheduler: Annotated[
@@ -47,16 +49,8 @@ class WorkerOptions:
         ),
     ] = None
 
-    def count(self) -> int | None:
-        """Return the number of processes, checked; None where none is stated."""
-        count = whole("jobs", self.jobs)
-        return None if count is None else checks.count("jobs", count, largest=_MOST)
-
     def workers(self) -> Cluster | None:
         """Return the cluster, checked; None where none is stated."""
         from strapgen.lab.study.clusters import Cluster
 
-        cluster = Cluster.of(self.scheduler, self.cluster)
-        if cluster is not None and self.jobs is not None:
-            raise InputError("--jobs goes with processes on this machine, not with --scheduler or --cluster")
-        return cluster
+        return Cluster.of(self.scheduler, self.cluster)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from dataclasses import asdict, dataclass
+from typing import Annotated, ClassVar
 
 import typer
 
 from strapgen.cli.help import PlainCommand, PlainGroup
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import Duration, Increments, listed, option, whole
+from strapgen.cli.options import Duration, StepName, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
+from strapgen.cli.values import NotNegative, Positive
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.simulate.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, pairs
+from strapgen.lab.simulate.sample_source import motion_option
 from strapgen.lab.study.worker_options import WorkerOptions
 
 app = typer.Typer(cls=PlainGroup, rich_markup_mode=None)
@@ -33,80 +33,66 @@ class Sweep:
     panel: ClassVar[str] = "Sweep"
 
     methods: Annotated[
-        str,
+        tuple[str, ...],
         option(
             *("--method", "--methods"),
             metavar="NAME,...",
             help="Integration methods, with commas between; strapgen list methods shows all.",
         ),
-    ] = "rk4"
-    increments: Increments = None
+    ] = ("rk4",)
+    increments: Annotated[
+        int | None,
+        option(
+            "--increments", metavar="N", help="Number of angle increments in a step, 1 to 8.  [default: 2]"
+        ),
+    ] = None
     words: Annotated[
-        str, option(*("--word", "--words"), metavar="BITS,...", help="Word lengths in bits, 8 to 64.")
-    ] = "8,10,12,14,16,18,20,24,28,32"
+        tuple[int, ...],
+        option(*("--word", "--words"), metavar="BITS,...", help="Word lengths in bits, 8 to 64."),
+    ] = (8, 10, 12, 14, 16, 18, 20, 24, 28, 32)
     roundings: Annotated[
-        str,
+        tuple[str, ...],
         option(
             *("--rounding", "--roundings"),
             metavar="NAME,...",
             help="How results are rounded: nearest, truncation.",
         ),
-    ] = "nearest"
+    ] = ("nearest",)
     carries: Annotated[
-        str,
+        tuple[str, ...],
         option(
             *("--carry", "--carries"),
             metavar="NAME,...",
             help="Error feedback from step to step: none, state, full.",
         ),
-    ] = "none,state,full"
+    ] = ("none", "state", "full")
     steps: Annotated[
-        str,
+        tuple[Positive, ...],
         option(
             *("--step", "--steps"),
             metavar="S,...",
             help="Step lengths in s; each must divide the duration.",
         ),
-    ] = "0.125"
+    ] = (Positive("0.125"),)
     pulses_arcsec: Annotated[
-        str,
+        tuple[NotNegative, ...],
         option(
             *("--pulse-arcsec", "--pulses-arcsec"),
             metavar="ARCSEC,...",
             help="Angles of a gyro pulse in arc seconds; 0 for increments without pulses.",
         ),
-    ] = "0"
-
-    def values(self) -> dict[str, Any]:
-        """Return the lists by the parameters of `word_length.cases`."""
-        return {
-            "methods": listed("--method", self.methods),
-            "increments": whole("increments", self.increments) or 2,
-            "words": [checks.whole("word", word) for word in listed("--word", self.words)],
-            "roundings": listed("--rounding", self.roundings),
-            "carries": listed("--carry", self.carries),
-            "steps": listed("--step", self.steps),
-            "pulses_arcsec": listed("--pulse-arcsec", self.pulses_arcsec),
-        }
+    ] = (NotNegative("0"),)
 
 
 @app.command("word-length", cls=PlainCommand)
 @grouped
 def word_length(
     *,
-    algorithm: Annotated[
-        str,
-        option(
-            "--algorithm", metavar="NAME", help="Algorithm: dcm, euler or cayley-klein.", panel="Algorithm"
-        ),
-    ] = "euler",
+    algorithm: StepName = "euler",
     sweep: Sweep,
-    motion: Annotated[
-        str,
-        option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.", panel="Input"),
-    ] = "coning",
+    motion: Annotated[str, motion_option()] = "coning",
     settings: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -115,7 +101,7 @@ def word_length(
             panel="Input",
         ),
     ] = None,
-    duration: Duration = "180",
+    duration: Duration = Positive("180"),
     workers: WorkerOptions,
     output: Output,
 ) -> None:
@@ -129,13 +115,7 @@ def word_length(
     Example: strapgen study word-length --word 12,16,20,24,32 --carry none,full --plot out/word-length.png
     """
     output.check(algorithm)
-    from strapgen import catalogue
-
-    checks.choice("algorithm", algorithm, catalogue.ALGORITHMS)
-    from strapgen.lab.motions.motion_names import MOTIONS
-
-    check_motion(motion, MOTIONS)
-    count, cluster = workers.count(), workers.workers()
+    cluster = workers.workers()
     if settings is None and motion != "coning" and not is_file(motion):
         raise InputError(f"--motion {motion} needs --set; strapgen list motions shows the keys")
 
@@ -147,12 +127,14 @@ def word_length(
         algorithm=algorithm,
         duration=duration,
         motion_name=motion,
-        settings=None if settings is None else pairs(settings),
-        **sweep.values(),
+        settings=settings,
+        **asdict(sweep) | {"increments": sweep.increments or 2},
     )
     _ = planned[0].profile  # a motion that lacks a parameter is told before anything runs
     with np.errstate(all="ignore"):
-        outcomes = {done.case: done for done in track(run(planned, count, cluster), "running", len(planned))}
+        outcomes = {
+            done.case: done for done in track(run(planned, workers.jobs, cluster), "running", len(planned))
+        }
     from strapgen.lab.word_length.word_length_plot import word_length_image
     from strapgen.lab.word_length.word_length_report import word_length_report
 

@@ -185,9 +185,9 @@ class Study:
                 word=word,
                 rounding=rounding,
                 carry=carry,
-                step=step,
-                duration=self.duration,
-                pulse_arcsec=pulse,
+                step=str(step),
+                duration=str(self.duration),
+                pulse_arcsec=str(pulse),
                 motion=self.motion_name,
                 settings=parameters,
             )

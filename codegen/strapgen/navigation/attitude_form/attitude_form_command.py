@@ -6,48 +6,48 @@ from typing import Annotated
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import listed, option
+from strapgen.cli.options import Processor, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
+from strapgen.cli.values import NotNegative, Number, Positive
 
 
 @grouped
 def study_attitude_form(
     *,
     update_hz: Annotated[
-        str, option("--update-hz", metavar="HZ", help="Slow cycles in a second.", panel="Rates")
-    ] = "50",
+        Positive, option("--update-hz", metavar="HZ", help="Slow cycles in a second.", panel="Rates")
+    ] = Positive("50"),
     navigation_hz: Annotated[
-        str,
+        NotNegative,
         option(
             "--navigation-hz", metavar="HZ", help="Cycles of the navigation frame in a second.", panel="Rates"
         ),
-    ] = "10",
+    ] = NotNegative("10"),
     orthonormalize_hz: Annotated[
-        str,
+        NotNegative,
         option(
             "--orthonormalize-hz",
             metavar="HZ",
             help="Orthonormalizations in a second; 0: none.",
             panel="Rates",
         ),
-    ] = "1",
+    ] = NotNegative("1"),
     max_rate_deg_s: Annotated[
-        str, option("--max-rate-deg-s", metavar="DEG_S", help="Largest body rate in deg/s.", panel="Rates")
-    ] = "70",
+        Positive,
+        option("--max-rate-deg-s", metavar="DEG_S", help="Largest body rate in deg/s.", panel="Rates"),
+    ] = Positive("70"),
     velocity_error: Annotated[
-        str,
+        Number,
         option(
             "--velocity-error",
             metavar="PART",
             help="Error of (47) that is allowed, as a part of the velocity increment.",
             panel="Rates",
         ),
-    ] = "1e-4",
+    ] = Number("1e-4"),
     without: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             "--without",
             metavar="PART,...",
@@ -55,16 +55,7 @@ def study_attitude_form(
             panel="Run",
         ),
     ] = None,
-    cpu: Annotated[
-        str | None,
-        option(
-            "--cpu",
-            metavar="NAME",
-            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
-            "instance cortex-m3.",
-            panel="Run",
-        ),
-    ] = None,
+    cpu: Processor = None,
     fixed: Annotated[FixedOptions, Shown(only=("word",))],
     output: Output,
 ) -> None:
@@ -85,16 +76,9 @@ def study_attitude_form(
         attitude_form_report,
     )
 
-    numbers = {"navigation-hz": navigation_hz, "orthonormalize-hz": orthonormalize_hz}
-    values = {name: float(checks.number(name, text)) for name, text in numbers.items()}
-    for name, value in values.items():
-        if value < 0:
-            raise InputError(f"{name} is {value:g}; a number of at least 0 is needed")
-    rates = forms.PartRates(float(checks.number("update-hz", update_hz, positive=True)), *values.values())
-    turning = math.radians(checks.number("max-rate-deg-s", max_rate_deg_s, positive=True))
-    allowed = float(checks.number("velocity-error", velocity_error))
-    which = forms.pairs([] if without is None else listed("--without", without))
-    loss = forms.truncation(rates, turning, allowed)
+    rates = forms.PartRates(float(update_hz), float(navigation_hz), float(orthonormalize_hz))
+    which = forms.pairs(without or ())
+    loss = forms.truncation(rates, math.radians(max_rate_deg_s), float(velocity_error))
     if cpu is not None:
         cost.processors(cpus=[cpu])
     settings = fixed.settings(1) if cpu else None

@@ -12,7 +12,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
+from strapgen.cli.values import Vector
 from strapgen.ir.exceptions import InputError
 
 
@@ -23,7 +23,7 @@ def study_calibration(
     ],
     *,
     rate_deg_s: Annotated[
-        str | None,
+        Vector | None,
         option(
             "--rate-deg-s",
             metavar="X,Y,Z",
@@ -32,7 +32,7 @@ def study_calibration(
         ),
     ] = None,
     acceleration_g: Annotated[
-        str | None,
+        Vector | None,
         option(
             "--acceleration-g", metavar="X,Y,Z", help="Acceleration in flight in g, body axes.", panel="Input"
         ),
@@ -48,10 +48,6 @@ def study_calibration(
     Example: strapgen study calibration examples/positions-20.toml --plot out/calibration.png
     """
     output.check(file)
-    rate, acceleration = (
-        _vector(name, value)
-        for name, value in (("--rate-deg-s", rate_deg_s), ("--acceleration-g", acceleration_g))
-    )
     from strapgen.navigation.calibration.calibration import QUANTITIES, calibrated
     from strapgen.navigation.calibration.calibration_file import read
     from strapgen.navigation.calibration.calibration_report import calibration_image, calibration_report
@@ -66,21 +62,11 @@ def study_calibration(
                 estimates[one.quantity] = one.estimate(content.errors[one.quantity])
             except InputError as error:
                 raise InputError(f"{file}: {error}") from None
-        if rate is not None or acceleration is not None:
-            turning = [math.radians(value) for value in rate or (0, 0, 0)]
-            covariance = one.error_covariance(turning, acceleration or (0, 0, 0))
+        if rate_deg_s is not None or acceleration_g is not None:
+            turning = [math.radians(value) for value in rate_deg_s or (0, 0, 0)]
+            covariance = one.error_covariance(turning, [*map(float, acceleration_g or (0, 0, 0))])
             remaining[one.quantity] = covariance * content.sigma[one.quantity] ** 2
     output.report(
         calibration_report(content, several, estimates, remaining),
         lambda path: calibration_image(content, several, path),
     )
-
-
-def _vector(name: str, value: str | None) -> list[float] | None:
-    """Return three numbers of an option."""
-    if value is None:
-        return None
-    parts = value.split(",")
-    if len(parts) != 3:
-        raise InputError(f"{name} is {value!r}; three numbers X,Y,Z are needed")
-    return [float(checks.number(name, part)) for part in parts]

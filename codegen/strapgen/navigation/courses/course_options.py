@@ -6,12 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from strapgen.cli.options import option, whole
+from strapgen.cli.options import option
 from strapgen.cli.output import Output, format_option, plot_option
+from strapgen.cli.values import Number, Vector
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.navigation.courses.courses import NavigationFrame
+
+
+#: The default of three numbers
+_ZERO = (Number("0"), Number("0"), Number("0"))
 
 
 @dataclass(frozen=True)
@@ -29,16 +34,16 @@ class Start:
     panel: ClassVar[str] = "Input"
 
     initial: Annotated[
-        str, option("--initial-deg", metavar="R,P,H", help="Roll, pitch and heading at the start in deg.")
-    ] = "0,0,0"
+        Vector, option("--initial-deg", metavar="R,P,H", help="Roll, pitch and heading at the start in deg.")
+    ] = _ZERO
     frame_rate: Annotated[
-        str,
+        Vector,
         option(
             "--frame-rate-deg-h",
             metavar="X,Y,Z",
             help="Rate of the navigation frame in deg/h, in navigation axes.",
         ),
-    ] = "0,0,0"
+    ] = _ZERO
 
     def matrix(self) -> Any:
         """Return the attitude at the start as a matrix, (3, 3)."""
@@ -46,7 +51,7 @@ class Start:
 
         from strapgen.run.backends import evaluator
 
-        return evaluator("dcm-from-euler-angles")(np.radians(_three("--initial-deg", self.initial)))
+        return evaluator("dcm-from-euler-angles")(np.radians([*map(float, self.initial)]))
 
     def frame(self) -> NavigationFrame:
         """Return the navigation frame with the attitude at its start."""
@@ -54,8 +59,8 @@ class Start:
 
         from strapgen.navigation.courses.courses import NavigationFrame
 
-        begin = np.radians(_three("--initial-deg", self.initial))
-        return NavigationFrame(begin, np.radians(_three("--frame-rate-deg-h", self.frame_rate)) / 3600)
+        begin, rate = (np.radians([*map(float, three)]) for three in (self.initial, self.frame_rate))
+        return NavigationFrame(begin, rate / 3600)
 
 
 @dataclass(frozen=True)
@@ -65,17 +70,17 @@ class CycleCounts:
     panel: ClassVar[str] = "Algorithm"
 
     fast: Annotated[
-        str | None,
+        int | None,
         option("--fast-cycles", metavar="N", help="Number of fast cycles in a slow cycle."),
     ] = None
     slow: Annotated[
-        str | None,
+        int | None,
         option(
             "--slow-cycles", metavar="N", help="Number of slow cycles in a navigation cycle.  [default: 1]"
         ),
     ] = None
     sculling: Annotated[
-        str | None,
+        int | None,
         option(
             "--sculling",
             metavar="N",
@@ -83,27 +88,12 @@ class CycleCounts:
         ),
     ] = None
 
-    @property
-    def stated(self) -> list[str]:
-        """The options that the command line has."""
-        values = {"--fast-cycles": self.fast, "--slow-cycles": self.slow, "--sculling": self.sculling}
-        return [name for name, value in values.items() if value is not None]
-
     def counts(self) -> dict[str, int]:
         """Return the cycles and the form of the sculling integral."""
         if self.fast is None:
             raise InputError("--fast-cycles is missing; an algorithm in two speeds needs it")
         return {
-            "fast_cycles": whole("fast_cycles", self.fast) or 0,
-            "slow_cycles": whole("slow_cycles", self.slow or "1") or 0,
-            "sculling": whole("sculling", self.sculling or "2") or 0,
+            "fast_cycles": self.fast,
+            "slow_cycles": 1 if self.slow is None else self.slow,
+            "sculling": 2 if self.sculling is None else self.sculling,
         }
-
-
-def _three(name: str, text: str) -> list[float]:
-    from strapgen.ir import checks
-
-    parts = text.split(",")
-    if len(parts) != 3:
-        raise InputError(f"{name} is {text!r}; three numbers with commas between are needed")
-    return [float(checks.number(name, part)) for part in parts]

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import OneBackend, StrapdownAlgorithm, option
 from strapgen.cli.progress import say_unused
 from strapgen.lab.sensor_errors.sensor_options import SensorFile, read_errors, with_errors
 from strapgen.navigation.courses.course_options import CourseOutput, CycleCounts, Start
 from strapgen.navigation.systems.built_in import is_system
+
+if TYPE_CHECKING:
+    from strapgen.lab.recordings.recording import InertialRecording
+    from strapgen.navigation.courses.courses import Course
 
 
 @grouped
@@ -53,39 +57,43 @@ def strapdown(
     if is_system(algorithm):
         from strapgen.navigation.systems.strapdown_system import system_along
 
-        return system_along(algorithm, cycles.stated, backend, (increments, errors), start, fixed, output)
+        return system_along(algorithm, stated(cycles), backend, (increments, errors), start, fixed, output)
     counts = cycles.counts()
+    fixed.check_backend(backend)
+    from strapgen.lab.recordings import recording
+
+    data = with_errors(recording.read_inertial(increments), read_errors(errors))
+    covered = _course(algorithm, data, counts, backend, fixed, start)
+    of_cycle = counts["fast_cycles"] * counts["slow_cycles"]
+    say_unused(increments, covered.unused, of_cycle, "navigation cycle")
+    facts = {"algorithm": f"{algorithm} in two speeds", "backend": backend, "source": str(increments)}
+    facts |= {} if errors is None else {"errors": errors}
+    _deliver(covered, facts, f"{facts['algorithm']}, {backend}: {increments.name}", output)
+
+
+def _course(
+    algorithm: str,
+    data: InertialRecording,
+    counts: dict[str, int],
+    backend: str,
+    fixed: FixedOptions,
+    start: Start,
+) -> Course:
+    """Run the algorithm along a recording."""
     import numpy as np
 
-    from strapgen.lab.recordings import recording
-    from strapgen.navigation.courses.course_plot import course_image
-    from strapgen.navigation.courses.course_report import course_report
     from strapgen.navigation.courses.courses import course
 
-    fixed.check_backend(backend)
-    data = with_errors(recording.read_inertial(increments), read_errors(errors))
     settings = fixed.settings_for_run(backend, 1, data.interval, lambda: data.largest)
-    frame = start.frame()
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        covered = course(
-            algorithm,
-            data,
-            **counts,
-            backend=backend,
-            settings=settings,
-            frame=frame,
-        )
-    say_unused(
-        increments, covered.unused, counts["fast_cycles"] * counts.get("slow_cycles", 1), "navigation cycle"
-    )
-    facts = {
-        "algorithm": f"{algorithm} in two speeds",
-        "backend": backend,
-        "source": str(increments),
-    }
-    facts |= {} if errors is None else {"errors": errors}
+        return course(algorithm, data, **counts, backend=backend, settings=settings, frame=start.frame())
+
+
+def _deliver(covered: Course, facts: dict[str, str], title: str, output: CourseOutput) -> None:
+    from strapgen.navigation.courses.course_plot import course_image
+    from strapgen.navigation.courses.course_report import course_report
+
     format = output.format or ("text" if output.file is None else "csv")
-    title = f"{facts['algorithm']}, {backend}: {increments.name}"
     replace(output, format=format).report(
         course_report(covered, facts), lambda path: course_image(covered, title, path)
     )

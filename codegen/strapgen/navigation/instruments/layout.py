@@ -4,35 +4,47 @@ from __future__ import annotations
 
 import re
 import shlex
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
-from strapgen.catalogue import toml_files
-from strapgen.catalogue.methods import coefficient_files, coefficients
+from strapgen.catalogue import coefficients
+from strapgen.catalogue.coefficients import Number
+from strapgen.catalogue.methods.coefficient_files import Source, Title, slug
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key, algebraic, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-
-if TYPE_CHECKING:
-    from strapgen.catalogue.methods.coefficients import Number
-
-#: Keys of a file and of a gyro in it.
-KEYS = ("name", "source", "sign", "gyros")
-GYRO_KEYS = ("x", "y", "spin", "turn_deg", "unbalance")
-#: A longer file is refused.
-MOST_BYTES = 20_000
-GYROS = 3
 
 #: A multiple of a symbol, which stands once: after a product and before a quotient, if they are there.
 _MULTIPLE = re.compile(r"(.*\*|[ +-]*)\s*(?P<symbol>B[0-9]?)\s*(/.*)?")
 
 
-class Unbalance(NamedTuple):
+@dataclass(frozen=True)
+class Unbalance:
     """A mass unbalance in rad/s per m/s^2: a multiple of a symbol, or a number where the symbol is empty."""
 
     factor: Number
     symbol: str = ""
+
+    WORDS: ClassVar = 'a number, or a multiple of B or of B0 to B9, such as "-B" or "B2/3",'
+    SCHEMA: ClassVar = {"type": ["number", "string"]}
+
+    @classmethod
+    def from_toml(cls, where: str, value: Any) -> Unbalance:
+        """Return the unbalance of an entry."""
+        match = _MULTIPLE.fullmatch(value) if isinstance(value, str) else None
+        if match is None:
+            try:
+                return cls(algebraic(where, value))
+            except InputError as error:
+                raise InputError(f"{error}; {cls.WORDS} is needed") from None
+        start, end = match.span("symbol")
+        at_zero, factor = (algebraic(where, f"{value[:start]}{x}{value[end:]}") for x in "01")
+        if at_zero != 0:
+            raise refused(where, value, f"{cls.WORDS} without a sum")
+        return cls(factor, match["symbol"] if factor != 0 else "")
 
 
 class GyroDescription(NamedTuple):
@@ -65,80 +77,80 @@ class Layout:
         return f"--layout {shlex.quote(self.file)}"
 
 
+Axis = tuple[Number, Number, Number]
+
+
+@dataclass(frozen=True)
+class GyroFile:
+    """A gyro of two torquer axes x and y, of length 1 and perpendicular, and its spin axis x cross y."""
+
+    x: Annotated[Axis, Key("Torquer axis in body axes", "1")]
+    unbalance: Annotated[
+        Unbalance, Key("Mass unbalance: a number, or a multiple of a symbol", "rad/s per m/s^2")
+    ]
+    y: Annotated[Axis | None, Key("The other torquer axis", "1")] = None
+    spin: Annotated[Axis | None, Key("The spin axis, in the place of y", "1")] = None
+    turn_deg: Annotated[
+        Fraction, Key("Angle by which the torquer axes are turned about the spin axis", "deg")
+    ] = Fraction(0)
+
+    def __post_init__(self) -> None:
+        if (self.y is None) == (self.spin is None):
+            raise InputError(
+                f"{'neither y nor spin is' if self.y is None else 'y and spin are'} there; one is needed"
+            )
+        for name in ("x", "y", "spin"):
+            axis = getattr(self, name)
+            if axis is not None and (square := _dot(axis, axis)) != 1:
+                raise InputError(
+                    f"{name} is [{', '.join(map(str, axis))}], of length sqrt({square}); length 1 is needed"
+                )
+        if _dot(self.x, self._other) != 0:
+            raise InputError(
+                f"x and {'spin' if self.y is None else 'y'} are not perpendicular, as they must be"
+            )
+
+    @property
+    def _other(self) -> Axis:
+        axis = self.spin if self.y is None else self.y
+        assert axis is not None, "one of them is there"
+        return axis
+
+    def description(self) -> GyroDescription:
+        """Return the gyro with both torquer axes."""
+        y = self._other if self.spin is None else _cross(self.spin, self.x)
+        return GyroDescription(self.x, y, self.turn_deg, self.unbalance)
+
+
+@dataclass(frozen=True)
+class LayoutFile:
+    """Three gyros with torquer axes and mass unbalances."""
+
+    name: Title
+    source: Source
+    sign: Annotated[
+        int, Key("s of the measurement M = W + s B A of rate W and acceleration A", choices=(1, -1))
+    ]
+    gyros: Annotated[tuple[GyroFile, GyroFile, GyroFile], Key("The gyros")]
+
+
+LAYOUT = UserFile("a layout", LayoutFile, 20_000)
+
+
 def read(path: str | Path) -> Layout:
-    """Read a layout from a file and check its axes exactly.
+    """Read a layout from a file and check its axes exactly."""
 
-    `path`: a TOML file with the keys `KEYS` and three tables ``[[gyros]]`` with keys of `GYRO_KEYS`. Every
-    number is a whole number or a string, see `coefficients.number`. An axis has three, in body axes. A gyro has
-    its torquer axis ``x`` and either ``y`` or its ``spin`` axis, x cross y; ``turn_deg``, by default 0, turns
-    both torquer axes about the spin axis by an angle in deg. The unbalance is a number in rad/s per m/s^2 or a
-    multiple of a symbol, such as ``"-B"`` or ``"B2/3"``.
-    """
-    data = toml_files.content(path, "a layout", MOST_BYTES)
-    try:
-        coefficient_files.check_keys(data, KEYS, ())
-        tables = coefficient_files.entries("gyros", data["gyros"])
-        if len(tables) != GYROS:
-            raise InputError(f"the layout has {len(tables)} gyros; three are needed")
-        sign = data["sign"]
-        if isinstance(sign, bool) or sign not in (-1, 1):
-            raise InputError(f"sign is {sign!r}; 1 or -1 is needed, s of M = W + s B A")
-        gyros = tuple(_gyro(f"gyro {number}", table) for number, table in enumerate(tables, 1))
-        name = coefficient_files.slug(data["name"])
-        layout = Layout(name, data["name"], data["source"], int(sign), gyros)
-        return replace(layout, file=checks.text("the name of the file", str(path)))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    def layout(file: LayoutFile) -> Layout:
+        name, gyros = slug(file.name), tuple(one.description() for one in file.gyros)
+        return Layout(
+            name, file.name, file.source, file.sign, gyros, checks.text("the name of the file", str(path))
+        )
+
+    return LAYOUT.convert(path, layout)
 
 
-def _gyro(what: str, table: Any) -> GyroDescription:
-    """Return the gyro of a table."""
-    if not isinstance(table, dict):
-        raise InputError(f"{what} is of type {type(table).__name__}; a table is needed")
-    try:
-        coefficient_files.check_keys(table, GYRO_KEYS, ("y", "spin", "turn_deg"))
-    except InputError as error:
-        raise InputError(f"{what}: {error}") from None
-    if ("y" in table) == ("spin" in table):
-        present = "both y and spin" if "y" in table else "neither y nor spin"
-        raise InputError(f"{what} has {present}; one of them is needed")
-    second = "y" if "y" in table else "spin"
-    x, other = (_axis(f"{what}: axis {key}", table[key]) for key in ("x", second))
-    if _total(zip(x, other, strict=True)) != 0:
-        raise InputError(f"{what}: axes x and {second} are not perpendicular, as they must be")
-    y = other if second == "y" else _cross(other, x)
-    turn = coefficients.number(f"{what}: turn_deg", table.get("turn_deg", 0))
-    if not isinstance(turn, Fraction):
-        raise InputError(f"{what}: turn_deg is {table['turn_deg']!r}; a rational number is needed")
-    return GyroDescription(x, y, turn, _unbalance(f"{what}: unbalance", table["unbalance"]))
-
-
-def _axis(what: str, value: Any) -> tuple[Number, ...]:
-    """Return an axis of length 1."""
-    elements = coefficient_files.entries(what, value)
-    if len(elements) != 3:
-        raise InputError(f"{what} has {len(elements)} elements; three are needed")
-    axis = tuple(coefficients.number(what, element) for element in elements)
-    square = _total(zip(axis, axis, strict=True))
-    if square != 1:
-        shown = ", ".join(map(str, elements))
-        raise InputError(f"{what} is [{shown}], of length sqrt({square}); length 1 is needed")
-    return axis
-
-
-def _unbalance(what: str, value: Any) -> Unbalance:
-    """Return a mass unbalance: a number, or a multiple of a symbol."""
-    match = _MULTIPLE.fullmatch(value) if isinstance(value, str) else None
-    if match is None:
-        try:
-            return Unbalance(coefficients.number(what, value))
-        except InputError as error:
-            raise InputError(f'{error}, or a multiple of B or of B0 to B9, such as "-B" or "B2/3"') from None
-    start, end = match.span("symbol")
-    at_zero, factor = (coefficients.number(what, f"{value[:start]}{x}{value[end:]}") for x in "01")
-    if at_zero != 0:
-        raise InputError(f"{what} is {value!r}; a number or a multiple of a symbol is needed, without a sum")
-    return Unbalance(factor, match["symbol"] if factor != 0 else "")
+def _dot(a: Axis, b: Axis) -> Number:
+    return _total(zip(a, b, strict=True))
 
 
 def _total(products: Any) -> Number:
@@ -147,8 +159,9 @@ def _total(products: Any) -> Number:
     return coefficients.number("product", "+".join(terms))
 
 
-def _cross(a: tuple[Number, ...], b: tuple[Number, ...]) -> tuple[Number, ...]:
+def _cross(a: Axis, b: Axis) -> Axis:
     """Return the cross product of two vectors."""
-    return tuple(
+    x, y, z = (
         _total([(a[(i + 1) % 3], b[(i + 2) % 3]), (-a[(i + 2) % 3], b[(i + 1) % 3])]) for i in range(3)
     )
+    return x, y, z

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from pathlib import Path
+from typing import Annotated
 
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -19,6 +23,8 @@ REFERENCES = {
 #: When a mode holds: in its turn, without air data for some time, or when it is selected.
 CONDITIONS = ("sequence", "no-air-data", "selected")
 KNOT = Fraction(1852, 3600)
+#: The schedule of the source, as far as it is printed.
+BUILT_IN = Path(__file__).parent / "ltr81.toml"
 
 
 @dataclass(frozen=True)
@@ -44,18 +50,47 @@ class LoopSetting:
 
 
 @dataclass(frozen=True)
+class LoopTable:
+    """A loop as a file states it; without them its order is the usual one, its reference the first of `REFERENCES`."""
+
+    tau_s: Annotated[
+        Fraction | None, Key("Time constant; none for an open loop", "s", least=1e-3, most=10**6)
+    ] = None
+    order: Annotated[int | None, Key("Order of the loop", choices=(2, 3))] = None
+    reference: Annotated[
+        str, Key("Reference of the loop", choices=sorted(set(sum(REFERENCES.values(), ()))))
+    ] = ""
+
+
+@dataclass(frozen=True)
 class LoopMode:
     """A mode of the schedule."""
 
-    name: str
+    heading: Annotated[LoopTable, Key("Loop of the heading")]
+    vertical: Annotated[LoopTable, Key("Loop of the vertical channel")]
+    level: Annotated[LoopTable | None, Key("Loop of levelling")] = None
+    erection: Annotated[LoopTable | None, Key("Loop of erection, in the place of levelling")] = None
+    name: Annotated[str, Key("Name; by default its number")] = ""
+    duration_s: Annotated[Fraction | None, Key("Duration; none for a mode without an end", "s", above=0)] = (
+        None
+    )
+    when: Annotated[str, Key("When the mode holds", choices=CONDITIONS)] = "sequence"
+    after_s: Annotated[Fraction, Key("Time without air data after which it holds", "s", least=0)] = Fraction(
+        0
+    )
     #: Levelling or erection, heading and vertical
-    loops: tuple[LoopSetting, ...]
-    #: None for a mode without an end
-    duration_s: Fraction | None = None
-    #: One of `CONDITIONS`
-    when: str = "sequence"
-    #: Time without air data after which the mode holds
-    after_s: Fraction = Fraction(0)
+    loops: tuple[LoopSetting, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        if (self.level is None) == (self.erection is None):
+            raise InputError("either level or erection is needed")
+        tables = {name: getattr(self, name) for name in REFERENCES}
+        settings = [
+            LoopSetting(name, table.reference or REFERENCES[name][0], table.tau_s, table.order)
+            for name, table in tables.items()
+            if table is not None
+        ]
+        object.__setattr__(self, "loops", tuple(settings))
 
     def loop(self, name: str) -> LoopSetting:
         """Return the setting of the loop "level", which may be that of erection, "heading" or "vertical"."""
@@ -66,20 +101,25 @@ class LoopMode:
 class LoopSchedule:
     """The modes of a reference system, and its switches."""
 
-    title: str
-    #: Those in sequence first; only the last of them may have no end
-    modes: tuple[LoopMode, ...]
-    cycle_s: Fraction
-    #: In m/s^2 and m
-    gravity: Fraction
-    radius: Fraction
-    #: Rate about down above which the heading loop is open; None for no cut-out
-    heading_cutout_deg_s: Fraction | None = None
-    #: True airspeed above which it becomes the reference of levelling, and below which it ceases to be
-    air_data_on_m_s: Fraction = 110 * KNOT
-    air_data_off_m_s: Fraction = 100 * KNOT
+    #: Only the last of those in sequence may have no end
+    modes: Annotated[tuple[LoopMode, ...], Key("The modes", least=1, most=50, name="mode")]
+    cycle_s: Annotated[Fraction, Key("Cycle of the loops", "s", least=1e-5, most=1000)]
+    gravity: Annotated[Fraction, Key("Gravity", "m/s^2", least=1e-3, most=1000)]
+    radius: Annotated[Fraction, Key("Radius of the earth", "m", least=1000, most=10**10, name="radius_m")]
+    title: Annotated[str, Key("Title in tables")] = ""
+    heading_cutout_deg_s: Annotated[
+        Fraction | None, Key("Rate about down above which the heading loop is open", "deg/s", above=0)
+    ] = None
+    air_data_on_m_s: Annotated[
+        Fraction, Key("True airspeed above which it becomes the reference of levelling", "m/s", above=0)
+    ] = 110 * KNOT
+    air_data_off_m_s: Annotated[
+        Fraction, Key("True airspeed below which it ceases to be", "m/s", above=0)
+    ] = 100 * KNOT
 
     def __post_init__(self) -> None:
+        named = [replace(one, name=one.name or f"mode {number}") for number, one in enumerate(self.modes, 1)]
+        object.__setattr__(self, "modes", tuple(named))
         if not self.sequence:
             raise InputError("the schedule has no mode in sequence")
         for mode in self.sequence[:-1]:
@@ -131,6 +171,18 @@ class LoopSchedule:
     def air_data_engaged(self, engaged: bool, airspeed_m_s: float) -> bool:
         """Return whether true airspeed is the reference of levelling, with hysteresis."""
         return airspeed_m_s > (self.air_data_off_m_s if engaged else self.air_data_on_m_s)
+
+
+SCHEDULE = UserFile("a schedule", LoopSchedule, 1 << 16)
+
+
+def read(path: str | Path = BUILT_IN) -> LoopSchedule:
+    """Read a schedule.
+
+    >>> [mode.name for mode in read().sequence]
+    ['fast', 'fine', 'normal']
+    """
+    return SCHEDULE.read(path)
 
 
 def total_s(modes: Iterable[LoopMode]) -> Fraction:

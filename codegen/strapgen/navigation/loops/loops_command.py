@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +12,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import pairs
+from strapgen.cli.values import Number, filled, names
 
 
 @grouped
@@ -28,15 +27,21 @@ def study_loops(
     ] = None,
     *,
     last: Annotated[
-        str,
+        Number,
         option("--last", metavar="S", help="Time of a last mode without an end, in s.", panel="Run"),
-    ] = "600",
+    ] = Number("600"),
     backend: Annotated[
         str,
-        option("--backend", metavar="NAME", help="Back end: numpy or c.", panel="Run"),
+        option(
+            "--backend",
+            metavar="NAME",
+            help="Back end: numpy or c.",
+            panel="Run",
+            read=names(("numpy", "c")),
+        ),
     ] = "numpy",
     settings: Annotated[
-        list[str] | None,
+        dict[str, Fraction] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -55,20 +60,13 @@ def study_loops(
     Example: strapgen study loops --set tilt_deg=2 --plot out/loops.png
     """
     output.check(file)
-    checks.choice("backend", backend, ("numpy", "c"))
-    from strapgen.navigation.loops.loop_schedule_file import BUILT_IN, read
+    from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
     from strapgen.navigation.loops.loops_report import LoopStudy, loops_image, loops_report
     from strapgen.navigation.loops.loops_study import LOOPS, LoopErrors, cycles_of_modes, designs, run_loops
 
-    stated = pairs(settings or [])
-    for key in stated:
-        checks.choice("--set", key, LoopErrors.__dataclass_fields__)
-    try:
-        errors = LoopErrors(**{key: float(checks.number(key, value)) for key, value in stated.items()})
-    except OverflowError:
-        raise InputError("--set has a number that is too large") from None
+    errors = filled(LoopErrors, settings)
     schedule = read(BUILT_IN if file is None else file)
-    modes = schedule.timed(checks.number("last", last))
+    modes = schedule.timed(last)
     cycles_of_modes(schedule, modes)
     gains = designs(schedule)
     courses = tuple(track(run_loops(schedule, modes, errors, backend), "running", len(LOOPS)))

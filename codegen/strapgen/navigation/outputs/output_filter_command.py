@@ -5,42 +5,43 @@ from __future__ import annotations
 from typing import Annotated
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import listed, option
+from strapgen.cli.options import a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
+from strapgen.cli.values import Number, Positive
 
 
 @grouped
 def study_output_filter(
     *,
     cutoff_hz: Annotated[
-        str, option("--cutoff-hz", metavar="HZ", help="Edge, which is damped by 3 dB.", panel="Filter")
-    ] = "3.2",
+        Positive, option("--cutoff-hz", metavar="HZ", help="Edge, which is damped by 3 dB.", panel="Filter")
+    ] = Positive("3.2"),
     sample_hz: Annotated[
-        str, option("--sample-hz", metavar="HZ", help="Samples in a second.", panel="Filter")
-    ] = "50",
+        Positive, option("--sample-hz", metavar="HZ", help="Samples in a second.", panel="Filter")
+    ] = Positive("50"),
     largest: Annotated[
-        str,
+        Positive,
         option(
             "--largest", metavar="SAMPLE", help="Largest magnitude of a sample, in its unit.", panel="Filter"
         ),
-    ] = "128",
+    ] = Positive("128"),
     frequencies: Annotated[
-        str,
+        tuple[Number, ...],
         option(
             "--frequency-hz", metavar="HZ,...", help="Frequencies that are measured, with sines.", panel="Run"
         ),
-    ] = "0.32,1,3.2,8,10,20",
+    ] = tuple(map(Number, ("0.32", "1", "3.2", "8", "10", "20"))),
     backend: Annotated[
-        str,
+        tuple[str, ...],
         option(
             "--backend",
             metavar="NAME,...",
             help="Back ends, with commas between; strapgen list backends shows all.",
             panel="Run",
+            read=a_backend,
         ),
-    ] = "c,c-fixed32,c-fixed16",
+    ] = ("c", "c-fixed32", "c-fixed16"),
     output: Output,
 ) -> None:
     """Measure a Butterworth filter of second order on several back ends, beside its analog and digital response.
@@ -54,17 +55,10 @@ def study_output_filter(
     from strapgen.navigation.outputs import output_filter_study as experiment
     from strapgen.navigation.outputs.output_filter import OutputFilter
     from strapgen.navigation.outputs.output_filter_report import output_filter_image, output_filter_report
-    from strapgen.run.backends import BACKENDS
 
-    names = [checks.choice("backend", name, BACKENDS) for name in listed("--backend", backend)]
-    edge = OutputFilter(
-        float(checks.number("cutoff-hz", cutoff_hz, positive=True)),
-        float(checks.number("sample-hz", sample_hz, positive=True)),
-    )
-    size = float(checks.number("largest", largest, positive=True))
-    lines = [float(checks.number("frequency-hz", text)) for text in listed("--frequency-hz", frequencies)]
-    tones = experiment.check_frequencies(edge, lines)
-    which = experiment.runs(names)
+    edge, size = OutputFilter(float(cutoff_hz), float(sample_hz)), float(largest)
+    tones = experiment.check_frequencies(edge, [*map(float, frequencies)])
+    which = experiment.runs([*backend])
     measured = track(experiment.measure(which, edge, size, tones), "measuring", len(which))
     study = experiment.FilterStudy(edge, size, tones, tuple(measured))
     output.report(output_filter_report(study), lambda path: output_filter_image(study, path))

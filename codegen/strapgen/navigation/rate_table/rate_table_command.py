@@ -6,16 +6,17 @@ from typing import Annotated
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Duration, FastBackends, backends, listed, option
+from strapgen.cli.options import Duration, FastBackends, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
+from strapgen.cli.values import Positive
 
 
 @grouped
 def rate_table(
     *,
     algorithm: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             "--algorithm",
             "--algorithms",
@@ -25,7 +26,7 @@ def rate_table(
         ),
     ] = None,
     method: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             "--method",
             metavar="NAME,...",
@@ -34,10 +35,10 @@ def rate_table(
         ),
     ] = None,
     backend: FastBackends = None,
-    duration: Duration = "3600",
+    duration: Duration = Positive("3600"),
     sample: Annotated[
-        str, option("--sample", metavar="S", help="Time between gyro samples in s.", panel="Input")
-    ] = "0.01",
+        Positive, option("--sample", metavar="S", help="Time between gyro samples in s.", panel="Input")
+    ] = Positive("0.01"),
     fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry"))],
     output: Output,
 ) -> None:
@@ -54,13 +55,8 @@ def rate_table(
     from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
     from strapgen.navigation.rate_table.rate_table_report import rate_table_report
 
-    names = experiment.ALGORITHMS if algorithm is None else listed("--algorithm", algorithm)
-    places = backends("--backend", backend, experiment.DEFAULT_BACKENDS)
-    methods = None if method is None else listed("--method", method)
-    count = len(list(experiment.cases(names, places, methods)))
-    runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1), methods)
-    rows = list(track(runs, "running", count))
-    output.report(
-        rate_table_report(rows, duration, sample),
-        lambda path: rate_table_image(rows, duration, sample, path),
-    )
+    names, places = algorithm or experiment.ALGORITHMS, backend or experiment.DEFAULT_BACKENDS
+    count = len(list(experiment.cases(names, places, method)))
+    runs = experiment.stress(duration, sample, 1, places, names, fixed.settings(1), method)
+    rows, times = list(track(runs, "running", count)), (str(duration), str(sample))
+    output.report(rate_table_report(rows, *times), lambda path: rate_table_image(rows, *times, path))

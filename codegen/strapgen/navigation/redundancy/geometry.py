@@ -9,10 +9,11 @@ from fractions import Fraction
 from functools import cache, cached_property, reduce
 from itertools import combinations
 from operator import add
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from strapgen.catalogue.methods import coefficients
-from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue import coefficients, toml_models
+from strapgen.catalogue.coefficients import Number
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -264,8 +265,11 @@ def _rational_factors(number: Number) -> list[Fraction]:
     return [Fraction(factor.p, factor.q) for factor in factors]
 
 
-#: Largest component of an axis.
-_LARGEST = 1000
+#: Axes as a file states them.
+Axes = Annotated[
+    tuple[Annotated[tuple[Number, Number, Number], Key(least=-1000, most=1000)], ...],
+    Key("What each sensor measures of a vector, in body axes", "1", least=LEAST_AXES, most=MOST_AXES),
+]
 
 
 def geometry(axes: Any) -> SensorGeometry:
@@ -278,9 +282,12 @@ def geometry(axes: Any) -> SensorGeometry:
     >>> geometry([[1, 0, 0], [0, 1, 0], [0, 0, 2], ["sqrt(3)/2", "1/4", "sqrt(3)/4"]]).equations
     ((-2*sqrt(3), -1, -sqrt(3), 4),)
     """
-    if not isinstance(axes, list | tuple):
-        raise InputError("axes is no list; rows of three numbers are needed")
-    rows = [_row(number, row) for number, row in enumerate(axes)]
+    return of_rows(toml_models.parse(Axes, axes, "axes"))
+
+
+def of_rows(axes: Sequence[Row]) -> SensorGeometry:
+    """Return a geometry of rows of exact numbers, see `geometry`."""
+    rows = list(axes)
     stated = SensorGeometry(tuple(rows))
     field = _in_field(rows)
     for number, length in enumerate(stated.lengths):
@@ -288,18 +295,6 @@ def geometry(axes: Any) -> SensorGeometry:
         if inside is not None:
             rows[number] = tuple(field.back(value / inside) for value in field.rows[number])
     return SensorGeometry(tuple(rows))
-
-
-def _row(number: int, row: Any) -> Row:
-    if not isinstance(row, list | tuple) or len(row) != 3 or any(isinstance(x, bool | list) for x in row):
-        raise InputError(f"axis {number} is {row}; three numbers are needed")
-    what = f"a component of axis {number}"
-    axis = tuple(
-        coefficients.number(what, x if isinstance(x, int | str) else str(checks.number(what, x))) for x in row
-    )
-    if any(not -_LARGEST <= component <= _LARGEST for component in axis):
-        raise InputError(f"axis {number} has a component beyond {_LARGEST}; a direction is needed")
-    return axis
 
 
 def _hexad() -> Iterator[Row]:

@@ -5,57 +5,55 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from strapgen.catalogue import toml_files
+from strapgen.catalogue import toml_models
+from strapgen.catalogue.toml_files import UserFile
+from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
 from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.redundancy import failure_selection, parity_equations
-from strapgen.navigation.redundancy.geometry import geometry
+from strapgen.navigation.redundancy.geometry import Axes, of_rows
 from strapgen.navigation.redundancy.parity_equations import KINDS, SensorSet
 
-#: A longer file is refused.
-_MOST_BYTES = 1 << 16
-_KEYS = ("name", "sensor", "range", "axes")
-_NAME = re.compile(r"[a-z][a-z0-9]{0,7}")
+_NAME = Key(
+    "What the names of kernels end with; by default that of the file",
+    pattern="[a-z][a-z0-9]{0,7}",
+    form="at most eight small letters and digits, a letter first,",
+)
+
+
+@dataclass(frozen=True)
+class GeometryFile:
+    """Redundant sensors: their axes, their kind, and what they measure."""
+
+    axes: Axes
+    name: Annotated[str, _NAME] = ""
+    sensor: Annotated[str, Key("What the sensors are", choices=tuple(KINDS))] = "gyro"
+    range: Annotated[
+        Fraction | None,
+        Key("Largest increment of a cycle; by default 1/8 rad or 4 m/s", "rad or m/s", above=0),
+    ] = None
+
+
+GEOMETRY = UserFile("a geometry", GeometryFile, 1 << 16)
 
 
 def read(path: str | Path) -> SensorSet:
-    """Read a geometry.
-
-    `path`: a TOML file with ``axes``, rows of three numbers each as `geometry` reads them, and if need be
-    ``name``, ``sensor``, "gyro" or "accelerometer", and ``range``, the largest increment of a cycle in rad or
-    m/s.
-    """
+    """Read the geometry of sensors; a row of axes is read as by `geometry`."""
     place = checks.path("path", path)
-    tables = toml_files.content(path, "a geometry", _MOST_BYTES, str)
-    try:
-        sensors = _parsed(tables, re.sub(r"[^a-z0-9]", "", place.stem.lower())[:8])
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    return replace(sensors, command=f"strapgen redundancy {shlex.quote(place.as_posix())}")
+    stem = re.sub(r"[^a-z0-9]", "", place.stem.lower())[:8]
 
+    def sensors(file: GeometryFile) -> SensorSet:
+        largest = file.range or (Fraction(1, 8) if file.sensor == "gyro" else Fraction(4))
+        name = file.name or toml_models.parse(Annotated[str, _NAME], stem, "name")
+        command = f"strapgen redundancy {shlex.quote(place.as_posix())}"
+        return SensorSet(name, of_rows(file.axes), file.sensor, largest, command)
 
-def _parsed(tables: dict[str, Any], name: str) -> SensorSet:
-    for key in tables:
-        checks.choice("key", key, _KEYS)
-    if "axes" not in tables:
-        raise InputError("the geometry has no axes; rows of three numbers are needed")
-    name = str(tables.get("name", name))
-    if not _NAME.fullmatch(name):
-        raise InputError(
-            f"the name is {name!r}; at most eight small letters and digits are needed, a letter first"
-        )
-    sensor = checks.choice("sensor", str(tables.get("sensor", "gyro")), KINDS)
-    default = Fraction(1, 8) if sensor == "gyro" else Fraction(4)
-    if isinstance(tables.get("range"), bool):
-        raise InputError("range is true or false; a number is needed")
-    largest = checks.number("range", tables.get("range", default), positive=True)
-    return SensorSet(name, geometry(tables["axes"]), sensor, largest)
+    return GEOMETRY.convert(path, sensors)
 
 
 def kernels(sensors: SensorSet) -> Iterator[Kernel]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from strapgen.catalogue.methods.coefficients import Number
+from strapgen.catalogue.coefficients import Number
 from strapgen.navigation.redundancy.failure_tables import FailureTable
 from strapgen.navigation.redundancy.parity_equations import SensorSet, equation_label, gain_text
 from strapgen.results.report import Report

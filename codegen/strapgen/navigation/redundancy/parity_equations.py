@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.catalogue.methods.coefficients import Number, root
+from strapgen.catalogue.coefficients import Number, root
 from strapgen.ir import checks
 from strapgen.ir.recursion import Recursion
 from strapgen.ir.signals import CYCLE, Signal, after

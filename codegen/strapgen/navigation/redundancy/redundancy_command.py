@@ -10,11 +10,11 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
-from strapgen.cli.output import Format, check_format
+from strapgen.cli.output import Format, NewFolder, check_format
 from strapgen.cli.progress import track, waiting
+from strapgen.cli.rules import Needs, rules
 from strapgen.cli.source_options import SourceOptions
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
+from strapgen.cli.values import names
 
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 @grouped
+@rules(Needs("--force", "--out"))
 def redundancy(
     file: Annotated[
         Path,
@@ -37,13 +38,11 @@ def redundancy(
             metavar="NAME",
             help="Kind of code: c, c-float, c-fixed, numpy or fixed-model.",
             panel="Algorithm",
+            read=names("strapgen.targets:BUILT_IN"),
         ),
     ] = "c",
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry"))],
-    out: Annotated[
-        Path | None,
-        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
-    ] = None,
+    out: NewFolder = None,
     output: Annotated[SourceOptions, Shown(only=("force",))],
     format: Format = "text",
 ) -> None:
@@ -56,14 +55,10 @@ def redundancy(
     Example: strapgen redundancy examples/hexad.toml --target c-fixed --out out/hexad
     """
     check_format(format)
-    if output.force and out is None:
-        raise InputError("--force goes with --out, the folder of the files")
     from strapgen.navigation.redundancy.failure_tables import failure_tables
     from strapgen.navigation.redundancy.geometry_file import read
     from strapgen.navigation.redundancy.geometry_report import geometry_report, tables_csv
-    from strapgen.targets import BUILT_IN
 
-    checks.choice("target", target, BUILT_IN)
     settings = fixed.settings(1)
     sensors = read(file)
     with waiting("scanning the parity space"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +12,7 @@ from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import pairs
+from strapgen.cli.values import filled, names, whole
 
 
 @grouped
@@ -26,17 +25,30 @@ def study_redundancy(
     ] = None,
     *,
     trials: Annotated[
-        str, option("--trials", metavar="N", help="Trials for every size of a failure.", panel="Run")
-    ] = "2000",
+        int,
+        option(
+            "--trials",
+            metavar="N",
+            help="Trials for every size of a failure.",
+            panel="Run",
+            read=whole(1, 1_000_000),
+        ),
+    ] = 2000,
     seed: Annotated[
-        str, option("--seed", metavar="N", help="Seed of the random numbers.", panel="Run")
-    ] = "1",
+        int, option("--seed", metavar="N", help="Seed of the random numbers.", panel="Run", read=whole(0))
+    ] = 1,
     backend: Annotated[
         str,
-        option("--backend", metavar="NAME", help="Back end: numpy, c or c-float.", panel="Run"),
+        option(
+            "--backend",
+            metavar="NAME",
+            help="Back end: numpy, c or c-float.",
+            panel="Run",
+            read=names(("numpy", "c", "c-float")),
+        ),
     ] = "numpy",
     settings: Annotated[
-        list[str] | None,
+        dict[str, Fraction] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -56,23 +68,14 @@ def study_redundancy(
     Example: strapgen study redundancy --trials 500 --plot out/redundancy.png
     """
     output.check(file)
-    count = checks.count("trials", checks.whole("trials", trials), largest=1_000_000)
-    number = checks.count("seed", checks.whole("seed", seed), smallest=0)
-    checks.choice("backend", backend, ("numpy", "c", "c-float"))
     from strapgen.navigation.redundancy.geometry_file import read
     from strapgen.navigation.redundancy.parity_equations import HEXAD_SET
     from strapgen.navigation.redundancy.redundancy_study import SensorErrors, redundancy_study, study_steps
     from strapgen.navigation.redundancy.redundancy_study_report import redundancy_image, redundancy_report
 
-    stated = pairs(settings or [])
-    for key in stated:
-        checks.choice("--set", key, SensorErrors.__dataclass_fields__)
-    try:
-        errors = SensorErrors(**{key: float(checks.number(key, value)) for key, value in stated.items()})
-    except OverflowError:
-        raise InputError("--set has a number that is too large") from None
+    errors = filled(SensorErrors, settings)
     sensors = HEXAD_SET if file is None else read(file)
-    steps = redundancy_study(sensors, errors, count, number, backend)
+    steps = redundancy_study(sensors, errors, trials, seed, backend)
     rows = list(track(steps, "running", len(study_steps(sensors.geometry))))
     output.report(
         redundancy_report(sensors, errors, rows), lambda path: redundancy_image(sensors, rows, path)

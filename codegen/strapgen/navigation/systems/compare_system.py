@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapgen.ir import checks
-from strapgen.lab.sensor_errors.sensor_options import force_of
 from strapgen.navigation.systems.simulate_system import (
     described_along,
     described_at,
@@ -31,7 +29,7 @@ def compared_system(
     name: str,
     methods: SeveralMethods,
     stated: list[str],
-    backends: tuple[list[str], str],
+    backends: tuple[Sequence[str], str],
     files: tuple[Sequence[Path] | None, bool],
     source: SampleSource,
     fixed: FixedOptions,
@@ -40,7 +38,6 @@ def compared_system(
     """Compare a described system on back ends, and exit with 1 if a pass is outside its bound."""
     refuse_options(methods, fixed, stated)
     output.check(name, *source.files)
-    source.check(of_system=True)
     from strapgen import registration
     from strapgen.cli.progress import waiting
     from strapgen.lab.compare.file_counts import counted
@@ -77,10 +74,9 @@ def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDA
         angle = np.asarray(data.increments)
         return description, samples(description, angle, np.zeros_like(angle)), Path(source.file).name
     description, profile = described_at(name, source), source.profile()
-    seconds = checks.number("duration", source.duration or "", positive=True)
+    assert source.duration is not None, "a motion has a duration"
     system = description.system
-    count, interval = cycles_of(system, seconds), 1 / system.sample_hz
-    force = force_of(source.specific_force)
-    angle, velocity = both_increments(profile, profile.attitude, force, interval, count)
+    count, interval = cycles_of(system, source.duration), 1 / system.sample_hz
+    angle, velocity = both_increments(profile, profile.attitude, source.force, interval, count)
     title = f"{source.described(profile.name, ' motion')}, {count} cycles of {float(interval):.6g} s"
     return description, samples(description, angle, velocity), title

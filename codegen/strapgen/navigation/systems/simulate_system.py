@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from strapgen.ir import checks
+from strapgen.cli.option_groups import stated
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.sensor_errors.sensor_options import force_of
 
 if TYPE_CHECKING:
     from strapgen.cli.fixed_options import FixedOptions
@@ -32,12 +31,10 @@ def simulated_system(
     output: RunOutput,
 ) -> None:
     """Simulate a described system, and deliver the run."""
-    stated = {"--orthonormalize": intervals.orthonormalize, "--scheme": intervals.scheme}
-    refuse_options(method, fixed, [option for option, value in stated.items() if value is not None])
+    others = {"--orthonormalize": intervals.orthonormalize, "--scheme": intervals.scheme}
+    refuse_options(method, fixed, [option for option, value in others.items() if value is not None])
     fixed.check_backend(backend)
     output.check(name, *source.files)
-    source.check(of_system=True)
-    output.check_motion(source.motion)
     if source.motion is None:
         if intervals.initial is not None or intervals.record is not None:
             raise InputError("--initial-deg and --record of a described system go with --motion")
@@ -52,16 +49,13 @@ def simulated_system(
     description = described_at(name, source)
     runner = runner_of(description, backend, fixed)
     profile, record = source.profile(), intervals.record
-    seconds = checks.number("duration", source.duration or "", positive=True)
-    every = None if record is None else checks.number("record", record, positive=True)
+    assert source.duration is not None, "a motion has a duration"
     with waiting(f"running {name}"):
-        run = simulate_system(
-            runner, profile, seconds, every, intervals.start(), force_of(source.specific_force)
-        )
+        run = simulate_system(runner, profile, source.duration, record, intervals.start(), source.force)
     facts = facts_of(runner, name) | {
         "motion": profile.name,
-        "duration_s": float(seconds),
-        "specific_force_m_s2": list(force_of(source.specific_force)),
+        "duration_s": float(source.duration),
+        "specific_force_m_s2": list(source.force),
     }
     facts |= source.facts
     title = f"{name}, {backend}: {source.described(profile.name, ' motion')}"
@@ -101,8 +95,8 @@ def recorded(source: SampleSource) -> Recording:
 
 def refuse_options(method: MethodOptions | None, fixed: FixedOptions, others: list[str]) -> None:
     """Refuse options of an algorithm that a described system states itself."""
-    stated = [] if method is None else method.stated
-    for option in [*stated, *others, *(option for option in fixed.stated if option not in FIXED)]:
+    of_method = [] if method is None else stated(method)
+    for option in [*of_method, *others, *(option for option in stated(fixed) if option not in FIXED)]:
         raise InputError(f"{option} does not go with a described system, whose file states what it does")
 
 
@@ -110,8 +104,7 @@ def described_at(name: str, source: SampleSource) -> Description:
     """Return a system at the rate of its file, or with the stated step from sample to sample."""
     from strapgen.navigation.systems.wiring import described
 
-    step = None if source.step is None else checks.number("step", source.step, positive=True)
-    return described(name, None if step is None else 1 / step)
+    return described(name, None if source.step is None else 1 / source.step)
 
 
 def described_along(name: str, data: Recording) -> Description:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def system_along(
     name: str,
-    others: list[str],
+    others: Iterable[str],
     backend: str,
     sensors: tuple[Path, str | None],
     start: Start,
@@ -27,7 +28,7 @@ def system_along(
     """Run a described system along a recording, as sensors with errors measure it, and deliver its outputs."""
     increments, errors = sensors
     refuse_options(None, fixed, [*others, *([] if output.plot is None else ["--plot"])])
-    if start.frame_rate != "0,0,0":
+    if any(start.frame_rate):
         raise InputError(
             "--frame-rate-deg-h does not go with a described system, whose navigation frame rests"
         )
@@ -41,7 +42,7 @@ def system_along(
     data = with_errors(recording.read_inertial(increments), read_errors(errors))
     runner = runner_of(described_along(name, data), backend, fixed)
     memory = None
-    if start.initial != "0,0,0":
+    if any(start.initial):
         memory, _ = begun(runner, start.matrix())
     with waiting(f"running {name}"):
         course = system_course(runner, data, memory)

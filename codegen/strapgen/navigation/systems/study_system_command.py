@@ -9,9 +9,9 @@ import typer
 
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Duration, listed, option
+from strapgen.cli.options import Duration, Processor, a_backend, option
 from strapgen.cli.output import Output
-from strapgen.ir import checks
+from strapgen.cli.values import Number, Positive
 
 
 @grouped
@@ -19,16 +19,17 @@ def study_system(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="TOML file that describes the system.")],
     *,
     backend: Annotated[
-        str,
+        tuple[str, ...],
         option(
             "--backend",
             metavar="NAME,...",
             help="Back ends beside C in double, with commas between; strapgen list backends shows all.",
             panel="Run",
+            read=a_backend,
         ),
-    ] = "c-float,c-fixed32,c-fixed16",
+    ] = ("c-float", "c-fixed32", "c-fixed16"),
     sample_hz: Annotated[
-        str | None,
+        Positive | None,
         option(
             "--sample-hz",
             metavar="HZ",
@@ -36,14 +37,14 @@ def study_system(
             panel="Input",
         ),
     ] = None,
-    duration: Duration = "60",
+    duration: Duration = Positive("60"),
     turn_rate_deg_s: Annotated[
-        str,
+        Positive,
         option("--turn-rate-deg-s", metavar="RATE", help="Largest rate of heading in deg/s.", panel="Input"),
-    ] = "70",
+    ] = Positive("70"),
     latitude_deg: Annotated[
-        str, option("--latitude-deg", metavar="DEG", help="Latitude of the vehicle in deg.", panel="Input")
-    ] = "45",
+        Number, option("--latitude-deg", metavar="DEG", help="Latitude of the vehicle in deg.", panel="Input")
+    ] = Number("45"),
     spectrum: Annotated[
         Path | None,
         option(
@@ -53,17 +54,8 @@ def study_system(
             panel="Input",
         ),
     ] = None,
-    cpu: Annotated[
-        str | None,
-        option(
-            "--cpu",
-            metavar="NAME",
-            help="Count the instructions of the C in fixed point on this processor, as strapgen cost does, for "
-            "instance cortex-m3.",
-            panel="Run",
-        ),
-    ] = None,
-    fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry", "drift_allowance"))],
+    cpu: Processor = None,
+    fixed: Annotated[FixedOptions, Shown(only=("rounding", "carry", "allowance"))],
     output: Output,
 ) -> None:
     """Run a described system on several back ends, and compare attitude, velocity and position.
@@ -83,13 +75,8 @@ def study_system(
     from strapgen.navigation.systems.system_study_report import system_study_report
     from strapgen.navigation.systems.turning_vehicle import TurningVehicle
     from strapgen.navigation.systems.wiring import described
-    from strapgen.run.backends import BACKENDS
 
-    names = [checks.choice("backend", name, BACKENDS) for name in listed("backend", backend)]
-    rate = None if sample_hz is None else checks.number("sample-hz", sample_hz, positive=True)
-    turning = math.radians(checks.number("turn-rate-deg-s", turn_rate_deg_s, positive=True))
-    latitude = math.radians(checks.number("latitude-deg", latitude_deg))
-    seconds = checks.number("duration", duration, positive=True)
+    turning, latitude = math.radians(turn_rate_deg_s), math.radians(latitude_deg)
     vehicle = TurningVehicle(latitude, turning, None if spectrum is None else read_spectrum(spectrum))
-    result = study(described(file, rate), vehicle, seconds, names, fixed.settings(1), cpu or "")
+    result = study(described(file, sample_hz), vehicle, duration, backend, fixed.settings(1), cpu or "")
     output.report(system_study_report(result))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,14 +13,14 @@ import typer
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import option
-from strapgen.cli.output import Format, WithRuns, check_format, print_json
+from strapgen.cli.output import Format, NewFolder, WithRuns, check_format, print_json
+from strapgen.cli.rules import Excludes, Needs, rules
 from strapgen.cli.source_options import SourceOptions
+from strapgen.cli.values import Positive
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
     from strapgen.navigation.systems.budget import Budget
@@ -27,7 +28,23 @@ if TYPE_CHECKING:
     from strapgen.navigation.systems.system_bounds import SystemBounds
 
 
+def _a_target(option: str, text: str) -> str:
+    from strapgen.targets import system_targets
+
+    return checks.choice(option[2:], text, system_targets())
+
+
+def _a_drawing(option: str, path: Path) -> Path:
+    if path.suffix.lower() != ".svg":
+        raise InputError(f"{option} {path} is no SVG file; a name that ends with .svg is needed")
+    return path
+
+
 @grouped
+@rules(
+    Needs("--with-runs --check --force", "--out"),
+    Excludes("--check", "--draw", reason="--check writes nothing"),
+)
 def system(
     file: Annotated[
         Path,
@@ -45,10 +62,11 @@ def system(
             metavar="NAME",
             help="Kind of code: c, c-float, c-fixed, numpy or fixed-model.",
             panel="System",
+            read=_a_target,
         ),
     ] = "c",
     sample_hz: Annotated[
-        str | None,
+        Positive | None,
         option(
             "--sample-hz",
             metavar="HZ",
@@ -70,19 +88,22 @@ def system(
         Shown(
             only=(
                 *("word", "lsb", "lsb_rad", "input_bits"),
-                *("rounding", "carry", "drift_allowance", "multiply", "digits"),
+                *("rounding", "carry", "allowance", "multiply", "digits"),
             )
         ),
     ],
-    out: Annotated[
-        Path | None,
-        option("--out", metavar="FOLDER", help="Folder for the files.  [default: no files]", panel="Output"),
-    ] = None,
+    out: NewFolder = None,
     with_runs: WithRuns = False,
     output: Annotated[SourceOptions, Shown(only=("check", "force"))],
     draw: Annotated[
         Path | None,
-        option("--draw", metavar="FILE", help="SVG file for a drawing of the wiring.", panel="Output"),
+        option(
+            "--draw",
+            metavar="FILE",
+            help="SVG file for a drawing of the wiring.",
+            panel="Output",
+            read=_a_drawing,
+        ),
     ] = None,
     format: Format = "text",
 ) -> None:
@@ -95,7 +116,9 @@ def system(
     Example: strapgen system examples/strapdown.toml --draw out/strapdown.svg
     """
     check_format(format)
-    _check_options(file, out, draw, with_runs, output)
+    checks.text("FILE", str(file))
+    if draw is not None and draw.resolve() == file.resolve():
+        raise InputError(f"--draw {draw} is the file that the command reads; another one is needed")
     fit, needs, command = fitted_stages(file, target, sample_hz, cpu, fixed)
     if with_runs and not _compiled(target):
         raise InputError(
@@ -124,25 +147,6 @@ def system(
     typer.echo(system_report(fit, needs, errors).text())
 
 
-def _check_options(
-    file: Path, out: Path | None, draw: Path | None, with_runs: bool, output: SourceOptions
-) -> None:
-    """Refuse options that do not go together, and a drawing that is no SVG or the file itself."""
-    checks.text("FILE", str(file))
-    stated = {"--with-runs": with_runs, "--check": output.check, "--force": output.force}
-    for name, is_stated in stated.items():
-        if is_stated and out is None:
-            raise InputError(f"{name} goes with --out, the folder of the files")
-    if draw is None:
-        return
-    if draw.suffix.lower() != ".svg":
-        raise InputError(f"--draw {draw} is no SVG file; a name that ends with .svg is needed")
-    if draw.resolve() == file.resolve():
-        raise InputError(f"--draw {draw} is the file that the command reads; another one is needed")
-    if output.check:
-        raise InputError("--check writes nothing; --draw does not go with it")
-
-
 def _compiled(target: str) -> bool:
     from strapgen.targets import TARGETS
 
@@ -158,7 +162,7 @@ def unit(fit: Fitted, needs: Budget, errors: SystemBounds, command: str) -> Sour
 
 
 def fitted_stages(
-    file: Path, target: str, sample_hz: str | None, cpu: str | None, fixed: FixedOptions
+    file: Path, target: str, sample_hz: Positive | None, cpu: str | None, fixed: FixedOptions
 ) -> tuple[Fitted, Budget, str]:
     """Return the generated stages, what they need, and the command that makes the files again."""
     from strapgen.ir.fixed_settings import Settings
@@ -169,10 +173,8 @@ def fitted_stages(
     from strapgen.navigation.systems.wiring import read_system
     from strapgen.targets import BUILT_IN, system_targets
 
-    checks.choice("target", target, system_targets())
-    rate = None if sample_hz is None else checks.number("--sample-hz", sample_hz, positive=True)
-    description = read_system(file, rate)
-    timed = None if fixed.lsb is None else str(description.system.sample_hz)
+    description = read_system(file, sample_hz)
+    timed = None if fixed.lsb is None else Positive(str(description.system.sample_hz))
     settings = replace(fixed, sample_hz=timed).settings(1)
     if BUILT_IN[target].fixed:
         settings = settings or Settings()
@@ -187,18 +189,18 @@ def fitted_stages(
         processors(None, [cpu])  # known before the stages are generated
     fit = fitted(description, target, settings)
     needs = budget(fit) if cpu is None else system_cost.measured_budget(fit, cpu)
-    return fit, needs, _command(file, target, rate, cpu, settings)
+    return fit, needs, _command(file, target, sample_hz, cpu, settings)
 
 
 def _command(
-    file: Path, target: str, rate: Fraction | None, cpu: str | None, settings: Settings | None
+    file: Path, target: str, rate: Positive | None, cpu: str | None, settings: Settings | None
 ) -> str:
     """Return the command line that makes the files again, without those of --with-runs."""
     from strapgen.targets.contract import options
 
     words = [f"strapgen system {shlex.quote(file.as_posix())} --target {target}"]
     stated = "" if settings is None else options(settings)
-    words += [] if rate is None or "--sample-hz" in stated else [f"--sample-hz {rate}"]
+    words += [] if rate is None or "--sample-hz" in stated else [f"--sample-hz {Fraction(rate)}"]
     words += [] if cpu is None else [f"--cpu {cpu}"]
     words += [stated] if stated else []
     return " ".join(words)

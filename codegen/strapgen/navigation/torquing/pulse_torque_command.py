@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Annotated, Any
+from fractions import Fraction
+from typing import Annotated
 
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
-from strapgen.lab.simulate.sample_source import pairs
+from strapgen.cli.values import filled
 
 
 @grouped
 def study_pulse_torque(
     *,
     settings: Annotated[
-        list[str] | None,
+        dict[str, Fraction] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -40,19 +39,7 @@ def study_pulse_torque(
     from strapgen.navigation.torquing.torquing_report import torquing_image, torquing_report
     from strapgen.navigation.torquing.torquing_study import PRINTED, torquing_rows
 
-    kinds = {
-        one.name: int if one.name in ("largest_pulses", "delay_cycles") else float
-        for one in fields(TorqueLoop)
-    }
-    stated: dict[str, Any] = {}
-    for key, value in pairs(settings or []).items():
-        checks.choice("--set", key, kinds)
-        stated[key] = (
-            checks.count(key, checks.whole(key, value), largest=1000)
-            if kinds[key] is int
-            else float(checks.number(key, value))
-        )
-    loop = TorqueLoop(**stated)
+    loop = filled(TorqueLoop, settings)
     loop.require_stable()
     rows = list(track(torquing_rows(loop), "running", len(PRINTED)))
     output.report(torquing_report(loop, rows), lambda path: torquing_image(loop, path))

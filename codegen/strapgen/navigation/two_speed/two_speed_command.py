@@ -11,7 +11,7 @@ import typer
 from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import Sculling, TwoSpeedAlgorithm, option, whole
+from strapgen.cli.options import CTarget, Sculling, TwoSpeedAlgorithm
 from strapgen.cli.output import Format, check_format, print_json
 from strapgen.cli.source_options import SourceOptions
 from strapgen.ir.exceptions import InputError
@@ -25,17 +25,14 @@ if TYPE_CHECKING:
 def two_speed(
     algorithm: TwoSpeedAlgorithm,
     *,
-    sculling: Sculling = "2",
-    target: Annotated[
-        str,
-        option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm"),
-    ] = "c",
+    sculling: Sculling = 2,
+    target: CTarget = "c",
     fixed: Annotated[
         FixedOptions,
         Shown(
             only=(
                 *("word", "max_rate_deg_s", "sample_hz", "lsb", "lsb_rad", "input_bits"),
-                *("rounding", "carry", "drift_allowance", "ranges", "formats"),
+                *("rounding", "carry", "allowance", "ranges", "formats"),
             )
         ),
     ],
@@ -112,9 +109,9 @@ class TwoSpeedRequest(NamedTuple):
     settings: Settings | None
 
 
-def request(algorithm: str, sculling: str, target: str, fixed: FixedOptions) -> TwoSpeedRequest:
+def request(algorithm: str, sculling: int, target: str, fixed: FixedOptions) -> TwoSpeedRequest:
     """Return what the options ask for."""
-    return TwoSpeedRequest(algorithm, whole("sculling", sculling) or 0, target, _settings(target, fixed))
+    return TwoSpeedRequest(algorithm, sculling, target, _settings(target, fixed))
 
 
 def _settings(target: str, fixed: FixedOptions) -> Settings | None:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import listed, one, option
+from strapgen.cli.options import Duration, a_backend, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.ir import checks
+from strapgen.cli.values import Positive, names
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import MOTION_FILE, RUN_MOTION_NAMES, check_motion, pairs
+from strapgen.lab.simulate.sample_source import in_words, motion_option
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,9 @@ class FlightOptions:
 
     panel: ClassVar[str] = "Input"
 
-    motion: Annotated[
-        str, option("--motion", metavar="NAME", help=f"Motion: {RUN_MOTION_NAMES}{MOTION_FILE}.")
-    ] = "random"
+    motion: Annotated[str, motion_option()] = "random"
     settings: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--set",
             metavar="KEY=VALUE...",
@@ -40,7 +38,7 @@ class FlightOptions:
         ),
     ] = "random"
     force_settings: Annotated[
-        list[str] | None,
+        dict[str, str] | None,
         option(
             "--force-set",
             metavar="KEY=VALUE...",
@@ -48,18 +46,20 @@ class FlightOptions:
             "[default: rms_m_s2=10 z_g=1]",
         ),
     ] = None
-    sample_hz: Annotated[str, option("--sample-hz", metavar="HZ", help="Sampling rate in Hz.")] = "100"
-    duration: Annotated[str, option("--duration", metavar="S", help="Duration of each run in s.")] = "60"
+    sample_hz: Annotated[Positive, option("--sample-hz", metavar="HZ", help="Sampling rate in Hz.")] = (
+        Positive("100")
+    )
+    duration: Duration = Positive("60")
 
     def described(self) -> str:
         """Return the motion and the force in words."""
-        motion, force = (", ".join(words) for words in self.stated())
+        motion, force = map(in_words, self.stated())
         return f"{self.motion} motion ({motion}), {self.force} specific force ({force})"
 
-    def stated(self) -> tuple[list[str], list[str]]:
+    def stated(self) -> tuple[dict[str, str], dict[str, str]]:
         """Return the settings of the motion and of the force, with their defaults."""
-        motion = ["rate_deg_s=60"] if self.motion == "random" else []
-        force = ["rms_m_s2=10", "z_g=1"] if self.force == "random" else []
+        motion = {"rate_deg_s": "60"} if self.motion == "random" else {}
+        force = {"rms_m_s2": "10", "z_g": "1"} if self.force == "random" else {}
         return self.settings or motion, self.force_settings or force
 
 
@@ -67,7 +67,7 @@ class FlightOptions:
 def study_velocity_position(
     *,
     methods: Annotated[
-        str | None,
+        tuple[str, ...] | None,
         option(
             *("--method", "--methods"),
             metavar="NAME,...",
@@ -83,6 +83,7 @@ def study_velocity_position(
             metavar="NAME",
             help="Back end; strapgen list backends shows all.",
             panel="Algorithm",
+            read=a_backend,
         ),
     ] = "numpy",
     carry: Annotated[
@@ -92,6 +93,7 @@ def study_velocity_position(
             metavar="NAME",
             help="Error feedback of the attitude in fixed point: none, state, full.",
             panel="Algorithm",
+            read=names(("none", "state", "full")),
         ),
     ] = "none",
     flight: FlightOptions,
@@ -109,7 +111,6 @@ def study_velocity_position(
     --force oscillation --force-set swing_y_g=1 frequency_hz=10 z_g=1 --backend c
     """
     output.check()
-    from strapgen.lab.motions.motion_names import MOTIONS
     from strapgen.lab.motions.specific_forces import force
     from strapgen.lab.motions.users_motions import any_motion
     from strapgen.navigation.velocity_position import velocity_position_study as experiment
@@ -119,21 +120,18 @@ def study_velocity_position(
     )
     from strapgen.run.backends import BACKENDS
 
-    one("--backend", backend)
-    checks.choice("backend", backend, BACKENDS)
-    check_motion(flight.motion, MOTIONS)
-    motion_settings, force_settings = flight.stated()
-    several = experiment.candidates(experiment.DEFAULT if methods is None else listed("--method", methods))
-    course = experiment.Flight(
-        any_motion(flight.motion, flight.duration, pairs(motion_settings)),
-        force(flight.force, **pairs(force_settings, "--force-set")),
-        checks.number("sample-hz", flight.sample_hz, positive=True),
-        checks.number("duration", flight.duration, positive=True),
-        backend,
-        checks.choice("carry", carry, ("none", "state", "full")),
-    )
     if carry != "none" and not BACKENDS[backend].fixed:
         raise InputError(f"--carry goes with a back end of fixed point, not with {backend}")
+    motion_settings, force_settings = flight.stated()
+    several = experiment.candidates(methods or experiment.DEFAULT)
+    course = experiment.Flight(
+        any_motion(flight.motion, flight.duration, motion_settings),
+        force(flight.force, **force_settings),
+        flight.sample_hz,
+        flight.duration,
+        backend,
+        carry,
+    )
     standings = list(track(experiment.study(several, course), "running", len(several)))
     output.report(
         translation_report(standings, course, flight.described()),

@@ -10,7 +10,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.catalogue.methods.coefficients import number
+from strapgen.catalogue.coefficients import number
 from strapgen.ir.exceptions import InputError
 
 QUICK = settings(derandomize=True, database=None, deadline=None)
@@ -177,7 +177,7 @@ def test_products_of_sums_do_not_explode():
 
 def test_rationals_need_no_computer_algebra():
     code = (
-        "import sys; from strapgen.catalogue.methods.coefficients import number; number('x', 'sqrt(4)*9/44');"
+        "import sys; from strapgen.catalogue.coefficients import number; number('x', 'sqrt(4)*9/44');"
         "print('sympy' in sys.modules)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

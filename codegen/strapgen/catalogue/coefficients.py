@@ -18,8 +18,12 @@ from strapgen.ir.exceptions import InputError
 if TYPE_CHECKING:
     import sympy as sp
 
-#: An exact number.
-Number: TypeAlias = "Fraction | sp.Expr"
+    Number: TypeAlias = Fraction | sp.Expr
+else:
+
+    class Number:
+        """An exact number, a `Fraction` or a SymPy expression; a type for readers of annotations, without SymPy."""
+
 
 #: Most characters of a text, and the largest exponent in it; both are far beyond any published coefficient.
 MOST_CHARACTERS = 1000
