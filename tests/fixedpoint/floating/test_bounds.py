@@ -88,7 +88,7 @@ def test_every_kernel_has_a_bound_or_a_reason():
         bounds = rounding_bounds(code)
         if name.endswith(("-truth", "-increments")):
             first = code.inputs[0].name
-            assert bounds.reason == f"the range of {first} is not known"
+            assert bounds.reason == f"the range of {first} is unknown"
         else:
             assert bounds.reason == UNBOUNDED.get(name, "")
             assert bool(bounds.errors) != bool(bounds.reason)
