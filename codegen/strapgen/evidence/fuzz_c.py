@@ -44,7 +44,7 @@ def driver_files(sources: Sources, range_checked: bool, commands: Sequence[str] 
             for a in (*inputs, *outputs)
         },
         "feedback": interface.residuals,
-        "guarded": range_checked,
+        "range_checked": range_checked,
         "arrays": order,
         "array_call": ", ".join(f"{name}[0]" for name in order),
         "alias": _alias(inputs, outputs, order),

@@ -28,13 +28,14 @@ def renamed(**names: str) -> Callable[[T], T]:
     def decorate(kind: T) -> T:
         fields = {old: new for old, new in names.items() if new in getattr(kind, "__dataclass_fields__", ())}
         if fields:
-            make: Callable[..., None] = vars(kind)["__init__"]
+            changed: Any = kind  # a type checker takes the constructors of a class as fixed
+            make = changed.__init__
 
             @functools.wraps(make)
             def init(self: Any, *values: Any, **rest: Any) -> None:
                 make(self, *values, **current(rest, fields))
 
-            kind.__init__ = init
+            changed.__init__ = init
         for old, new in names.items():
 
             def read(self: Any, old: str = old, new: str = new) -> Any:

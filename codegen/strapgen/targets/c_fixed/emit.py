@@ -101,5 +101,5 @@ def values_of(fixed: FixedProgram, name: str, target: str, printer: StatementPri
         "command": command,
         "contract": contract_lines.of_fixed(fixed, name, command, memory),
         "normalizing": contract.upkeep_text(fixed.program, interface, target),
-        "guarded": tuple(value for value in fixed.body if value.range_checked),
+        "range_checked": tuple(value for value in fixed.body if value.range_checked),
     }
