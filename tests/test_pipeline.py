@@ -26,6 +26,7 @@ EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues
 #: algorithm until it is chosen, then the choice, or a request that holds it.
 WALK = """
 cli.option_groups grouped.<locals>.run
+cli.option_groups Option.value
 cli.generate_command generate
 cli.generate_command request
 cli.options MethodOptions.choose
@@ -38,6 +39,7 @@ pipeline fixed_program
 pipeline program
 catalogue.derivation derive
 catalogue.derivation _of_catalogue
+cli.generated_result GeneratedSources.of
 """
 
 

@@ -70,7 +70,7 @@ def test_json_has_what_was_agreed(check, tmp_path):
         "cause": "state kept between runs",
     }
     old, new = {"order", "drift_deg_h", "closed_form_deg_h"}, {"drift_by_axis_deg_h", "coefficient_ratio"}
-    assert {*data} == {"file", "holds", "cause", "coefficients", *old, *new}
+    assert {*data} == {"schema", "file", "holds", "cause", "coefficients", *old, *new}
     assert data["coefficients"] == [
         {"older": -1, "newer": 0, "seen": pytest.approx(1 / 12, abs=1e-6), "wanted": 1 / 12}
     ]

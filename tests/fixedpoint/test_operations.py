@@ -68,7 +68,7 @@ def test_a_divisor_below_zero_is_checked_to_stay_there():
     assert (s.range.lowest, s.range.highest, s.range_checked) == (-2, Fraction(-1, 2), True)
 
 
-@pytest.mark.parametrize(("least", "guarded"), [(Fraction(3, 10), False), (Fraction(1, 5), True)])
+@pytest.mark.parametrize(("least", "range_checked"), [(Fraction(3, 10), False), (Fraction(1, 5), True)])
 def test_a_limit_that_is_proved_within_a_factor_of_two_is_not_checked(least, range_checked):
     """Of about 1 on unit vectors half is the limit; a proof of 3/10 is near it, and one of 1/5 is not."""
     squares = [node("multiply", name, name) for name in "abcd"]

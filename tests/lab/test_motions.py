@@ -133,7 +133,7 @@ def test_many_digits_need_a_closed_form():
     [
         ("spin", {}, "motion 'spin' is not known; allowed: constant, sinusoidal, coning, polynomial"),
         ("coning", {"a_deg_s": 1, "b_deg_s": 1}, "motion coning lacks g_deg_s or g_rad_s"),
-        ("coning", {"c_deg_s": 1}, "key of motion coning: 'c_deg_s' is not known; allowed: a_deg_s"),
+        ("coning", {"c_deg_s": 1}, "key of motion coning: 'c_deg_s' is not known \\(did you mean a_deg_s"),
         ("sinusoidal", {"a_deg_s": 1, "b_deg_s": 1, "b_rad_s": 1}, "b_deg_s and b_rad_s are both given"),
         ("constant", {}, "motion constant needs parameters; allowed: x_deg_s"),
         ("constant", {"x_deg_s": "nan"}, "x_deg_s is 'nan'; a finite number is needed"),

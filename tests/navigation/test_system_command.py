@@ -46,7 +46,8 @@ def test_the_summary_shows_stages_values_and_the_budget(two, capsys):
 def test_json_has_the_keys_that_the_page_promises(two, capsys):
     data = json.loads(run("two.toml --target c-fixed --word 16 --format json", capsys))
     assert list(data) == [
-        *("name", "title", "target", "sample_hz", "stages", "inputs", "values", "outputs", "budget", "files")
+        *("schema", "name", "title", "target", "sample_hz"),
+        *("stages", "inputs", "values", "outputs", "budget", "files"),
     ]
     budget = data["budget"]
     assert budget["operations_per_second"] == sum(
@@ -96,7 +97,7 @@ def test_files_are_compared_and_not_written_over(two, capsys):
     header.write_text(header.read_text().replace("Two speeds", "Three speeds"))
     assert "Three speeds" in run("two.toml --out o --with-runs --check", capsys, status=1)
     data = json.loads(run("two.toml --out o --check --format json", capsys, status=1))
-    assert set(data) == {"in_step", "difference"}
+    assert set(data) == {"schema", "in_step", "difference"}
     run("two.toml --out o --sample-hz 1600", capsys, status=2)  # another command made the files
     assert "Three speeds" in header.read_text()
     run("two.toml --out o --sample-hz 1600 --force", capsys)

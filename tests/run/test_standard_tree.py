@@ -197,7 +197,10 @@ def test_check_of_an_empty_folder(folder, capsys, tmp_path):
 
 def test_check_as_json(folder, capsys):
     status, out, _ = command(capsys, *CHECK, str(folder), "--format", "json")
-    assert (status, json.loads(out)) == (0, {"in_step": True, "difference": ""})
+    assert (status, json.loads(out)) == (
+        0,
+        {"schema": "strapgen/in-step/1", "in_step": True, "difference": ""},
+    )
     (folder / "c" / "euler_rk4_2.c").unlink()
     status, out, _ = command(capsys, *CHECK, str(folder), "--format", "json")
     data = json.loads(out)

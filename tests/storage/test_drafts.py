@@ -119,3 +119,21 @@ def test_a_busy_folder_is_an_error_and_no_endless_loop(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="busy"), drafts.draft_folder(tmp_path, ".draft-"):
         raise AssertionError
     assert list(tmp_path.iterdir()) == []
+
+
+FORKING = """
+import os, sys
+from pathlib import Path
+from strapgen.storage import drafts
+with drafts.draft_folder(Path(sys.argv[1]), ".draft-") as place:
+    if os.fork() == 0:
+        raise SystemExit  # leaves the block, as the end of a program does
+    os.wait()
+    assert place.is_dir()
+assert not place.exists()
+"""
+
+
+def test_a_forked_process_leaves_the_folder_to_its_owner(tmp_path):
+    done = subprocess.run([sys.executable, "-c", FORKING, str(tmp_path)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

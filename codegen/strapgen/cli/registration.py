@@ -25,7 +25,7 @@ REGISTRATION = Registration(
         "schema": Command(
             f"{__package__}.schema_command:schema",
             "Derive",
-            summary="Print the JSON Schema of a result, or list the names of all",
+            summary="Print the JSON Schema of a result or of users' files",
         ),
     },
     results={

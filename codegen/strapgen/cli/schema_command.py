@@ -26,7 +26,7 @@ def schema(
     ] = False,
     out: Folder = None,
 ) -> None:
-    """Print the JSON Schema of a result or of a kind of users' files, or list the names of all.
+    """Print the JSON Schema of a result or of users' files.
 
     JSON says its schema under the key schema, as strapgen/comparison/1; a list says it in each row. Kinds of files end
     with .toml; their schemas come with the package too, in its folder schemas.

@@ -24,7 +24,7 @@ def algorithm():
     build.output(EULER.next, algebra.quaternion_product(state, p))
     return build.kernel(
         "one-and-one", "Coning from the increment before", "none", transition=EULER.transition.name,
-        attitude_step=AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1){companions}),
+        attitude_step=AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1){step}),
         order=Order(4, 4, 2, 4){declared},
     )
 """
@@ -32,14 +32,14 @@ def algorithm():
 
 def drift(tmp_path, **texts: object) -> float:
     path = tmp_path / "own.py"
-    path.write_text(STEP.format(**({"said": 1, "companions": "", "declared": ""} | texts)))
+    path.write_text(STEP.format(**({"said": 1, "step": "", "declared": ""} | texts)))
     run = strapgen.algorithm(str(path)).simulate(duration=2)
     return float(abs(run.drift).max())
 
 
 def test_previous_increments_that_are_declared_are_taken(tmp_path):
     declared = drift(tmp_path, declared=", previous=1")
-    assert declared == drift(tmp_path, attitude_step=", previous=1") < 1e-6
+    assert declared == drift(tmp_path, step=", previous=1") < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_previous_increments_that_are_declared_are_taken(tmp_path):
     [
         ({}, "its increments say, the first 1 are those before the step, and it declares previous=0"),
         (
-            {"declared": ", previous=1", "companions": ", previous=2"},
+            {"declared": ", previous=1", "step": ", previous=2"},
             "previous is 1, and 2 in its attitude_step",
         ),
     ],

@@ -218,7 +218,7 @@ def stability(choice: Choice) -> Stability:
 
     >>> from strapgen import catalogue
     >>> stability(catalogue.choose("euler", "rk3")).as_dict()["contractive"]
-    [(0.0, 3.4641016151377544)]
+    [[0.0, 3.4641016151377544]]
     """
     closed_form = constant_rate(choice)
     return Stability(closed_form.kernel, closed_form.stretch_squared, contraction(closed_form))
