@@ -19,6 +19,7 @@ from strapgen.ir.version import VERSION
 from strapgen.run.generation import Request
 
 NAME = "euler_rk4_2_w32"
+GENERATED = Path(__file__).resolve().parents[2] / "generated" / "c_fixed"
 
 
 def says(arguments: list[str], capsys) -> tuple[int, str, str]:
@@ -55,6 +56,17 @@ def test_a_file_as_generated_holds(ending, folder, capsys):
     status, data = verified(folder / f"{NAME}.{ending}", capsys)
     assert status == 0 and data["holds"] and data["in_step"] and data["differences"] == []
     assert 0.5 <= data["max_ulp"] <= data["bound_ulp"] < 0.6
+
+
+@pytest.mark.parametrize("method", ["rk1", "rk2"])
+@pytest.mark.parametrize("algorithm", ["euler", "dcm"])
+def test_a_step_of_low_order_that_leaves_its_range_holds(algorithm, method, capsys):
+    """On the cone its state grows until the code refuses it; the model refuses the same calls."""
+    path = GENERATED / f"{algorithm}_{method}_2_w32.c"
+    status, said, _ = says(["verify", str(path)], capsys)
+    assert status == 0
+    calls, of = re.search(r"(\d+) of (\d+) calls return what they must", said).groups()
+    assert calls == of
 
 
 def test_the_error_of_a_state_that_saturates_is_that_from_the_end_of_its_range():

@@ -27,6 +27,7 @@ from strapgen.results.records import entry, properties
 from strapgen.results.result import Result
 from strapgen.run.backends import Backend
 from strapgen.run.c import CEvaluator
+from strapgen.run.evaluators import Evaluator
 from strapgen.run.exact import DIGITS, Interpreter, number
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.generated_files import command_of, text_of
@@ -127,8 +128,9 @@ def verify(
         if sources.fixed is None:
             measured = _floating(compiled, table.rows, table.tolerances, request)
             return Verification(file, differences, *measured)
+        is_cone = increments is None
         run = _cone(sources.fixed) if increments is None else _words(sources.fixed, increments)
-        return Verification(file, differences, *_fixed(compiled, table.rows, run, request))
+        return Verification(file, differences, *_fixed(compiled, table.rows, run, request, is_cone))
     except CompilerError as error:
         if not differences:
             raise
@@ -215,9 +217,12 @@ def _reason(header: str, generated: str) -> str:
 
 
 def _fixed(
-    sources: Sources, rows: Sequence[CallVector], run: Array | None, request: Request
+    sources: Sources, rows: Sequence[CallVector], run: Array | None, request: Request, restarts: bool
 ) -> tuple[int, int, float, float]:
-    """Run a function on integers; return wrong calls, calls, the largest error and its bound in last places."""
+    """Run a function on integers; return wrong calls, calls, the largest error and its bound in last places.
+
+    A run that `restarts` begins again at the identity attitude where the code has to refuse its state.
+    """
     assert sources.fixed is not None
     of = CEvaluator(sources)
     model = ModelEvaluator(pipeline.compile(request.choice, MODEL, request.settings))
@@ -230,10 +235,13 @@ def _fixed(
             worst = max(worst, exact.error(inputs, outputs))
     calls = len(rows)
     if run is not None:
-        state = np.array([_identity(sources)])
-        feedback = of.fresh(1)
+        start = np.array([_identity(sources)])
+        state, feedback = start, of.fresh(1)
         for increments in run:
             arguments = [state, increments[None]]
+            if restarts and state is not start and _refused(model, arguments, feedback):
+                wrong, calls = wrong + (not _refused(of, arguments, feedback)), calls + 1
+                arguments, feedback = [start, increments[None]], of.fresh(1)
             after, feedback_after = of.run(arguments, feedback)
             expected, expected_feedback = model.run(arguments, feedback)
             equal = np.array_equal(after[0], expected[0]) and np.array_equal(
@@ -245,6 +253,15 @@ def _fixed(
             state, feedback = np.asarray(expected[0]), expected_feedback
     bound = max(max(a.errors) / a.format.unit for a in sources.fixed.outputs)
     return wrong, calls, worst, float_above(bound)
+
+
+def _refused(evaluator: Evaluator, arguments: Sequence[Array], feedback: Array) -> bool:
+    """Tell whether a back end refuses its inputs."""
+    try:
+        evaluator.run(arguments, feedback)
+    except InputError:
+        return True
+    return False
 
 
 def _called(of: CEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
