@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import run
 from languages import DOUBLE, SAMPLES, check_lines
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run import compiler
+from strapgen.run import backends, compiler
 from strapgen.run.backends import of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.targets.contract_lines import Contract
@@ -194,11 +193,6 @@ def test_a_step_of_c_plus_plus_is_a_constant_expression(tmp_path, right, flags):
 
 
 #: A step that no other test compiles: what is loaded already needs no compiler.
-SIMULATE = (
-    "simulate euler --method rk1 --increments 7 --motion constant --set x_deg_s=1 --step 1 --duration 2"
-)
-
-
 @pytest.mark.parametrize(
     ("backend", "variable", "said"),
     [
@@ -207,10 +201,11 @@ SIMULATE = (
         ("octave", "OCTAVE", "no Octave: 'none' is not on the PATH; install octave (or set OCTAVE)"),
     ],
 )
-def test_a_program_that_is_missing_is_named_in_one_line(backend, variable, said, monkeypatch, capsys):
+def test_a_program_that_is_missing_is_named_in_one_line(backend, variable, said, monkeypatch):
     monkeypatch.setenv(variable, "none --some-option")
-    run([*SIMULATE.split(), "--backend", backend], 2)
-    assert capsys.readouterr().err == f"strapgen: {said}, or use the numpy back end\n"
+    with pytest.raises(CompilerError) as failure:
+        backends.backend("euler", "rk1", 7, backend=backend).propagate(np.zeros((2, 7, 3)))
+    assert str(failure.value) == f"{said}, or use the numpy back end"
 
 
 @pytest.mark.parametrize(
