@@ -88,11 +88,10 @@ def test_the_built_in_file_is_what_its_command_writes(shaped):
     built_in = SHAPES["coning-shaped-8"]
     assert replace(built_in, name=shaped.name) == shaped
     path = shaped_coning._BUILT_IN.files["coning-shaped-8"]
-    command, figures = path.read_text().splitlines()[:2]
-    assert (
-        written(shaped, command.removeprefix("# Designed by: "), [figures.removeprefix("# ")])
-        == path.read_text()
-    )
+    schema, text = path.read_text().split("\n", 1)
+    command, figures = text.splitlines()[:2]
+    assert schema.startswith("#:schema ")
+    assert written(shaped, command.removeprefix("# Designed by: "), [figures.removeprefix("# ")]) == text
 
 
 @pytest.mark.long

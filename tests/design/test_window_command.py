@@ -46,7 +46,8 @@ def run(capsys, tmp_path, monkeypatch):
     ],
 )
 def test_a_second_design_gives_the_same_file(name, run, tmp_path):
-    text = (FOLDER / f"{name}.toml").read_text()
+    schema, text = (FOLDER / f"{name}.toml").read_text().split("\n", 1)
+    assert schema.startswith("#:schema ")
     command = text.splitlines()[0].removeprefix("# Designed by: strapgen ")
     status, said, warned = run(command)
     assert (status, said) == (0, "") and f"wrote {name}.toml" in warned

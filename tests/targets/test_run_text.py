@@ -40,7 +40,7 @@ def test_examples_are_the_formula_rounded_up(algorithm, carry):
         exact = angles.bound(int(steps)), angles.bound(int(steps), int(steps) // 1000, error)
         for printed, value in zip((alone, normalized), exact, strict=True):
             assert value <= float(printed) <= 1.001 * value
-    formula = re.search(r"by at most (?:(\S+) \+ )?(\S+) N rad", text[0])
+    formula = re.search(r"at most (?:(\S+) \+ )?(\S+) N rad", text[0])
     once, per_step = (Fraction(part or 0) for part in formula.groups())
     assert angles.once <= once <= Fraction(1001, 1000) * angles.once
     assert angles.per_step <= per_step <= Fraction(1001, 1000) * angles.per_step
