@@ -124,9 +124,9 @@ def _slopes(
     chain: Chain, ordinate: str, abscissa: str, known: Fraction, turns: bool
 ) -> list[tuple[str, Fraction | None]]:
     """Return bounds of the derivatives: the inverse distance from the origin, none across the cut."""
-    above, exact_addends = chain.range(ordinate), chain.range(abscissa)
-    distances = [max(Fraction(0), inside.lowest, -inside.highest) for inside in (above, exact_addends)]
+    y, x = chain.range(ordinate), chain.range(abscissa)
+    distances = [max(Fraction(0), inside.lowest, -inside.highest) for inside in (y, x)]
     distance = max(known, Interval.of(sum((d * d for d in distances), Fraction(0))).sqrt().lowest)
     slope = 1 / distance if distance else None
-    is_cut = turns and above.low < 0 and exact_addends.low < 0
+    is_cut = turns and y.low < 0 and x.low < 0
     return [(ordinate, None if is_cut else slope), (abscissa, slope)]

@@ -94,8 +94,8 @@ class Quantities:
         quantity = self.items[name]
         shift = quantity.offset - number
         ends = (quantity.range.lowest + shift, quantity.range.highest + shift)
-        exact_addends = (abs(c) * self.items[m[0]].range.magnitude for m, c in quantity.exact_addends)
-        return max(map(abs, ends)) + sum(exact_addends, Fraction(0))
+        sizes = (abs(c) * self.items[m[0]].range.magnitude for m, c in quantity.exact_addends)
+        return max(map(abs, ends)) + sum(sizes, Fraction(0))
 
     def factors(self) -> set[str]:
         """Return the quantities that must be words: factors of products, exact parts beside others, and arguments."""

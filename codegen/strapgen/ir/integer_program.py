@@ -95,9 +95,8 @@ class Value:
     offset: Fraction  # the constant that is not stored
     error: Fraction  # bound of the distance from the exact value, in units of the value
     peak: int  # bound of the magnitude of every partial sum
-    range_checked: bool = (
-        False  # whether the range is checked when the code runs: a call outside returns an error
-    )
+    #: Whether the range is checked when the code runs: a call outside returns an error
+    range_checked: bool = False
     meaning: str = ""  # the comment where a named stage of the algorithm begins
     #: Whether the nearer end of the range replaces integers outside; `error` is that before.
     saturated: bool = False

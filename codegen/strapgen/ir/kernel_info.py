@@ -1,4 +1,4 @@
-"""What is said of a kernel beside its formulas; every stage passes it on whole."""
+"""The names, source, orders and recursion of a kernel; every stage passes them on unchanged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from strapgen.ir.recursion import Recursion
 
 @dataclass(frozen=True)
 class KernelInfo:
-    """What is said of a kernel beside its formulas: it is the `info` of a kernel, its programs and its sources.
+    """The names, source, orders and recursion of a kernel: the `info` of the kernel, its programs and its sources.
 
     Parameters
     ----------

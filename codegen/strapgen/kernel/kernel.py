@@ -20,6 +20,8 @@ from strapgen.kernel.evaluation import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
 EPSILON = sp.Symbol(RESOLUTION, real=True)
+#: Fields of a kernel by their names of the version before.
+_RENAMED = {"companions": "attitude_step", "own": "bundled_kernels"}
 
 
 def symbols(signal: Signal) -> sp.Matrix:
@@ -71,7 +73,7 @@ def evaluate_stages(
     return known
 
 
-@renamed(companions="attitude_step", own="bundled_kernels")
+@renamed(**_RENAMED)
 @dataclass(frozen=True)
 class Kernel(KernelInfo):
     """An algorithm as exact expressions. Its `KernelInfo` is the words and names that every stage passes on.
@@ -309,7 +311,7 @@ class KernelBuilder:
         InputError
             If its `attitude_step` states other numbers.
         """
-        rest = current(rest, {"companions": "attitude_step", "own": "bundled_kernels"})
+        rest = current(rest, _RENAMED)
         step = rest.get("attitude_step")
         if isinstance(step, AttitudeStep):
             stated = {what: rest.pop(what) for what in ("previous", "ahead") if rest.get(what)}

@@ -56,6 +56,22 @@ _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
 
 
+def program_command(what: str, variable: str, default: str, package: str) -> list[str]:
+    """Return the path and the options of a program, which a variable of the environment may name."""
+    text = os.environ.get(variable, "").strip() or default
+    try:
+        program, *options = shlex.split(text)
+    except ValueError:  # a quotation mark that is not closed
+        program, options = text, []
+    path = shutil.which(program)
+    if path is None:
+        raise CompilerError(
+            f"no {what}: {program!r} is not on the PATH; install {package} (or set {variable}), or use the numpy "
+            "back end"
+        )
+    return [str(Path(path).absolute()), *options]
+
+
 @dataclass(frozen=True)
 class Compiler:
     """A compiler of one language: the variable with its command, the command without one, and what to install."""
@@ -69,18 +85,7 @@ class Compiler:
 
     def command(self) -> list[str]:
         """Return the path of the compiler and its own options."""
-        text = os.environ.get(self.variable, "").strip() or self.default
-        try:
-            program, *options = shlex.split(text)
-        except ValueError:  # a quotation mark that is not closed
-            program, options = text, []
-        path = shutil.which(program)
-        if path is None:
-            raise CompilerError(
-                f"no {self.language} compiler: {program!r} is not on the PATH; install {self.package} (or set "
-                f"{self.variable}), or use the numpy back end"
-            )
-        return [str(Path(path).absolute()), *options]
+        return program_command(f"{self.language} compiler", self.variable, self.default, self.package)
 
     def path(self) -> str:
         """Return the path of the compiler."""

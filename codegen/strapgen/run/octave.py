@@ -10,7 +10,6 @@ from __future__ import annotations
 import atexit
 import math
 import os
-import shlex
 import shutil
 import subprocess
 import tempfile
@@ -23,6 +22,7 @@ import numpy as np
 
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
+from strapgen.run import compiler
 from strapgen.run.evaluators import Array, Evaluator, Loop
 from strapgen.storage import cache
 
@@ -64,17 +64,7 @@ _REQUEST = (
 
 def command() -> list[str]:
     """Return the command of Octave: that of $OCTAVE, or `octave-cli`; a `CompilerError` says that there is none."""
-    text = os.environ.get("OCTAVE", "").strip() or "octave-cli"
-    try:
-        program, *rest = shlex.split(text)
-    except ValueError:  # a quotation mark that is not closed
-        program, rest = text, []
-    path = shutil.which(program)
-    if path is None:
-        raise CompilerError(
-            f"no Octave: {program!r} is not on the PATH; install octave (or set OCTAVE), or use the numpy back end"
-        )
-    return [path, *rest]
+    return compiler.program_command("Octave", "OCTAVE", "octave-cli", "octave")
 
 
 def missing() -> str:

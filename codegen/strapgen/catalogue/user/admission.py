@@ -248,7 +248,7 @@ def _require_step(kernel: Kernel) -> None:
         return
     step = kernel.attitude_step
     if step is None:
-        _refuse(kernel, "it has no attitude_step, the companions of an attitude step")
+        _refuse(kernel, "it has no attitude_step; an attitude step needs one")
         return
     if not isinstance(step, AttitudeStep):
         _refuse(kernel, f"its attitude_step is {step!r}; strapgen.AttitudeStep is needed")

@@ -128,9 +128,10 @@ def verify(
         if sources.fixed is None:
             measured = _floating(compiled, table.rows, table.tolerances, request)
             return Verification(file, differences, *measured)
-        is_cone = increments is None
         run = _cone(sources.fixed) if increments is None else _words(sources.fixed, increments)
-        return Verification(file, differences, *_fixed(compiled, table.rows, run, request, is_cone))
+        return Verification(
+            file, differences, *_fixed(compiled, table.rows, run, request, increments is None)
+        )
     except CompilerError as error:
         if not differences:
             raise
