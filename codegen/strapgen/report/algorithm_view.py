@@ -13,8 +13,8 @@ from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.evidence.subjects import Subject
 from strapgen.ir import checks
-from strapgen.ir.decimals import above, below
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import above, below
 from strapgen.ir.integer_program import FixedProgram, used_by
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.lab.comparison_report import ComparedKernel, ComparisonResult
