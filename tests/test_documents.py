@@ -603,7 +603,14 @@ def helpers() -> set[str]:
 
 
 #: Scripts that compile or derive many kernels.
-LONG_EXAMPLES = ("word_length_study", "coning_drift", "recorded_gyro", "compare_orders", "certified_bounds")
+LONG_EXAMPLES = (
+    "word_length_study",
+    "coning_drift",
+    "recorded_gyro",
+    "compare_orders",
+    "certified_bounds",
+    "great_circle",
+)
 
 
 @pytest.mark.parametrize(
