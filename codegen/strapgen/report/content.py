@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.design.frontier.frontier import Standing, pareto
+from strapgen.design.frontier import Standing, pareto
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.report.algorithm_view import AlgorithmView, view
 from strapgen.report.conditions import Conditions

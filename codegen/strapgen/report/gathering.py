@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from strapgen import pipeline
 from strapgen.catalogue import ALGORITHMS, Choice
-from strapgen.design.frontier import frontier
-from strapgen.design.frontier.frontier import Candidate, Standing
+from strapgen.design import frontier
+from strapgen.design.frontier import Candidate, Standing
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.study.resumable import side_by_side
 from strapgen.report.conditions import Conditions

@@ -147,7 +147,7 @@ def _page(
 ) -> str:
     """Run all that a page shows, and return it."""
     from strapgen import catalogue
-    from strapgen.design.frontier import frontier
+    from strapgen.design import frontier
     from strapgen.report import gathering
     from strapgen.report.content import Content
     from strapgen.report.page import report_page

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.cli.generated_result import GeneratedSources, GenerateResult
-from strapgen.design.frontier.frontier import Standing
-from strapgen.design.frontier.frontier_report import FrontierResult
+from strapgen.design.frontier import FrontierResult, Standing
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from strapgen.analysis.ratios.ratios import Claim
-from strapgen.analysis.ratios.ratios_report import claims_text
+from strapgen.analysis.ratios import Claim, claims_text
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.thesis.predicted_tables import PredictedEntry
