@@ -20,9 +20,9 @@ from strapgen.design.commit_late.commit_late_sources import LateSources
 from strapgen.design.commit_late.late_filters import REACH, FixedFilters, LateFilters, polynomial
 from strapgen.design.commit_late.late_unit import LateUnitInC, LateUnitOnIntegers, state_argument
 from strapgen.fixedpoint import quantize
-from strapgen.ir.attitude_step import Truncation
-from strapgen.ir.decimals import above
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import above
+from strapgen.ir.kernel_info import Truncation
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.lowering import lower

@@ -17,8 +17,8 @@ from strapgen.analysis.vibration.mean_rates import Curve
 from strapgen.analysis.vibration.vibration_report import VibrationResult
 from strapgen.design.design_plots import frontier_image
 from strapgen.design.frontier import MOTIONS, FrontierResult, Standing
-from strapgen.ir.attitude_step import Order
 from strapgen.ir.exceptions import InputError, MissingExtraError
+from strapgen.ir.kernel_info import Order
 from strapgen.lab.compare.comparison import AngleHistory, Comparison
 from strapgen.lab.compare.comparison_plot import comparison_image
 from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult

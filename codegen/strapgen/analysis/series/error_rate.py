@@ -30,7 +30,7 @@ from strapgen.analysis.series.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.covariants import NotCovariantError
 from strapgen.kernel.power_series import Powers
 from strapgen.lab.step_series import one_step
@@ -126,7 +126,7 @@ def _steady_error_rate(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     back = one_step.true_matrix(ring, [[ring.from_expr(sp.expand(x)) for x in turning]], top)
     raw = _logarithm(_product(step, _product(_square(true), _square(back))))
     axis = model.rate(sp.S.Zero, *symbols) + turning
-    skew = rotations.skew(axis)
+    skew = algebra.skew(axis)
     matrices = {}
     for power in range(1, top):
         parts = [[element.parts.get(power + 1, ring.zero) for element in row] for row in raw]
@@ -304,9 +304,9 @@ def _drift(matrix: sp.Matrix) -> sp.Matrix:
 
 def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
     """Return the integral of a drift rate that turns with a frame, without its component along the axis."""
-    square = rotations.dot(axis, axis)
-    across = drift - rotations.dot(drift, axis) / square * axis
-    turned = rotations.cross(axis, drift)
+    square = algebra.dot(axis, axis)
+    across = drift - algebra.dot(drift, axis) / square * axis
+    turned = algebra.cross(axis, drift)
     length = sp.sqrt(sp.expand(square))
     return across.applyfunc(_short) * sp.sin(length * TIME) / length + turned.applyfunc(_short) * (
         1 - sp.cos(length * TIME)
@@ -345,9 +345,9 @@ def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
         (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
         Powers(extended, {}, top),
     )
-    determinant = rotations.dot(m[0], rotations.cross_elements(m[1], m[2]))
+    determinant = algebra.dot(m[0], algebra.cross_elements(m[1], m[2]))
     axis = [extended.from_expr(sp.expand(x)) for x in error.axis]
-    square = rotations.dot(axis, axis)
+    square = algebra.dot(axis, axis)
     value = Powers(extended, {0: y}, top)
     shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}
     for power in range(first, top + 1):

@@ -31,8 +31,8 @@ from strapgen.analysis.series.invariants import (
 from strapgen.analysis.unknowns.elimination import Equation
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
-from strapgen.kernel.evaluation import exact
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab.step_series import one_step, sampled_motion

@@ -22,7 +22,7 @@ from strapgen.analysis.vibration.systems import ANGLES, T_M, VELOCITIES, F, T
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel
 
 

@@ -11,9 +11,8 @@ import sympy as sp
 
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel import power_series
-from strapgen.kernel.kernel import Kernel
+from strapgen.kernel.kernel import Kernel, rationalized
 from strapgen.kernel.power_series import Powers
-from strapgen.kernel.rational_constants import rationalized
 
 #: A time as whole multiples of the basic times.
 Shift = tuple[int, ...]

@@ -25,10 +25,10 @@ from strapgen.design.commit_late.late_filters import (
     LateFilters,
 )
 from strapgen.ir import checks
-from strapgen.ir.decimals import above
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import above
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION

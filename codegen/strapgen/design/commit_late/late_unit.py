@@ -17,7 +17,7 @@ import numpy as np
 from strapgen.design.commit_late.commit_late_sources import LateSources
 from strapgen.design.commit_late.late_filters import NEXT, NORMALIZED_EVERY, REACH, SHORT, short_place
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
 from strapgen.run.c import array_type, real_type
