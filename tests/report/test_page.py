@@ -21,10 +21,8 @@ from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Verdict
 from strapgen.ir.version import VERSION
 from strapgen.report.algorithm_view import view
-from strapgen.report.conditions import Conditions
-from strapgen.report.content import Content
-from strapgen.report.dossier import dossier
-from strapgen.report.page import report_page
+from strapgen.report.dossier import Conditions, dossier
+from strapgen.report.page import Content, report_page
 from strapgen.thesis import thesis_tables
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,7 +17,7 @@ from strapgen.analysis.series.series import PARTS, STEP, ErrorSeries, series
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.motions.motion_names import is_file
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
 from strapgen.results.records import INTERNAL, Record, entry

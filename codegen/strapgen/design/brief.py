@@ -20,7 +20,7 @@ from strapgen.analysis.vibration.spectrum import Spectrum, random_rates, read_sp
 from strapgen.catalogue.toml_files import UserFile
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab.processors import PROCESSORS
 from strapgen.lab.recordings.recording import read_increments
 from strapgen.targets.registry import TARGETS
 

@@ -16,12 +16,8 @@ from strapgen.cli.progress import track, waiting
 from strapgen.cli.rules import Needs, rules
 from strapgen.cli.values import Positive, whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.simulate.sample_source import (
-    MotionSettings,
-    motion_option,
-)
-from strapgen.lab.study.worker_options import WorkerOptions
+from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.run_options import MotionSettings, WorkerOptions, motion_option
 
 if TYPE_CHECKING:
     from strapgen.design.brief import DesignBrief

@@ -35,8 +35,8 @@ from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
-from strapgen.lab.step_series import one_step, sampled_motion
-from strapgen.lab.step_series.one_step import Step
+from strapgen.lab import one_step, sampled_motion
+from strapgen.lab.one_step import Step
 
 #: Motions on which conditions of an attitude step are stated.
 OF_ATTITUDE = ("general", "coning", "polynomial")

@@ -30,7 +30,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.kernel.power_series import Powers
-from strapgen.lab.step_series import one_step
+from strapgen.lab import one_step
 
 #: Highest degree in the amplitudes of the lines.
 DEGREE = 4

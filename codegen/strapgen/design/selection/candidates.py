@@ -27,9 +27,9 @@ from strapgen.design.selection import causes
 from strapgen.design.selection.causes import Rounding
 from strapgen.ir import checks
 from strapgen.ir.sources import Sources
-from strapgen.lab.cost import cost as costs
+from strapgen.lab.cost import cost
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.simulate.runs import Run, drift_between, simulate
+from strapgen.lab.runs import Run, drift_between, simulate
 from strapgen.run.backends import backend
 
 #: Operations that cost next to nothing.
@@ -148,7 +148,7 @@ class AttitudeStep:
     def cost(self, carry: str) -> ProcessorCost:
         """Return bytes and instructions of the C in fixed point."""
         settings = causes.settings(self.choice, self._brief, carry)
-        one = costs.cost(pipeline.compile(self.choice, "c-fixed", settings), self._brief.processor.cpu)
+        one = cost(pipeline.compile(self.choice, "c-fixed", settings), self._brief.processor.cpu)
         executed = None if one.executed is None else one.executed / float(self.step)
         return ProcessorCost(float(one.code_bytes + one.constant_bytes), executed)
 

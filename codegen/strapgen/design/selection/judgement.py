@@ -19,9 +19,8 @@ from strapgen.design.selection.candidates import STATES, Algorithm, Contender, a
 from strapgen.design.selection.causes import Rounding
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.version import VERSION
-from strapgen.lab.cost.processors import PROCESSORS
-from strapgen.lab.study.clusters import Bundle, Cluster, moved
-from strapgen.lab.study.resumable import resume, side_by_side
+from strapgen.lab.parallel_cases import Bundle, Cluster, moved, resume, side_by_side
+from strapgen.lab.processors import PROCESSORS
 from strapgen.storage import cache as disk_cache
 
 #: The causes of a drift, in the order of a report; the first three are the software's.
