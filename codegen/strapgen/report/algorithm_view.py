@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from strapgen.evidence.collection import Subject
 from strapgen.evidence.evidence_report import EvidencePage
-from strapgen.evidence.subjects import Subject
 from strapgen.ir.decimals import above, below
 from strapgen.ir.integer_program import FixedProgram, used_by
 from strapgen.ir.signals import FRAMES, Signal

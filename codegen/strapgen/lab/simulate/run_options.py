@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from strapgen.cli.option_groups import Excludes, Needs, Rule
 from strapgen.cli.options import option
 from strapgen.cli.output import Output, format_option, plot_option
-from strapgen.cli.rules import Excludes, Needs, Rule
 from strapgen.cli.values import Positive, Vector, line
 
 _Text = str | None

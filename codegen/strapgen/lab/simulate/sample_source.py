@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
+from strapgen.cli.option_groups import Needs, OneOf, Rule
 from strapgen.cli.options import option
 from strapgen.cli.progress import say_unused, waiting
-from strapgen.cli.rules import Needs, OneOf, Rule
 from strapgen.cli.values import Positive, Vector, names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from strapgen.cli.option_groups import OneOf, Rule
 from strapgen.cli.options import option
-from strapgen.cli.rules import OneOf, Rule
 from strapgen.cli.values import whole
 
 if TYPE_CHECKING:
