@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen.ir.decimals import above, places_above
-from strapgen.ir.fixed_interface import Interface
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.formats import above, places_above
+from strapgen.ir.interfaces import Interface, RoundingBounds
 from strapgen.ir.signals import CYCLE, after
 from strapgen.ir.sources import Sources
 from strapgen.results.records import INTERNAL, entry

@@ -19,8 +19,8 @@ from typer.models import OptionInfo, ParameterInfo
 
 from strapgen.cli import values
 from strapgen.cli.values import written
+from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import alternatives
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

@@ -13,8 +13,8 @@ from typer.core import TyperCommand, TyperGroup
 from strapgen import registration
 from strapgen.cli import help_layout
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
+from strapgen.ir.checks import alternatives, suggestions
 from strapgen.ir.exceptions import InputError, StrapgenError
-from strapgen.ir.suggestions import alternatives, suggestions
 from strapgen.registration import Command
 
 

@@ -20,8 +20,8 @@ from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.firmware.vectors import MODEL, vectors_of_choice
-from strapgen.ir.angle_accumulation import AngleAccumulation
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.interfaces import AngleAccumulation
 from strapgen.ir.program import OPERATIONS, Program
 from strapgen.run.fixed import ModelEvaluator
 

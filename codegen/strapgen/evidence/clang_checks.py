@@ -13,7 +13,7 @@ from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.evidence.processor_runs import LONGEST_WORD, ROWS, motion_rows
 from strapgen.firmware.vectors import vectors_of_choice
 from strapgen.firmware.vectors_c import table_files
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.lab.cost.runner_c import CallRun, run_files
 from strapgen.storage.drafts import temporary_folder

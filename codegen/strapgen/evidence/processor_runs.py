@@ -21,8 +21,8 @@ from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.firmware.vectors import MODEL, model_call
 from strapgen.firmware.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError
-from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument, Interface
 from strapgen.lab.cost.runner_c import (
     MOST,
     NEEDED,

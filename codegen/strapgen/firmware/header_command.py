@@ -16,8 +16,8 @@ from strapgen.design.commit_late import window_generate_command
 from strapgen.firmware.verification import file_backend as file_backend
 from strapgen.firmware.verification import paths_of, sources_of_files, whole_header
 from strapgen.ir import checks
+from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import alternatives
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
 from strapgen.run.generated_files import command_of, text_of

@@ -14,8 +14,8 @@ from strapgen.catalogue import Choice
 from strapgen.firmware.vectors import vectors_of_choice
 from strapgen.firmware.vectors_c import VectorTable, loop_calls, table_files
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed.two_speed_c import Wiring
 from strapgen.run.kernel_sources import StepSources

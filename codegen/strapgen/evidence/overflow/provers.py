@@ -14,7 +14,7 @@ from pathlib import Path
 
 from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.evidence.overflow.c_types import MODELS, Model
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets.c_fixed.words import memory_type
 

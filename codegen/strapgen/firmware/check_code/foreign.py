@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from strapgen.firmware.check_code.foreign_arguments import RATES, ForeignSource, bridge_text, definitions
 from strapgen.ir import checks
+from strapgen.ir.checks import suggestions
 from strapgen.ir.exceptions import CompilerError, InputError
-from strapgen.ir.suggestions import suggestions
 from strapgen.ir.timing import timed
 from strapgen.lab.simulate.runs import drift_between
 from strapgen.run import compiler
