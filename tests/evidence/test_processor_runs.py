@@ -17,8 +17,8 @@ from strapgen.evidence.actual_errors import PRECISION, ball, exact_states
 from strapgen.evidence.collection import Subject
 from strapgen.evidence.processor_runs import Part, motion_rows, of_model, parts_of
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost.runner_c import MOST, NEEDED, CallRun
-from strapgen.lab.cost.runners import RUNNERS, Runner
+from strapgen.lab.processors import RUNNERS, Runner
+from strapgen.lab.runner_c import MOST, NEEDED, CallRun
 
 flint = pytest.importorskip("flint")
 

@@ -20,10 +20,8 @@ from strapgen.evidence.collection import Subject, Verdict
 from strapgen.evidence.evidence_report import evidence_page, read_page
 from strapgen.ir.version import VERSION
 from strapgen.report.algorithm_view import view
-from strapgen.report.conditions import Conditions
-from strapgen.report.content import Content
-from strapgen.report.dossier import dossier
-from strapgen.report.page import report_page
+from strapgen.report.dossier import Conditions, dossier
+from strapgen.report.page import Content, report_page
 from strapgen.thesis import thesis_tables
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -15,7 +15,7 @@ from strapgen.firmware.vectors import vectors_of_choice
 from strapgen.firmware.vectors_c import table_files
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
-from strapgen.lab.cost.runner_c import CallRun, run_files
+from strapgen.lab.runner_c import CallRun, run_files
 from strapgen.storage.drafts import temporary_folder
 from strapgen.storage.files import write_files
 from strapgen.targets.c.number_text import numbers_of, types_of

@@ -23,7 +23,9 @@ from strapgen.firmware.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument, Interface
-from strapgen.lab.cost.runner_c import (
+from strapgen.lab.motions.motions import GENERAL, Motion, motion
+from strapgen.lab.processors import RUNNERS, Runner
+from strapgen.lab.runner_c import (
     MOST,
     NEEDED,
     NOISE,
@@ -34,8 +36,6 @@ from strapgen.lab.cost.runner_c import (
     long_run_files,
     run_files,
 )
-from strapgen.lab.cost.runners import RUNNERS, Runner
-from strapgen.lab.motions.motions import GENERAL, Motion, motion
 from strapgen.run.backends import evaluator
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.storage.files import write_files

@@ -21,7 +21,7 @@ from strapgen.cli.progress import track
 from strapgen.cli.values import Positive
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, in_words
+from strapgen.lab.run_options import MOTION_NAMES, MotionSettings, in_words
 
 if TYPE_CHECKING:
     from strapgen.analysis.agreement.agreement import Agreement

@@ -25,7 +25,7 @@ from strapgen.ir import checks
 from strapgen.ir.checks import suggestions
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.timing import timed
-from strapgen.lab.simulate.runs import drift_between
+from strapgen.lab.runs import drift_between
 from strapgen.run import compiler
 from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows

@@ -28,7 +28,7 @@ from strapgen.firmware.check_code.foreign import (
     rotation_vectors,
 )
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.simulate.runs import drift_between
+from strapgen.lab.runs import drift_between
 from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]
