@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from strapgen.cli.option_groups import grouped
+from strapgen.cli.option_groups import Needs, grouped, rules
 from strapgen.cli.options import Duration, GyroRate, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track, waiting
-from strapgen.cli.rules import Needs, rules
 from strapgen.cli.values import Positive, whole
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
@@ -118,7 +117,7 @@ def _simulated(
 
 def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Path, report: str) -> None:
     """Write the firmware of the cheapest algorithm that meets the brief."""
-    from strapgen.cli.source_options import SourceOptions
+    from strapgen.cli.generate_command import SourceOptions
     from strapgen.design.selection.selection_report import firmware_files
     from strapgen.design.selection.simulated import algorithm_named
 

@@ -13,13 +13,12 @@ import typer
 
 from strapgen.analysis.vibration.vibration_command import BandOptions
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.help import PlainCommand, PlainGroup
-from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.generate_command import SourceOptions
+from strapgen.cli.option_groups import Needs, OneOf, Rule, Shown, command_line, grouped, rules
 from strapgen.cli.options import CTarget, option
 from strapgen.cli.output import Format, Output, check_format, show
+from strapgen.cli.program import PlainCommand, PlainGroup
 from strapgen.cli.progress import waiting
-from strapgen.cli.rules import Needs, OneOf, Rule, rules
-from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.values import NotNegative, Positive, names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

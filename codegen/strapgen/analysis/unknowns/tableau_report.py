@@ -18,7 +18,7 @@ from strapgen.analysis.unknowns.unknowns_report import (
 )
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.results.display.methods import method_latex
+from strapgen.results.display.objects import method_latex
 from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable

@@ -14,7 +14,7 @@ from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
-from strapgen.results.display.methods import array_latex
+from strapgen.results.display.objects import array_latex
 from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
