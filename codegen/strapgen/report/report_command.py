@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.option_groups import Needs, Rule, Shown, command_line, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, GyroRate, SeveralMethods, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Needs, Rule, rules
 from strapgen.cli.values import Positive
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.run_options import (
@@ -147,7 +146,7 @@ def _page(
 ) -> str:
     """Run all that a page shows, and return it."""
     from strapgen import catalogue
-    from strapgen.design.frontier import frontier
+    from strapgen.design import frontier
     from strapgen.report import dossier
     from strapgen.report.page import Content, report_page
     from strapgen.run.versions import versions

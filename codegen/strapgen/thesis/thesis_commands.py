@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Excludes, Shown, grouped, rules
 from strapgen.cli.options import FastBackends, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Excludes, rules
 from strapgen.cli.values import Positive, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -97,7 +96,7 @@ def _simulated(
 
 def _predict(output: Output) -> None:
     """Deliver the tables as the series predict them, and the ratios that the thesis reads from its tables."""
-    from strapgen.analysis.ratios import ratios
+    from strapgen.analysis import ratios
     from strapgen.thesis import predicted_tables
     from strapgen.thesis.predicted_tables import PredictedTablesResult
     from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES
