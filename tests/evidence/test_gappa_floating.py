@@ -14,7 +14,7 @@ from strapgen.evidence import gappa
 from strapgen.evidence.gappa_floating import floating_script
 from strapgen.evidence.gappa_scripts import CannotFollowError, Script
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import NUMBERS
 from strapgen.ir.program import Program
 
 pytestmark = pytest.mark.skipif(not gappa.TOOL.installed(), reason="gappa is not installed")

@@ -22,7 +22,7 @@ from strapgen.ir.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
 
 
 @grouped
@@ -115,7 +115,7 @@ def request(
     algorithm: str, method: MethodOptions, target: str, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
     """Return the request of the command's options."""
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
     from strapgen.targets import TARGETS, fixed_targets
 
     choice = method.choose(algorithm, step=False)
@@ -172,7 +172,7 @@ def _generate_all(targets: tuple[str, ...] | None, output: SourceOptions, format
     total = len(catalogue.standard())
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total), targets)
     if output.check:
-        difference = standard_tree.difference(out, files)
+        difference = standard_tree.tree_difference(out, files)
         show_step(difference, format)
         if difference:
             left = standard_tree.strangers(out, files)

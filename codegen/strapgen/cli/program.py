@@ -44,7 +44,7 @@ _OWN = {name: command for one in registration.built_in().values() for name, comm
 def _show_versions(chosen: bool) -> None:
     if not chosen:
         return
-    from strapgen.run.versions import versions
+    from strapgen.run.compiler import versions
 
     typer.echo("\n".join(f"{name} {version}" for name, version in versions().items()))
     raise typer.Exit

@@ -84,7 +84,7 @@ class SourceOptions:
 
     def write(self, files: Mapping[str, str]) -> list[Path]:
         """Write files into the folder, but over none that has another contract, unless that is forced."""
-        from strapgen.run.generated_files import command_of, text_of
+        from strapgen.run.standard_tree import command_of, text_of
         from strapgen.storage.files import write_files
 
         folder = self.out or Path()
@@ -104,9 +104,9 @@ class SourceOptions:
 
     def compare(self, files: Mapping[str, str]) -> str:
         """Return the difference of the files in the folder from generated ones; "" if there is none."""
-        from strapgen.run import generated_files
+        from strapgen.run.standard_tree import difference
 
-        return generated_files.difference(self.out or Path(), files)
+        return difference(self.out or Path(), files)
 
     def show_difference(self, files: Mapping[str, str], format: str) -> None:
         """Print the difference of the files in the folder from generated ones, and exit with 1 if there is one."""

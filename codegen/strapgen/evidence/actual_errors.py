@@ -25,7 +25,7 @@ from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
 from strapgen.ir.angle_accumulation import AngleAccumulation
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Program
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 #: Calls, and steps of a run; steps from one look at the state to the next.
 COUNT, BETWEEN = 10_000, 100

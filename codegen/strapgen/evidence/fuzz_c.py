@@ -10,9 +10,8 @@ from collections.abc import Sequence
 
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
-from strapgen.targets.c.number_text import numbers_of, types_of
-from strapgen.targets.definitions import word_literal
-from strapgen.targets.rendering import render
+from strapgen.targets.c_numbers import numbers_of, types_of
+from strapgen.targets.rendering import render, word_literal
 
 
 def driver_name(sources: Sources) -> str:

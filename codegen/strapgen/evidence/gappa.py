@@ -17,7 +17,7 @@ from strapgen.evidence.gappa_scripts import CannotFollowError, Script
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import NUMBERS
 
 #: Processor time after which a proof is given up, and bits of the ends of intervals.
 SECONDS, PRECISION = 60, 256

@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from strapgen.evidence.gappa_scripts import SIGNS, CannotFollowError, Script, number, product, total
-from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import CONSTANT, INPUT, NUMBERS, Expression, Expressions
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import is_power_of_two
 from strapgen.ir.float_interface import RoundingBounds

@@ -18,7 +18,7 @@ from strapgen.firmware.vectors.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError
 from strapgen.lab.cost.runner_c import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
 from strapgen.lab.cost.runners import RUNNERS, Runner
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 from strapgen.storage.files import write_files
 
 #: Rows of the motion, which a run goes through again and again.

@@ -151,7 +151,7 @@ def _page(
     from strapgen.report import gathering
     from strapgen.report.content import Content
     from strapgen.report.page import report_page
-    from strapgen.run.versions import versions
+    from strapgen.run.compiler import versions
     from strapgen.storage import cache
 
     shown = choices or catalogue.standard()

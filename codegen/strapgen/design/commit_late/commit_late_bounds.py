@@ -16,9 +16,8 @@ from typing import NamedTuple
 from strapgen.design.commit_late.fixed_filters import FixedFilters, Integers, NowErrors
 from strapgen.design.commit_late.late_filters import LateFilters, Rows
 from strapgen.design.commit_late.lost_samples import REACH
+from strapgen.fixedpoint.floating.errors import Expressions, sensitivities, slopes
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
-from strapgen.fixedpoint.floating.expressions import Expressions
-from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.exceptions import InputError

@@ -15,7 +15,7 @@ from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
-from strapgen.targets.c.emit import CPrinter, real_of
+from strapgen.targets.c import CPrinter, real_of
 from strapgen.targets.rendering import render
 
 _Tap = TypeVar("_Tap", int, Fraction)

@@ -24,7 +24,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.results.result import Result
 from strapgen.targets import BUILT_IN, contract
-from strapgen.targets.c.emit import real_of
+from strapgen.targets.c import real_of
 
 #: Kinds of C that commit late.
 TARGETS = ("c", "c-float", "c-fixed")

@@ -21,8 +21,8 @@ from strapgen.design.commit_late.lost_samples import REACH
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
+from strapgen.run.backend_names import of_sources
 from strapgen.run.evaluators import Array, Evaluator, in_units
-from strapgen.run.registry import of_sources
 
 
 class SampleKind(IntEnum):

@@ -10,7 +10,7 @@ from strapgen.design.commit_late.late_unit import GapError, refusal
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
-from strapgen.run.c import array_type, real_type
+from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array
 
 

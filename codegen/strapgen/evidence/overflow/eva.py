@@ -13,7 +13,7 @@ from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
-from strapgen.targets.c_fixed.words import memory_type
+from strapgen.targets.c_numbers import memory_type
 
 _OPTIONS = (
     "-eva",

@@ -12,7 +12,7 @@ from strapgen.firmware.vectors.vectors_c import VectorTable
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed.two_speed_c import Wiring
-from strapgen.targets.c.number_text import numbers_of, types_of
+from strapgen.targets.c_numbers import numbers_of, types_of
 from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render
 

@@ -15,7 +15,7 @@ from strapgen.ir.program import OPERATIONS, RESOLUTION, Program
 from strapgen.ir.sources import Sources
 from strapgen.run.evaluators import Array, Evaluator
 from strapgen.run.kernel_sources import program_of
-from strapgen.targets.c.emit import CPrinter, real_of
+from strapgen.targets.c import CPrinter, real_of
 
 
 def _sinc(x: Array) -> Array:

@@ -26,8 +26,8 @@ from strapgen.ir.program import Operation, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.results.result import Result
+from strapgen.run.compiled_code import ModelEvaluator
 from strapgen.run.exact import ExactEvaluator
-from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
 from strapgen.targets import BUILT_IN
 from strapgen.targets.contract import options

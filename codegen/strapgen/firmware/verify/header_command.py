@@ -21,7 +21,7 @@ from strapgen.navigation.two_speed import two_speed_command as two_speed
 if TYPE_CHECKING:
     from strapgen.ir.sources import Sources
     from strapgen.navigation.systems.fitting import Fitted
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
 
 #: The commands that generate C; a header can state these alone.
 COMMANDS: dict[str, Callable[..., Any]] = {

@@ -24,7 +24,7 @@ def runner_of_file(
     """Return what runs a file as it stands, and the settings that its header states."""
     from strapgen.firmware.verify import header_command
     from strapgen.firmware.verify.whole_verification import whole_header
-    from strapgen.run.generated_files import command_of, text_of
+    from strapgen.run.standard_tree import command_of, text_of
 
     header = whole_header(file)
     if header is None:

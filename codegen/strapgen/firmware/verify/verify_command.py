@@ -78,7 +78,7 @@ def verify(
 def header_command_of(file: Path) -> HeaderCommand:
     """Return the command in the header of a generated function."""
     from strapgen.firmware.verify import header_command, verification
-    from strapgen.run.generated_files import command_of, text_of
+    from strapgen.run.standard_tree import command_of, text_of
 
     header, _ = verification.paths_of(file)
     return header_command.read(command_of(text_of(header)) or "")
@@ -89,7 +89,7 @@ def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, outp
     from strapgen.cli.progress import waiting
     from strapgen.firmware.verify import header_command
     from strapgen.firmware.verify.whole_verification import verify_whole
-    from strapgen.run.generated_files import command_of, text_of
+    from strapgen.run.standard_tree import command_of, text_of
 
     with waiting(f"verifying {header.name}"):
         sources = header_command.read(command_of(text_of(header)) or "").whole(algorithms)

@@ -12,8 +12,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.sources import Sources
 from strapgen.results.records import entry, properties
 from strapgen.results.result import Result
-from strapgen.run.generated_files import command_of, text_of
-from strapgen.run.generation import Request
+from strapgen.run.kernel_sources import Request
+from strapgen.run.standard_tree import command_of, text_of
 
 #: What the commands begin with that generate several functions and a whole that calls them.
 _COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ")
