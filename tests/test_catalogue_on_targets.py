@@ -22,7 +22,7 @@ from strapgen.catalogue import Choice, choose
 from strapgen.fixedpoint import series
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.navigation.frame.navigation_names import NAVIGATION
 from strapgen.navigation.instruments.compensation_names import COMPENSATION
 from strapgen.navigation.loops.loop_names import LOOPS

@@ -100,7 +100,7 @@ def test_all_numbers_are_those_of_the_commands_that_stand_beside_them(page, data
 
 
 def test_the_program_of_the_documentation_reads_the_data(page, monkeypatch, capsys, data):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "report.md").read_text(), re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "evidence.md").read_text(), re.DOTALL)
     assert "out/report.html" in code
     monkeypatch.chdir(page.parent)
     (page.parent / "out").mkdir()

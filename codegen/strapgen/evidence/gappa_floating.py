@@ -13,7 +13,7 @@ from strapgen.evidence.gappa_scripts import SIGNS, CannotFollowError, Script, nu
 from strapgen.fixedpoint.floating.errors import CONSTANT, INPUT, NUMBERS, Expression, Expressions
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import is_power_of_two
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import RESOLUTION, Program
 from strapgen.kernel import polynomials
 

@@ -22,8 +22,8 @@ from strapgen.fixedpoint.integer_sums import Quantization
 from strapgen.fixedpoint.intervals import Interval, norm, root
 from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Quantities, Sum
 from strapgen.fixedpoint.series import Series, Truncated
-from strapgen.ir.fixed_interface import Argument, RoundingAccumulation
 from strapgen.ir.integer_program import IntegerSum, Value
+from strapgen.ir.interfaces import Argument, RoundingAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
 from strapgen.kernel.bernstein import Cube, Powers, eigenvalue_bounds
 from strapgen.kernel.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale

@@ -17,7 +17,7 @@ from strapgen.fixedpoint.accumulation import StepErrors, stretch
 from strapgen.fixedpoint.integer_sums import Quantization
 from strapgen.fixedpoint.intervals import Interval, norm, root
 from strapgen.fixedpoint.quantities import up
-from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
+from strapgen.ir.interfaces import LARGEST_ERROR, AngleAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
 from strapgen.kernel.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
 

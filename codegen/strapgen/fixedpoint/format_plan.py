@@ -18,13 +18,13 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import TURNING, Settings, rounded_limit
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Value
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program, Result
-from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
+from strapgen.ir.units import Sensor
 
 
 @dataclass(frozen=True)

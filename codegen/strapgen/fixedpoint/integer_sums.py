@@ -29,12 +29,11 @@ from strapgen.fixedpoint.quantities import (
     used_by,
 )
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import ROUNDINGS, Format, finest
+from strapgen.ir.formats import ROUNDINGS, Format, finest, from_digits, signed_digits
 from strapgen.ir.integer_program import Coefficient, IntegerOperation, IntegerSum, Term, Value
+from strapgen.ir.interfaces import ErrorFeedback
 from strapgen.ir.program import Program
-from strapgen.ir.signed_digits import from_digits, signed_digits
 
 #: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
 _LARGEST_PART = Fraction(1, 2)

@@ -24,7 +24,6 @@ from strapgen.fixedpoint.quantities import (
     nearest,
 )
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import (
@@ -38,6 +37,7 @@ from strapgen.ir.integer_program import (
     operation_counts,
     used_by,
 )
+from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import CYCLE, Signal
 

@@ -9,16 +9,22 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 
-from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
-from strapgen.ir.decimals import above, below, places_above
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
 from strapgen.ir.fixed_settings import TURNING, Settings
-from strapgen.ir.float_interface import Condition, RoundingBounds
-from strapgen.ir.formats import Format
+from strapgen.ir.formats import Format, above, below, places_above
 from strapgen.ir.integer_program import FixedProgram, Value
+from strapgen.ir.interfaces import (
+    LARGEST_ERROR,
+    AngleAccumulation,
+    Argument,
+    Condition,
+    ErrorFeedback,
+    Interface,
+    RoundingAccumulation,
+    RoundingBounds,
+)
 from strapgen.ir.program import Program
-from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
+from strapgen.ir.units import Sensor
 
 
 def argument_text(argument: Argument) -> str:

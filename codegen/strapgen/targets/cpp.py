@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import c, c_fixed

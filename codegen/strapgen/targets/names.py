@@ -16,8 +16,8 @@ from itertools import count
 from typing import NamedTuple, TypeVar
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
+from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.targets.c_library import LIBRARY

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.storage import resources

@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
-from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.float_interface import RoundingBounds
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import Argument, RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import c, c_fixed

@@ -23,7 +23,7 @@ from strapgen.fixedpoint.angle_accumulation import (
     _unsteadiness,
 )
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.ir.angle_accumulation import LARGEST_ERROR
+from strapgen.ir.interfaces import LARGEST_ERROR
 from strapgen.ir.signals import Signal
 
 HALF = Fraction(1, 2)

@@ -8,10 +8,10 @@ import sympy as sp
 
 from strapgen.catalogue.kernels.updates import ROTATION_VECTOR
 from strapgen.catalogue.kinematics import SAVAGE
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 
 INCREMENT = Signal.vector(
     "increment",

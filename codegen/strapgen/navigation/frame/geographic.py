@@ -8,7 +8,7 @@ import sympy as sp
 
 from strapgen.catalogue.kernels.euler_angles import followed_angles
 from strapgen.catalogue.kinematics import DCM
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_signals import DERIVED, GEOGRAPHIC, POSITION, VELOCITY

@@ -8,10 +8,10 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 from strapgen.navigation.frame.frame_signals import (
     ACCELERATION,
     DERIVED,

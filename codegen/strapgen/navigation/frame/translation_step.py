@@ -10,7 +10,7 @@ import sympy as sp
 from strapgen.catalogue.kernels.acceleration import rotated
 from strapgen.catalogue.kernels.velocity_position import CHANGES
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_signals import GRAVITY, VELOCITY

@@ -8,9 +8,9 @@ import sympy as sp
 
 from strapgen.catalogue.kernels.updates import NAVIGATION_ROTATION, ROTATION_VECTOR, transition
 from strapgen.catalogue.kinematics import DCM, SAVAGE, UNIT
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 #: The rows: the navigation axes x and y in body axes.
@@ -33,7 +33,7 @@ _TITLE = "Two rows of the direction cosine matrix"
 
 def _third(rows: list[sp.Matrix]) -> sp.Matrix:
     """Return the third row as a column, equation (43)."""
-    return rotations.cross(*rows)
+    return algebra.cross(*rows)
 
 
 def update(order: int | None = None) -> Kernel:
@@ -74,10 +74,10 @@ def orthonormalized() -> Kernel:
     """Return two rows made orthonormal to first order, equations (28) to (31)."""
     build = KernelBuilder()
     rows = [build.input(row) for row in ROWS]
-    half = build.value("half_error", rotations.dot(*rows) / 2, "half the rows' product")
+    half = build.value("half_error", algebra.dot(*rows) / 2, "half the rows' product")
     factors = [
         build.value(
-            f"factor_{number}", 1 + (1 - rotations.dot(row, row)) / 2, f"1/|row {number}| to first order"
+            f"factor_{number}", 1 + (1 - algebra.dot(row, row)) / 2, f"1/|row {number}| to first order"
         )
         for number, row in enumerate(rows, 1)
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 #: Kernels that correct the increments of sensors, and those that make their errors; they take no method.
 COMPENSATION = {

@@ -10,7 +10,7 @@ import sympy as sp
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.instruments.gyro_model import LETTERS, ErrorStructure, products, source_structure
 from strapgen.navigation.instruments.separation import INCREMENT, MICHELIN, VELOCITY_INCREMENT

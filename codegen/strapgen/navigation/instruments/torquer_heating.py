@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.instruments.imu_errors import CYCLE_RATE

@@ -7,9 +7,9 @@ from dataclasses import replace
 import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel.evaluation import Wrapped
+from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.instruments.imu_errors import CYCLE
 from strapgen.navigation.loops.loop_signals import (

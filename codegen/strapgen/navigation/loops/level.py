@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_signals import CURVATURE

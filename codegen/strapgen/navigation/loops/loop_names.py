@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 #: Kernels of the loops of an attitude and heading reference, and of a gyro's torquer; they take no method.
 LOOPS = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.instruments.imu_errors import CYCLE

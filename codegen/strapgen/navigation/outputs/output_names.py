@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 #: How a unit can be mounted, by the direction that its x axis points to.
 MOUNTINGS = {"fore": "ahead", "right": "right", "aft": "aft", "left": "left"}

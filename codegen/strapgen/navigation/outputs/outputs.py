@@ -7,9 +7,9 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import ANY, Signal, after
-from strapgen.kernel.evaluation import Wrapped
+from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_signals import FENNER
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from fractions import Fraction
 
 from strapgen.catalogue.kinematics import DCM
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import CYCLE, Signal, after
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 from strapgen.navigation.redundancy.parity_equations import SEBRING
 
 INCREMENT = Signal.vector(

@@ -10,7 +10,7 @@ import sympy as sp
 
 from strapgen.catalogue.coefficients import Number, root
 from strapgen.ir import checks
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import CYCLE, Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, Triad

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 
 def _recipe(title: str, module: str, function: str, *arguments: Any) -> Recipe:

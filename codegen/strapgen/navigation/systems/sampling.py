@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import ANY, CYCLE, Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.ir.decimals import float_above
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.formats import float_above
 from strapgen.ir.signals import Signal
 from strapgen.navigation.systems.compiled_system import CompiledSystem
 from strapgen.navigation.systems.system_backends import SystemMemory, SystemRunner

@@ -8,8 +8,8 @@ from fractions import Fraction
 
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.navigation.systems.error_propagation import moved
 from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
 from strapgen.navigation.systems.system import Push, SystemStage

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.ir.sources import Function, Sources

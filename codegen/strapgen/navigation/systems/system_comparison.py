@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 from strapgen.navigation.systems.compiled_system import CompiledSystem
 from strapgen.navigation.systems.system_agreement import PassAgreement, agreement, distance
 from strapgen.navigation.systems.system_backends import SystemRun, system_runner

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import CYCLE, Signal
-from strapgen.ir.suggestions import counted
 from strapgen.navigation.systems.ports import Ports
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.instruments.pulses import GILMORE

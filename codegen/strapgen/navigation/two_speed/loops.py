@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from strapgen.catalogue import Choice
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem
 from strapgen.navigation.systems.system_runner import EXACT_BITS, carried

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from strapgen.ir.decimals import above
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.formats import above
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources

@@ -34,7 +34,7 @@ from strapgen.catalogue.kernels.updates import (
     turned_frame,
 )
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 

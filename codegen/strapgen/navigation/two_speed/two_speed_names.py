@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 _MODULE = "strapgen.navigation.two_speed.two_speed_loops"
 
