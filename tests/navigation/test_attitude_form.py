@@ -12,7 +12,7 @@ from commands import run
 
 from strapgen import pipeline
 from strapgen.catalogue import Choice
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab.processors import PROCESSORS
 from strapgen.navigation.attitude_form import attitude_form
 from strapgen.navigation.two_speed import transformation_error
 
