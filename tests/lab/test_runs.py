@@ -95,12 +95,12 @@ def test_decimals_are_exact(make):
         ({"step": 0.1, "duration": 1, "orthonormalize": -1}, "orthonormalize is -1"),
     ],
 )
-def test_times_that_cannot_be_used(times, words):
+def test_invalid_times_are_refused(times, words):
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
         simulate(strapgen.backend("euler"), strapgen.motion("constant", y_deg_s=1), **times)
 
 
-def test_a_run_that_overflows_names_the_samples_that_the_rate_is_extracted_from():
+def test_an_overflowing_run_names_the_rate_extraction():
     # A cone of 5 degrees at 20 Hz, sampled at 100 Hz: the polynomial through eight samples swings far beyond the rate.
     omega, half_angle = 2 * math.pi * 20, math.radians(5)
     cone = strapgen.motion(
@@ -181,7 +181,7 @@ def test_orthonormalization_keeps_the_turned_error_to_second_order():
     assert math.log(apart[0] / apart[1]) / math.log(sizes[0] / sizes[1]) > 1.8
 
 
-def test_a_state_without_a_kernel_for_its_start_begins_at_zero_rotation(monkeypatch):
+def test_an_initial_attitude_without_conversion_kernel_is_refused(monkeypatch):
     backend = strapgen.backend("euler")
     monkeypatch.setattr(backend, "attitude", "dcm-from-thirds")
     with pytest.raises(InputError, match="no kernel converts a matrix to the state of euler-rk4-2"):
@@ -227,7 +227,7 @@ def test_the_drift_is_the_largest_angle_over_the_duration():
     assert drift(runs_of(vectors)) == pytest.approx(360)
 
 
-def test_the_steady_drift_leaves_out_what_swings():
+def test_the_steady_drift_excludes_oscillation():
     time = np.arange(101)
     vectors = np.zeros((101, 3))
     vectors[:, 0] = 1e-6 * time + 1e-3 * (-1.0) ** time
@@ -246,7 +246,7 @@ def short_parts(monkeypatch):
 @pytest.mark.parametrize(
     ("every", "record"), [(None, 1), (3, 1), (3, 7), (8, 50), (20, 3), (None, 11), (49, 49)]
 )
-def test_a_run_in_parts_has_the_bits_of_the_whole(make, every, record, rng, short_parts):
+def test_runs_in_parts_are_bit_identical(make, every, record, rng, short_parts):
     backend = make("euler", largest=0.011, carry="full")
     increments = backend.representable(rng.uniform(-0.011, 0.011, (STEPS, 2, 3)))
     calls = []
@@ -299,7 +299,7 @@ def test_a_refusal_names_the_step_of_the_run(short_parts):
 
 @pytest.mark.parametrize("previous", [0, 1, 3])
 @pytest.mark.parametrize("pulse", [None, 0.01])
-def test_windows_in_parts_are_those_of_the_whole_row(previous, pulse, rng):
+def test_windows_in_parts_equal_those_of_the_whole_row(previous, pulse, rng):
     row = rng.normal(size=(previous + 2 * 20, 3))
     whole = windows(row, 2, previous)
     whole = whole if pulse is None else pulses(whole, pulse, previous)
@@ -309,7 +309,7 @@ def test_windows_in_parts_are_those_of_the_whole_row(previous, pulse, rng):
     np.testing.assert_array_equal(np.concatenate(got), whole)
 
 
-def test_pulses_that_cannot_be_counted_are_refused_in_a_later_part():
+def test_uncountable_pulses_are_refused_in_later_parts():
     part = StepWindows(lambda first, stop: np.full((stop - first, 3), 1e14 * first), 1, 0, 0.1)
     part(0, 5)
     with pytest.raises(InputError, match="more pulses than can be counted"):
