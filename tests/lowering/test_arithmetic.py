@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Reference, walk
 from strapgen.kernel.polynomials import Polynomial
-from strapgen.lowering.arithmetic import (
+from strapgen.lowering.trees import (
     chain,
     expanded,
     gathered,

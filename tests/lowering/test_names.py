@@ -6,7 +6,7 @@ import pytest
 from derived import program
 
 from strapgen.catalogue import Choice
-from strapgen.lowering.names import FACTOR, SHARED, is_temporary, shared_names
+from strapgen.lowering.trees import FACTOR, SHARED, is_temporary, shared_names
 
 
 @pytest.mark.parametrize("name", [f"{SHARED}1", f"{FACTOR}2"])

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from strapgen.analysis.vibration.spectrum import read_spectrum
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.design.environment import (
     Environment,
     Line,

@@ -12,11 +12,10 @@ import sympy as sp
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS
+from strapgen.catalogue.methods.method import increments_signal, label, labels, turns_signal
 from strapgen.catalogue.methods.rate_fit import step_order
 from strapgen.catalogue.methods.runge_kutta import method
-from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX, read
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read
 from strapgen.ir.kernel_info import Order
 from strapgen.kernel.kernel import Kernel
 

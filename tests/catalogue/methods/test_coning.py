@@ -21,7 +21,7 @@ from strapgen import derive
 from strapgen.catalogue import MOST_INCREMENTS, Choice, choose
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods import rotation_series as series
-from strapgen.catalogue.methods.coning import method, sample_terms
+from strapgen.catalogue.methods.coning import by_form, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.ir.fixed_settings import Settings
 from strapgen.kernel.algebra import cross_elements
@@ -201,17 +201,17 @@ def test_combined_coefficients_are_the_nearest_to_uncompressed_ones(samples, pre
 
 @MANY
 def test_orders_of_the_forms(many):
-    assert [method("compressed").step_order(n, 0).step for n in range(1, 9)] == [
+    assert [by_form("compressed").step_order(n, 0).step for n in range(1, 9)] == [
         2,
         4,
         *[3] * 6,
     ]
-    assert [method("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
-    combined = method("combined")
+    assert [by_form("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
+    combined = by_form("combined")
     alone = [n for n, previous in many if previous == 0]
     assert [combined.step_order(n, 0).step for n in alone] == [2, 4, 4, *[6] * (len(alone) - 3)]
     assert [combined.step_order(1, p).step for p in range(4)] == [2, 3, 4, 5]
-    polynomial = method("polynomial")
+    polynomial = by_form("polynomial")
     for samples, previous in many:
         assert polynomial.step_order(samples, previous) == combined.step_order(samples, previous)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.catalogue.methods.crouch_grossman import _NODES, _WEIGHTS
+from strapgen.catalogue.methods.runge_kutta import _NODES, _WEIGHTS
 
 
 def test_the_coefficients_meet_the_conditions_of_third_order_in_time():

@@ -21,7 +21,7 @@ from peano_baker import (
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS
-from strapgen.catalogue.methods import magnus
+from strapgen.catalogue.methods import rotation_series
 from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, evaluate_stages
 
@@ -71,7 +71,7 @@ def test_rates_at_the_nodes_of_gauss_give_the_order_too(algorithm, order):
     kernel = derive(algorithm, f"magnus{order}", rates=True)
     assert kernel.order.extraction is None and kernel.order.step == order
     rate, top = generic_rate(order + 1, field), order + 1
-    nodes = [field.from_sympy(sp.sympify(node)) for node in magnus.method(order).nodes]
+    nodes = [field.from_sympy(sp.sympify(node)) for node in rotation_series.magnus(order).nodes]
     values = dict(zip(kernel.inputs[1].elements, turns(rate, nodes, top), strict=True))
     found = evaluated(kernel, values, kernel.transition, field)
     assert lowest_difference(found, true_rotation(algorithm, rate, top)) == top
@@ -80,7 +80,7 @@ def test_rates_at_the_nodes_of_gauss_give_the_order_too(algorithm, order):
 @pytest.mark.parametrize(("order", "left"), [(4, 2), (6, 2)])
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_commutators_of_the_other_sign_lose_the_order(algorithm, order, left, monkeypatch):
-    monkeypatch.setattr(magnus, "_commutator", algebra.cross)
+    monkeypatch.setattr(rotation_series, "_commutator", algebra.cross)
     kernel = derive(algorithm, f"magnus{order}", 4)
     assert local_error(kernel, generic_rate(5), order + 1) == left + 1
 

@@ -8,8 +8,8 @@ from peano_baker import evaluated, generic_rate, local_error, lowest_difference,
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS
-from strapgen.catalogue.methods import munthe_kaas
-from strapgen.catalogue.methods.munthe_kaas import bortz
+from strapgen.catalogue.methods import runge_kutta
+from strapgen.catalogue.methods.runge_kutta import bortz
 from strapgen.kernel.kernel import evaluate_stages
 
 #: Exact series of many methods: with the long tests.
@@ -78,7 +78,7 @@ def test_the_local_error_is_of_fifth_order(algorithm, count, previous):
 def test_rates_at_the_nodes_give_the_order_too(algorithm):
     kernel = derive(algorithm, "munthe-kaas4", rates=True)
     rate = generic_rate(5)
-    nodes = munthe_kaas.method(4).nodes
+    nodes = runge_kutta.munthe_kaas(4).nodes
     values = dict(zip(kernel.inputs[1].elements, turns(rate, nodes, 6), strict=True))
     found = evaluated(kernel, values, kernel.transition)
     assert lowest_difference(found, true_rotation(algorithm, rate, 6)) == 5
@@ -86,14 +86,14 @@ def test_rates_at_the_nodes_give_the_order_too(algorithm):
 
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_products_of_the_other_sign_lose_the_order(algorithm, monkeypatch):
-    monkeypatch.setattr(munthe_kaas, "cross", lambda u, v: -v.cross(u) * -1)
+    monkeypatch.setattr(runge_kutta, "cross", lambda u, v: -v.cross(u) * -1)
     kernel = derive(algorithm, "munthe-kaas4", 3)
     assert local_error(kernel, generic_rate(3), 6) == 3
 
 
 @pytest.mark.parametrize("products", [0, 1])
 def test_a_series_that_is_cut_too_early_loses_the_order(products, monkeypatch):
-    monkeypatch.setattr(munthe_kaas, "bortz", lambda phi, turn, most: bortz(phi, turn, products))
+    monkeypatch.setattr(runge_kutta, "bortz", lambda phi, turn, most: bortz(phi, turn, products))
     kernel = derive("euler", "munthe-kaas4", 3)
     assert local_error(kernel, generic_rate(3), 6) < 5
 

@@ -28,8 +28,7 @@ from strapgen.catalogue.methods.order_conditions import (
     word_coefficient,
     words,
 )
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

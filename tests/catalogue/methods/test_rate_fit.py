@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from peano_baker import Series, angle, generic_rate, lowest_difference, rotation, true_rotation
 
 from strapgen.catalogue import MOST_INCREMENTS
-from strapgen.catalogue.methods.magnus import method as magnus
 from strapgen.catalogue.methods.rate_fit import Fit, from_increments, from_rates, step_order
+from strapgen.catalogue.methods.rotation_series import magnus
 
 RATIONALS = st.fractions(min_value=-3, max_value=3, max_denominator=20)
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from strapgen import derive
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods.munthe_kaas import bortz
+from strapgen.catalogue.methods.runge_kutta import bortz
 from strapgen.kernel import algebra
 from strapgen.kernel.algebra import cross_elements
 

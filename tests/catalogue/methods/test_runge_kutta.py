@@ -13,8 +13,8 @@ from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
 from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
+from strapgen.catalogue.methods.method import increments_signal
 from strapgen.catalogue.methods.runge_kutta import method
-from strapgen.catalogue.methods.samples import increments_signal
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.exceptions import InputError
 

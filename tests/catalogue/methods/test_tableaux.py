@@ -15,8 +15,7 @@ import strapgen
 from strapgen.catalogue import METHODS, STANDARD_METHODS
 from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.order_conditions import largest_residual
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX, read, verify
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read, verify
 from strapgen.ir.exceptions import InputError
 from strapgen.storage import resources
 

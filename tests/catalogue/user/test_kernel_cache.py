@@ -16,7 +16,7 @@ from users_files import STEP, beside, written
 
 import strapgen
 from strapgen.catalogue import choose
-from strapgen.catalogue.user import kernel_cache, loading
+from strapgen.catalogue.user import loading
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.storage import cache
@@ -246,14 +246,14 @@ def test_what_pickle_does_not_restore_in_every_part_is_not_kept():
     def whole(part: object) -> list:
         return [(Fraction(1, 2), Signal.scalar("x")), (sp.sin(sp.sqrt(x)), part)]
 
-    assert kernel_cache._alike(whole(sp.Integer(3)), whole(sp.Integer(3)))
-    assert kernel_cache._alike(whole(Marked("!")), whole(Marked("!")))
-    assert not kernel_cache._alike(whole(sp.sin(x + 1)), whole(sp.sin(x + 2)))
+    assert loading._alike(whole(sp.Integer(3)), whole(sp.Integer(3)))
+    assert loading._alike(whole(Marked("!")), whole(Marked("!")))
+    assert not loading._alike(whole(sp.sin(x + 1)), whole(sp.sin(x + 2)))
     for other in (sp.Integer(4), sp.Float(3), sp.Symbol("x"), sp.pi, Marked("!")):
-        assert not kernel_cache._alike(whole(other), whole(sp.Integer(3)))
-    assert not kernel_cache._alike(whole(Marked("!")), whole(Marked("?")))
-    assert not kernel_cache._alike((1, 2.0), (1, 2)) and not kernel_cache._alike((1,), (1, 2))
-    assert not kernel_cache._alike(Signal.scalar("x"), Signal.scalar("x", meaning="another"))
+        assert not loading._alike(whole(other), whole(sp.Integer(3)))
+    assert not loading._alike(whole(Marked("!")), whole(Marked("?")))
+    assert not loading._alike((1, 2.0), (1, 2)) and not loading._alike((1,), (1, 2))
+    assert not loading._alike(Signal.scalar("x"), Signal.scalar("x", meaning="another"))
 
 
 def test_text_in_the_cache_is_written_again_without_sympy(file, tmp_path, capsys):
@@ -292,5 +292,5 @@ def test_choices_of_a_kernel_at_hand_and_in_the_cache_are_equal(file):
 def test_a_kernel_that_no_longer_restores_is_derived_again(file, monkeypatch):
     derived = choose(file).user_kernel.kernel
     stored = choose(file)
-    monkeypatch.setattr(kernel_cache.pickle, "loads", lambda data: 1 / 0)
+    monkeypatch.setattr(loading.pickle, "loads", lambda data: 1 / 0)
     assert stored.user_kernel.kernel == derived

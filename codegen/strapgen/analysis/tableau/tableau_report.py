@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from strapgen.catalogue.methods import order_conditions
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.results.display.methods import method_latex
 from strapgen.results.records import INTERNAL
 from strapgen.results.result import Result

@@ -12,7 +12,7 @@ from strapgen.analysis.unknowns.families import Family, PolynomialSolution
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.analysis.unknowns.unknowns_latex import solution_latex, unknown_tableau_latex
 from strapgen.analysis.unknowns.unknowns_report import family_lines, text_of
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
