@@ -255,33 +255,6 @@ def test_what_is_wrong_is_told_in_one_line(said, written):
     assert "\n" not in message and len(message) < 250
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"name = ", "mine.toml is not TOML (Invalid value"),
-        (b'name = "\xff"', "mine.toml is not UTF-8 (byte 8)"),
-        (b"nodes = " + b"[" * 5000, "mine.toml is not TOML ("),
-        (b"order = " + b"9" * 5000, "mine.toml is not TOML ("),
-        (b"#" * 10**6, "mine.toml is over 200000 bytes long"),
-        (b"", "mine.toml: name is missing"),
-        (b"\0", "mine.toml is not TOML ("),
-    ],
-)
-def test_what_is_no_such_file_at_all(content, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("mine.toml").write_bytes(content)
-    with pytest.raises(InputError) as caught:
-        read("mine.toml")
-    assert said in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_what_cannot_be_read(tmp_path):
-    with pytest.raises(InputError, match=r"none\.toml cannot be read \(No such file or directory\)"):
-        read(tmp_path / "none.toml")
-    with pytest.raises(InputError, match=r"cannot be read \(Is a directory\)"):
-        read(tmp_path)
-
-
 def test_tableau_that_misses_a_condition_is_refused_where_it_is_used():
     """Built in or an object of Python: no file is read that would be checked."""
     wrong = replace(TABLEAUX["rk4"], name="wrong", weights=(Fraction(1, 4),) * 2 + (Fraction(1, 6),) * 2)
