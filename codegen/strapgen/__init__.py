@@ -33,11 +33,11 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
+    from strapgen.design import family as _family
     from strapgen.design.commit_late.commit_late import CommitLate as CommitLate
     from strapgen.design.commit_late.late_recording import recording_attitudes as recording_attitudes
     from strapgen.design.commit_late.late_unit import GapError as GapError
     from strapgen.design.commit_late.late_unit import SampleKind as SampleKind
-    from strapgen.design.windows import family as _family
     from strapgen.firmware.check_code.conformance import Finding as Finding
     from strapgen.firmware.check_code.conformance import check as check
     from strapgen.fixedpoint.floating.bounds import rounding_bounds as rounding_bounds
@@ -250,7 +250,7 @@ _NAMESPACES = {
     "tableaux": "catalogue.methods.tableaux",
     "unknowns": "analysis.unknowns.unknowns",
     "vibration": "analysis.vibration",
-    "window_design": "design.windows.family",
+    "window_design": "design.family",
     "windows": "catalogue.methods.windows",
 }
 #: Present names by those of the version before, which give a warning.
