@@ -21,8 +21,8 @@ from strapgen.firmware.verification import _Exact
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.version import VERSION
-from strapgen.run.generated_files import command_of, text_of
-from strapgen.run.generation import Request
+from strapgen.run.kernel_sources import Request
+from strapgen.run.standard_tree import command_of, text_of
 
 NAME = "euler_rk4_2_w32"
 GENERATED = Path(__file__).resolve().parents[2] / "generated" / "c_fixed"

@@ -146,10 +146,10 @@ def _page(
 ) -> str:
     """Run all that a page shows, and return it."""
     from strapgen import catalogue
-    from strapgen.design.frontier import frontier
+    from strapgen.design import frontier
     from strapgen.report import dossier
     from strapgen.report.page import Content, report_page
-    from strapgen.run.versions import versions
+    from strapgen.run.compiler import versions
     from strapgen.storage import cache
 
     shown = choices or catalogue.standard()
