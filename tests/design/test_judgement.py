@@ -14,7 +14,7 @@ import strapgen
 from strapgen.cli import main
 from strapgen.design.brief import BudgetBrief, ProcessorBrief, RecordedEnvironment, read_brief
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import STATES, contenders
+from strapgen.design.selection.candidates import STATES, choice_of, contenders
 from strapgen.design.selection.judgement import CAUSES, Question, in_order, judged, judgements, verdicts
 from strapgen.design.selection.simulated import algorithm_named, run, vibration
 from strapgen.navigation.two_speed.two_speed_selection import TwoSpeedLoops
@@ -75,7 +75,7 @@ def test_every_algorithm_that_may_be_selected_is_a_step_of_every_state(name):
         if one.method == "two-speed" or one.method.startswith("tuned-"):
             continue
         for state in STATES:
-            choice = one.choice(state, str(BRIEFS / f"{name}.toml"))
+            choice = choice_of(one, state, str(BRIEFS / f"{name}.toml"))
             assert (choice.increments, choice.previous, choice.ahead) == (
                 one.increments,
                 one.previous,
@@ -159,8 +159,8 @@ def test_everything_that_meets_a_brief_does_so_in_time_as_well():
 def test_coning_and_quantization_are_the_same_with_every_state():
     path = BRIEFS / "ahrs.toml"
     brief = read_brief(path)
-    for contender in contenders(brief, ["rk2:1", "magnus4:2", "crouch-grossman3:2"]):
-        several = [contender.choice(state, str(path)) for state in STATES]
+    for candidate in contenders(brief, ["rk2:1", "magnus4:2", "crouch-grossman3:2"]):
+        several = [choice_of(candidate, state, str(path)) for state in STATES]
         for cause in (causes.coning, causes.quantization):
             one, other = (cause(choice, brief) for choice in several)
             assert one == pytest.approx(other, rel=1e-9)
@@ -284,8 +284,8 @@ def test_a_recording_has_the_drift_of_the_vibration_that_it_is_of(tmp_path):
         table.writerow(["t", "dx", "dy", "dz"])
         table.writerows([[(k + 1) / float(rate), *row] for k, row in enumerate(rows)])
     recorded = RecordedEnvironment.read(tmp_path / "log.csv")
-    (contender,) = contenders(brief, ["coning-compressed:4"])
-    choice = contender.choice("euler", str(path))
+    (candidate,) = contenders(brief, ["coning-compressed:4"])
+    choice = choice_of(candidate, "euler", str(path))
     expected = strapgen.vibration.of(choice)
     step = causes.step_length(choice, brief.gyro)
     # What is recorded has passed the gyro: 1/|G|^2 of the vibration's coning.

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from strapgen.design.brief import LineEnvironment, read_brief
+from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import Contender, algorithm_of
+from strapgen.design.selection.candidates import algorithm_of
 from strapgen.design.selection.simulated import software_drifts, start_phases
 
 BRIEFS = Path(__file__).resolve().parents[2] / "examples" / "briefs"
@@ -44,9 +45,9 @@ def written(folder, hertz, gyro="", seed=0):
     return path
 
 
-def predicted_and_run(path, contender, state):
+def predicted_and_run(path, candidate, state):
     brief = read_brief(path)
-    algorithm = algorithm_of(contender, state, brief, path)
+    algorithm = algorithm_of(candidate, state, brief, path)
     found = algorithm.rectification()
     at_its_phases = found.at(start_phases(len(brief.environment.lines())))
     run = software_drifts(brief, algorithm)["coning"]
@@ -55,29 +56,29 @@ def predicted_and_run(path, contender, state):
 
 @pytest.mark.parametrize("hertz", FREQUENCIES)
 @pytest.mark.parametrize(
-    ("state", "contender"),
+    ("state", "candidate"),
     [
-        ("euler", Contender("coning-compressed", 2)),
-        ("dcm", Contender("coning-compressed", 1, 2)),
-        ("euler", Contender("coning-combined", 2, 1)),
-        ("dcm", Contender("rk4", 2)),
-        ("euler", Contender("taylor2", 1)),
-        ("euler", Contender("window-3-3", 1, 3, 3)),
-        ("dcm", Contender("two-speed", 4)),
-        ("euler", Contender("two-speed", 2)),
+        ("euler", Candidate("coning-compressed", 2)),
+        ("dcm", Candidate("coning-compressed", 1, 2)),
+        ("euler", Candidate("coning-combined", 2, 1)),
+        ("dcm", Candidate("rk4", 2)),
+        ("euler", Candidate("taylor2", 1)),
+        ("euler", Candidate("window-3-3", 1, 3, 3)),
+        ("dcm", Candidate("two-speed", 4)),
+        ("euler", Candidate("two-speed", 2)),
     ],
 )
 def test_a_prediction_is_that_of_a_run_at_its_phases_and_above_it_at_the_worst(
-    hertz, state, contender, tmp_path
+    hertz, state, candidate, tmp_path
 ):
-    predicted, worst, run = predicted_and_run(written(tmp_path, hertz, GYRO), contender, state)
+    predicted, worst, run = predicted_and_run(written(tmp_path, hertz, GYRO), candidate, state)
     assert predicted == pytest.approx(run, rel=0.01)
     assert worst > 0.99 * run
 
 
 def test_lines_at_one_frequency_depend_on_how_they_begin(tmp_path):
     predicted, worst, run = predicted_and_run(
-        written(tmp_path, ("20", "20")), Contender("coning-compressed", 2), "euler"
+        written(tmp_path, ("20", "20")), Candidate("coning-compressed", 2), "euler"
     )
     assert predicted == pytest.approx(run, rel=0.01)
     assert worst > 1.05 * run
