@@ -21,7 +21,7 @@ from strapgen.design import window_command
 from strapgen.design.commit_late.commit_late_sources import sources
 from strapgen.design.family import written
 from strapgen.ir.exceptions import InputError
-from strapgen.run.generated_files import command_of
+from strapgen.run.standard_tree import command_of
 
 FOLDER = Path(windows.__file__).parent / "window_filters"
 

@@ -82,7 +82,7 @@ class Question:
     candidate: Candidate
 
     def moved(self, begin: Path, end: Path) -> Question:
-        """Return the question with its brief in another folder, see `clusters.Movable`."""
+        """Return the question with its brief in another folder, see `parallel_cases.Bundle`."""
         return replace(self, path=moved(self.path, begin, end))
 
 
