@@ -23,11 +23,15 @@ from strapgen.fixedpoint import function_series
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.recursion import Recursion
-from strapgen.navigation.frame.navigation_names import NAVIGATION
-from strapgen.navigation.instruments.compensation_names import COMPENSATION
-from strapgen.navigation.loops.loop_names import LOOPS
-from strapgen.navigation.outputs.output_names import MOUNTINGS, OUTPUTS, TWO_ROWS
-from strapgen.navigation.redundancy.redundancy_names import REDUNDANCY
+from strapgen.navigation.navigation_kernels import (
+    COMPENSATION,
+    LOOPS,
+    MOUNTINGS,
+    NAVIGATION,
+    OUTPUTS,
+    REDUNDANCY,
+    TWO_ROWS,
+)
 from strapgen.run.backends import Evaluator
 from strapgen.run.c import CEvaluator
 from strapgen.run.fixed import ModelEvaluator

@@ -16,8 +16,7 @@ from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.instruments.gyro_model import source_structure
-from strapgen.navigation.instruments.imu_errors import imu_compensate
+from strapgen.navigation.instruments.imu_errors import imu_compensate, source_structure
 
 #: No term of the error model has products of increments.
 NO_PRODUCTS = {

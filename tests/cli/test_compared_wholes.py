@@ -12,10 +12,9 @@ import pytest
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import described
-from strapgen.navigation.two_speed.loop_files import LoopFiles
-from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+from strapgen.navigation.two_speed.two_speed_runner import LoopFiles, TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import loops
 
 GYRO = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"

@@ -30,9 +30,7 @@ from strapgen.lab.recordings.recording import History
 from strapgen.lab.simulate.runs import Run, simulate
 from strapgen.lab.simulate.runs_plot import history_image, run_image
 from strapgen.lab.simulate.runs_report import HistoryResult, RunResult
-from strapgen.navigation.rate_table.rate_table import Row
-from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
-from strapgen.navigation.rate_table.rate_table_report import RateTableResult
+from strapgen.navigation.rate_table import RateTableResult, Row, rate_table_image
 from strapgen.results import figures as drawing
 from strapgen.thesis.predicted_tables import PredictedEntry
 from strapgen.thesis.predicted_tables_report import PredictedTablesResult

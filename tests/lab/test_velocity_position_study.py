@@ -10,8 +10,7 @@ import pytest
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.specific_forces import force
-from strapgen.navigation.velocity_position import velocity_position_study
-from strapgen.navigation.velocity_position.velocity_position_study import Flight, candidates, study
+from strapgen.navigation.translations import DEFAULT, Flight, candidates, study
 
 
 def flight(backend="numpy", duration="2", hertz=10):
@@ -32,7 +31,7 @@ def test_every_method_has_a_velocity_and_windows_beat_the_recursion():
 
 
 def test_the_default_algorithms_exist():
-    assert len(candidates(velocity_position_study.DEFAULT)) == len(velocity_position_study.DEFAULT)
+    assert len(candidates(DEFAULT)) == len(DEFAULT)
 
 
 def test_fixed_point_adds_rounding_alone():

@@ -20,7 +20,7 @@ from precisions import precision
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen.navigation.frame.earth import Earth, schuler_rate
+from strapgen.navigation.frame.frame_rates import Earth, schuler_rate
 
 EARTH = Earth.sphere(MU, RADIUS, RATE)
 #: Rate in rad/s and specific force in m/s^2 of the great circle, both constant in body axes: about y, and along z.

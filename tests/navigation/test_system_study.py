@@ -11,8 +11,8 @@ from commands import run
 from strapgen.analysis.vibration.spectrum import read_spectrum
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_study
-from strapgen.navigation.systems.system_agreement import agreement
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_comparison import agreement
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.turning_vehicle import TurningVehicle
 from strapgen.navigation.systems.wiring import described
 

@@ -11,7 +11,7 @@ from strapgen.firmware.vectors.cycle_vectors_c import loop_calls
 from strapgen.firmware.vectors.vectors_c import VectorTable
 from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.sources import Sources
-from strapgen.navigation.two_speed.two_speed_c import Wiring
+from strapgen.navigation.two_speed.two_speed_sources import Wiring
 from strapgen.targets.c.number_text import numbers_of, types_of
 from strapgen.targets.registry import BUILT_IN
 from strapgen.targets.rendering import render

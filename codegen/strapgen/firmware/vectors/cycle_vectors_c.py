@@ -8,7 +8,7 @@ from typing import Any
 
 from strapgen.firmware.vectors.vectors_c import file_names
 from strapgen.ir.sources import Sources
-from strapgen.navigation.two_speed.two_speed_c import LOOPS, Wiring
+from strapgen.navigation.two_speed.two_speed_sources import LOOPS, Wiring
 from strapgen.targets.c.number_text import NumberText, numbers_of, types_of
 from strapgen.targets.lines import fill_arguments
 from strapgen.targets.rendering import render

@@ -46,7 +46,7 @@ def _of_system(
     run_differing: bool,
 ) -> tuple[RunsSamples, Settings | None]:
     from strapgen.firmware.verify.whole_verification import sources_of_files
-    from strapgen.navigation.systems.compiled_system import CompiledSystem
+    from strapgen.navigation.systems.system_runner import CompiledSystem
     from strapgen.run.backends import BACKENDS
 
     fit, sources = command.system(algorithms)
@@ -70,9 +70,7 @@ def _of_loops(
 ) -> tuple[RunsSamples, Settings | None]:
     from strapgen.firmware.verify.whole_verification import sources_of_files
     from strapgen.navigation.two_speed import two_speed_sources
-    from strapgen.navigation.two_speed.loop_files import LoopFiles
-    from strapgen.navigation.two_speed.loops import LoopSources
-    from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+    from strapgen.navigation.two_speed.two_speed_runner import LoopFiles, LoopSources, TwoSpeed
 
     request, system = command.two_speed(), description.system
     kernels = two_speed_sources.kernels(request.algorithm, request.sculling)

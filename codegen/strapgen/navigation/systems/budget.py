@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.program import Constant, Node, Operation, Program
+from strapgen.lab.cost import cost as costs
 from strapgen.navigation.systems.fitting import Fitted
 from strapgen.navigation.systems.system import Rate
 from strapgen.targets import TARGETS
@@ -243,3 +245,16 @@ def _is_power(number: Fraction) -> bool:
     """Return whether a number is a power of two."""
     top, bottom = number.numerator, number.denominator
     return top & (top - 1) == 0 and bottom & (bottom - 1) == 0
+
+
+def measured_budget(fit: Fitted, cpu: str) -> Budget:
+    """Return what a system needs, with the instructions of every stage on a processor."""
+    (name,) = costs.processors(None, [cpu])
+    counts = {}
+    for stage, sources in fit.sources.items():
+        try:
+            one = costs.cost(sources, name)
+        except CompilerError as error:
+            raise CompilerError(f"stage {stage}: {error}") from None
+        counts[stage] = one.executed, one.code_bytes, one.stack_bytes
+    return budget(fit, counts, name)

@@ -38,9 +38,9 @@ from strapgen.lab.motions.motions import Motion
 from strapgen.lab.simulate.runs import Run, drift_between
 from strapgen.lab.step_series.quantization_noise import polynomial_noise
 from strapgen.navigation.systems import system_file, system_generation
+from strapgen.navigation.systems.budget import measured_budget
 from strapgen.navigation.systems.fitting import Fitted, fitted
-from strapgen.navigation.systems.system_backends import system_runner
-from strapgen.navigation.systems.system_cost import measured_budget
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.system_runs import simulate_system
 from strapgen.navigation.systems.wiring import Description, wired
 from strapgen.run import exact
