@@ -21,7 +21,7 @@ from strapgen.catalogue.methods import tableaux, windows
 from strapgen.firmware.check_code.foreign_arguments import read_arguments
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.formats import Format
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 from strapgen.lab.recordings import recording
 from strapgen.targets.contract_lines import Contract
 

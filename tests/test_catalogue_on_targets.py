@@ -22,7 +22,7 @@ from strapgen.catalogue import Choice, choose
 from strapgen.fixedpoint import function_series
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.navigation.navigation_kernels import (
     COMPENSATION,
     LOOPS,
@@ -32,8 +32,8 @@ from strapgen.navigation.navigation_kernels import (
     REDUNDANCY,
     TWO_ROWS,
 )
-from strapgen.run.backends import Evaluator
 from strapgen.run.c import CEvaluator
+from strapgen.run.evaluators import Evaluator
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
 

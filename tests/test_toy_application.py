@@ -173,7 +173,7 @@ FAULTS = {
         "names.py",
         "KERNELS = {'twist-z': 3}",
         "derive twist-z",
-        "is of type int; a strapgen.ir.recipe.R",
+        "is of type int; a strapgen.ir.kernel_info.R",
     ),
     "target": (
         "target.py",

@@ -7,7 +7,7 @@ from pathlib import Path
 #: A step whose title tells what was imported for it; the first lines are the test's.
 STEP = """{beginning}
 from fractions import Fraction
-from strapgen.ir.attitude_step import AttitudeStep
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.ir.signals import Signal
 

@@ -41,20 +41,20 @@ if _typing.TYPE_CHECKING:
     from strapgen.firmware.check_code.conformance import Finding as Finding
     from strapgen.firmware.check_code.conformance import check as check
     from strapgen.fixedpoint.floating.bounds import rounding_bounds as rounding_bounds
-    from strapgen.ir.attitude_step import AttitudeStep as AttitudeStep
-    from strapgen.ir.attitude_step import Order as Order
     from strapgen.ir.exceptions import CompilerError as CompilerError
     from strapgen.ir.exceptions import InputError as InputError
     from strapgen.ir.exceptions import InputTypeError as InputTypeError
     from strapgen.ir.exceptions import MissingExtraError as MissingExtraError
     from strapgen.ir.exceptions import StrapgenError as StrapgenError
     from strapgen.ir.fixed_settings import Settings as Settings
-    from strapgen.ir.float_interface import RoundingBounds as RoundingBounds
     from strapgen.ir.formats import Format as Format
     from strapgen.ir.integer_program import FixedProgram as FixedProgram
+    from strapgen.ir.interfaces import RoundingBounds as RoundingBounds
+    from strapgen.ir.kernel_info import AttitudeStep as AttitudeStep
     from strapgen.ir.kernel_info import KernelInfo as KernelInfo
+    from strapgen.ir.kernel_info import Order as Order
+    from strapgen.ir.kernel_info import Recursion as Recursion
     from strapgen.ir.program import Program as Program
-    from strapgen.ir.recursion import Recursion as Recursion
     from strapgen.ir.signals import Signal as Signal
     from strapgen.ir.sources import Sources as Sources
     from strapgen.kernel import algebra as algebra
@@ -170,17 +170,17 @@ _NAMES = {
         "Convergence",
         "converge",
     ),
-    "ir.attitude_step": (
+    "ir.kernel_info": (
         "AttitudeStep",
         "Order",
+        "KernelInfo",
+        "Recursion",
     ),
     "ir.fixed_settings": ("Settings",),
-    "ir.float_interface": ("RoundingBounds",),
+    "ir.interfaces": ("RoundingBounds",),
     "ir.formats": ("Format",),
     "ir.integer_program": ("FixedProgram",),
-    "ir.kernel_info": ("KernelInfo",),
     "ir.program": ("Program",),
-    "ir.recursion": ("Recursion",),
     "ir.signals": ("Signal",),
     "ir.sources": ("Sources",),
     "pipeline": (

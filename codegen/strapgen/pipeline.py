@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
 from strapgen.catalogue import Choice
-from strapgen.ir import stage_arguments
+from strapgen.ir import checks
+from strapgen.ir.checks import some
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.ir.suggestions import some
 from strapgen.ir.timing import timed
 from strapgen.storage.stage_cache import cached
 from strapgen.targets.names import UNNAMED, Naming
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from strapgen.catalogue.choice import AnyMethod
-    from strapgen.ir.recipe import Description
+    from strapgen.ir.kernel_info import Description
     from strapgen.kernel.kernel import Kernel
 
 _DEFAULTS = Settings()
@@ -114,7 +114,7 @@ def derive(
     >>> derive("temperature-coefficient", constants={"slope_above": 0.5, "slope_below": "1/2"}).outputs[0].expressions
     (difference/2 + nominal,)
     """
-    stage_arguments.require("derive", algorithm, str, os.PathLike, Choice)
+    checks.require("derive", algorithm, str, os.PathLike, Choice)
     return catalogue.derive(
         catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants, layout)
     )
@@ -140,7 +140,7 @@ def lower(kernel: Kernel) -> Program:
     from strapgen import lowering  # loads SymPy, as only deriving and lowering do
     from strapgen.kernel.kernel import Kernel
 
-    stage_arguments.require("lower", kernel, Kernel)
+    checks.require("lower", kernel, Kernel)
     kernel.require_known()
     with timed("lower", kernel.name):
         return lowering.lower(kernel)
@@ -166,7 +166,7 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     >>> str(fixed.formats["state"]), float(fixed.error_bounds["next"] * 2**30) < 1
     ('Q1.30', True)
     """
-    stage_arguments.require("quantize", program, Program)
+    checks.require("quantize", program, Program)
     _require_settings(settings)
     with timed("quantize", program.kernel):
         return fixedpoint.quantize(program, settings or Settings())
@@ -193,7 +193,7 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     >>> sorted(generate(lower(derive("euler")), "c").step_files)
     ['euler_rk4_2.c', 'euler_rk4_2.h']
     """
-    stage_arguments.require("generate", program, Program, FixedProgram)
+    checks.require("generate", program, Program, FixedProgram)
     _require_target(target, settings)
     if isinstance(program, Program) and targets.TARGETS[target].fixed:
         program = quantize(program, settings)
@@ -208,11 +208,11 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
 def _require_target(target: Any, settings: Any) -> None:
     if not isinstance(target, str):
         names = some(targets.TARGETS)
-        raise InputTypeError(f"target is {stage_arguments.describe(target)}; a name is needed: {names}")
+        raise InputTypeError(f"target is {checks.describe(target)}; a name is needed: {names}")
     _require_settings(settings)
     targets.require(target, settings)
 
 
 def _require_settings(settings: Any) -> None:
     if settings is not None and not isinstance(settings, Settings):
-        raise InputTypeError(f"settings is {stage_arguments.describe(settings)}; strapgen.Settings is needed")
+        raise InputTypeError(f"settings is {checks.describe(settings)}; strapgen.Settings is needed")

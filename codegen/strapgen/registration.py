@@ -78,7 +78,7 @@ class Registration:
     commands : mapping of str to Command, optional
         Commands by name; one of a group has the name of the group and its own, as "study loops".
     kernels : tuple of str, optional
-        Tables of kernels: mappings of names to `strapgen.ir.recipe.Recipe`, as plain data.
+        Tables of kernels: mappings of names to `strapgen.ir.kernel_info.Recipe`, as plain data.
     methods : tuple of str, optional
         Tables of methods without coefficient files: mappings of names to `strapgen.catalogue.Integrator`.
     tableaux, windows, coning_shapes : tuple of str, optional

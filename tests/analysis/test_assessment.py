@@ -22,7 +22,7 @@ from strapgen.analysis.vibration.mean_rates import D_Y, PARTS, PHI, THETA_X, THE
 from strapgen.analysis.vibration.systems import T_L, T_M, F, T
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.lab.simulate.runs import attitude

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 
-from strapgen.kernel import evaluation
+from strapgen.kernel import algebra
 from strapgen.kernel.power_series import Powers, function
 
 RING, X, Y = sp.ring("x y", sp.QQ)
@@ -21,7 +21,7 @@ def number(value: sp.Rational) -> Powers:
 def evaluated(expression: sp.Expr) -> sp.Expr:
     """Return an expression of a = h x and b = h^2 y as a series."""
     values = {"a": Powers(RING, {1: X}, TOP), "b": Powers(RING, {2: Y}, TOP)}
-    made = evaluation.evaluate(expression, values, number, function)
+    made = algebra.evaluate(expression, values, number, function)
     assert isinstance(made, Powers)
     return sum(part.as_expr() * H**power for power, part in made.parts.items())
 

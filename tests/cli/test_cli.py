@@ -1230,7 +1230,7 @@ def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
         '        transition="transition",', '        transition="transition", order=Order(7, 7, 2, 7),'
     )
     lines = claimed.splitlines()
-    lines.insert(2, "from strapgen.ir.attitude_step import Order")
+    lines.insert(2, "from strapgen.ir.kernel_info import Order")
     (tmp_path / "wrong.py").write_text("\n".join(lines))
     with pytest.raises(SystemExit) as stop:
         main(["check", str(tmp_path / "wrong.py"), "--format", "json"])

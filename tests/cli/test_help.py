@@ -12,7 +12,7 @@ from strapgen import registration
 from strapgen.cli import app, main, top_help
 from strapgen.cli.help import PlainCommand, _label
 from strapgen.cli.help_layout import summary
-from strapgen.ir.suggestions import SYNONYMS
+from strapgen.ir.checks import SYNONYMS
 
 
 def commands(group, path=()):

@@ -24,9 +24,9 @@ from strapgen.design.commit_late.late_unit import LateUnitOnIntegers, state_argu
 from strapgen.design.commit_late.late_unit_in_c import LateUnitInC
 from strapgen.design.commit_late.lost_samples import REACH
 from strapgen.fixedpoint import quantize
-from strapgen.ir.attitude_step import Truncation
-from strapgen.ir.decimals import above
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import above
+from strapgen.ir.kernel_info import Truncation
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.lowering import lower

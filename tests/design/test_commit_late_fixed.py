@@ -13,7 +13,7 @@ from strapgen.design.commit_late.commit_late_sources import kernels
 from strapgen.design.commit_late.late_filters import LateFilters
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 
 FILTERS = LateFilters(WINDOWS["window-7-7"], calm_start=True)
 #: Of a step that is generated more quickly.

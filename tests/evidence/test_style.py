@@ -19,7 +19,7 @@ from strapgen.firmware.project import project, two_speed_project
 from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import table_files
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.storage.files import write_files
 from strapgen.storage.resources import folder as shipped

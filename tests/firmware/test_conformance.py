@@ -61,9 +61,9 @@ import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
-from strapgen.ir.attitude_step import AttitudeStep
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.ir.attitude_step import Order
+from strapgen.ir.kernel_info import Order
 
 def algorithm():
     build = KernelBuilder()

@@ -17,7 +17,7 @@ from strapgen.fixedpoint.sensor_scale import _note, in_counts
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Assignment, Reference
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.run.c import CEvaluator
 from strapgen.run.fixed import ModelEvaluator

@@ -10,7 +10,7 @@ from derived import program, quantized
 
 from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir import decimals
+from strapgen.ir import formats
 from strapgen.ir.fixed_settings import Settings
 from strapgen.targets import contract
 
@@ -57,8 +57,8 @@ def test_bound_that_a_call_attains_is_not_rounded_down():
 def test_rounding_goes_one_way(value):
     for digits in (2, 4, 6):
         for style in "ge":
-            low = Fraction(decimals.below(value, digits, style))
-            high = Fraction(decimals.above(value, digits, style))
+            low = Fraction(formats.below(value, digits, style))
+            high = Fraction(formats.above(value, digits, style))
             assert low < value < high < value + abs(value) / 10 ** (digits - 2)
-    assert Fraction(decimals.float_below(value)) < value < Fraction(decimals.float_above(value))
-    assert value < Fraction(decimals.places_above(value, 3)) <= value + Fraction(1, 1000)
+    assert Fraction(formats.float_below(value)) < value < Fraction(formats.float_above(value))
+    assert value < Fraction(formats.places_above(value, 3)) <= value + Fraction(1, 1000)

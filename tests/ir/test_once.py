@@ -1,6 +1,6 @@
 """A property that is worked out once."""
 
-from strapgen.ir.once import once
+from strapgen.ir.program import once
 
 
 class Counted:

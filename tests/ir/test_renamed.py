@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import strapgen
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 
 OLD = {"Companions": "AttitudeStep", "resolution": "EPSILON"}
 

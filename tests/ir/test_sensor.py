@@ -11,7 +11,7 @@ import pytest
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 
 HUNDREDTH = Fraction(1, 100)
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.ir.signed_digits import from_digits, signed_digits
+from strapgen.ir.formats import from_digits, signed_digits
 
 
 @given(st.integers(-(1 << 63), 1 << 63))

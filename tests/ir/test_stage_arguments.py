@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.ir import stage_arguments
+from strapgen.ir import checks
+from strapgen.ir.checks import some
 from strapgen.ir.exceptions import InputTypeError
-from strapgen.ir.suggestions import some
 from strapgen.lab.recordings import recording
 from strapgen.run import exact
 
@@ -149,17 +149,17 @@ def test_every_wrong_pairing_of_stages_is_told_in_one_line():
 
 
 def test_messages_name_calls_that_exist():
-    tables = (stage_arguments._NEXT, stage_arguments._NAMED, stage_arguments._MAKERS, stage_arguments._TAKERS)
+    tables = (checks._NEXT, checks._NAMED, checks._MAKERS, checks._TAKERS)
     names = [
         found for pair in re.findall(r"strapgen\.(\w+)|'(\w+)\(", str(tables)) for found in pair if found
     ]
     assert {"derive", "lower", "generate", "build", "backend", "motion", "choose", "Settings"} <= set(names)
     assert not set(names) - set(dir(strapgen))
     classes = [
-        *stage_arguments._NEXT,
-        *stage_arguments._MAKERS,
-        *stage_arguments._TAKERS,
-        *(made for _, made in stage_arguments._NEXT.values()),
+        *checks._NEXT,
+        *checks._MAKERS,
+        *checks._TAKERS,
+        *(made for _, made in checks._NEXT.values()),
     ]
     assert not {name for name in classes if name != "str"} - set(dir(strapgen))
 

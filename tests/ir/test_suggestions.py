@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import strapgen
+from strapgen.ir.checks import MOST_NAMES, some, suggestions, unknown
 from strapgen.ir.exceptions import StrapgenError
-from strapgen.ir.suggestions import MOST_NAMES, some, suggestions, unknown
 
 Z = np.zeros((3, 2, 3))
 

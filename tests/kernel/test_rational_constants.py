@@ -14,8 +14,7 @@ from strapgen import derive
 from strapgen.catalogue import Choice, choose
 from strapgen.ir.program import Constant, walk
 from strapgen.ir.signals import Signal
-from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rational_constants import DIGITS, rationalized
+from strapgen.kernel.kernel import DIGITS, Kernel, KernelBuilder, rationalized
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sympy as sp
 
 from strapgen.ir.signals import Signal
+from strapgen.kernel.derivatives import add_tangents
 from strapgen.kernel.kernel import KernelBuilder, evaluate_stages
-from strapgen.kernel.tangents import add_tangents
 
 
 def test_changes_are_derivatives_along_the_change_of_the_inputs():

@@ -14,9 +14,9 @@ import pytest
 from strapgen import catalogue, motion
 from strapgen.catalogue import INTEGRATORS, choose
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.ir.attitude_step import Order
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.kernel_info import Order
 from strapgen.lab.converge import convergence
 from strapgen.lab.converge.convergence import Convergence, Rung, converge
 from strapgen.lab.converge.convergence_report import ConvergenceResult, ladder_table

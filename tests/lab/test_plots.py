@@ -18,8 +18,8 @@ from strapgen.analysis.vibration.vibration_report import VibrationResult
 from strapgen.design.frontier.frontier import MOTIONS, Standing
 from strapgen.design.frontier.frontier_plot import frontier_image
 from strapgen.design.frontier.frontier_report import FrontierResult
-from strapgen.ir.attitude_step import Order
 from strapgen.ir.exceptions import InputError, MissingExtraError
+from strapgen.ir.kernel_info import Order
 from strapgen.lab.compare.comparison import AngleHistory, Comparison
 from strapgen.lab.compare.comparison_plot import comparison_image
 from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult

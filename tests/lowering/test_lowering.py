@@ -14,8 +14,7 @@ from derived import FUNCTIONS, kernel, precisely, program, tells_more
 from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.ir.program import RESOLUTION, Assignment, Constant, Node, Operation, Program, Reference, walk
-from strapgen.kernel.kernel import Kernel
-from strapgen.kernel.rational_constants import rationalized
+from strapgen.kernel.kernel import Kernel, rationalized
 from strapgen.lowering import candidates, canonical
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
 

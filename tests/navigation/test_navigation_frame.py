@@ -12,8 +12,8 @@ from derived import precisely
 
 import strapgen
 from strapgen import derive
+from strapgen.kernel.algebra import cross, rotation
 from strapgen.kernel.kernel import Kernel
-from strapgen.kernel.rotations import cross, rotation
 from strapgen.navigation.frame.frame_rates import AZIMUTHS, Earth
 
 PRECISE = mpmath.mp.clone()

@@ -14,8 +14,8 @@ from navigation.described_files import ATTITUDE, TWO_SPEEDS, description
 from navigation.test_system_bounds import TABLES
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.signals import Signal
 from strapgen.navigation.systems.fitting import Fitted, fitted
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds

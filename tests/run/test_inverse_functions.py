@@ -13,7 +13,7 @@ from precisions import precision
 
 import strapgen
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import Wrapped
+from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import EPSILON, KernelBuilder
 from strapgen.run.backends import BACKENDS, of_sources
 

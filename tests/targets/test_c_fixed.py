@@ -15,9 +15,9 @@ from fixed_inputs import corners_and_random
 
 from strapgen import build, generate
 from strapgen.catalogue import Choice
-from strapgen.ir.decimals import above, places_above
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import above, places_above
 from strapgen.run.c import CEvaluator
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.targets.c_fixed.statements import _noted

@@ -14,7 +14,7 @@ from small_programs import TYPES, computed
 import strapgen
 from strapgen import generate
 from strapgen.catalogue import Choice
-from strapgen.ir import decimals
+from strapgen.ir import formats
 from strapgen.ir.fixed_settings import Settings
 from strapgen.run.c import CEvaluator
 from strapgen.storage import resources
@@ -164,7 +164,7 @@ def test_numbers_of_a_header_are_rounded_away_from_what_they_bound(digits):
     drawn = [Fraction(int(a), int(b)) for a, b in rng.integers(1, 1 << 40, (200, 2))]
     for size in (*drawn, *(x / (1 << 60) for x in drawn), *(x * 10**20 for x in drawn), Fraction(7, 1000)):
         for number in (size, -size):
-            low, high = Fraction(decimals.below(number, digits)), Fraction(decimals.above(number, digits))
+            low, high = Fraction(formats.below(number, digits)), Fraction(formats.above(number, digits))
             assert low <= number <= high
             assert high - low <= size / 10 ** (digits - 1)
-    assert decimals.above(Fraction(1, 3)) == "0.333334"
+    assert formats.above(Fraction(1, 3)) == "0.333334"

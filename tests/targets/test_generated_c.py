@@ -15,7 +15,7 @@ import pytest
 from strapgen import pipeline
 from strapgen.catalogue import standard
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.units import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.storage import resources
 

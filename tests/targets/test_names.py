@@ -23,9 +23,9 @@ import strapgen
 from strapgen import targets
 from strapgen.catalogue.user import admission
 from strapgen.fixedpoint import quantize
-from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources

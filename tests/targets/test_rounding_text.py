@@ -9,7 +9,7 @@ import pytest
 from derived import programs
 
 from strapgen.fixedpoint.floating import rounding_bounds
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.targets import emit
 from strapgen.targets.c.rounding_text import rounding_text
 

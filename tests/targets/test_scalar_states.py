@@ -10,7 +10,7 @@ import pytest
 import strapgen
 from strapgen import KernelBuilder, Signal
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import after
 from strapgen.kernel.kernel import Kernel
 from strapgen.run.backends import of_sources

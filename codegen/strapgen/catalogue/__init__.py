@@ -21,7 +21,7 @@ from strapgen.catalogue.method_names import (
 from strapgen.catalogue.methods.integrators import Integrator
 from strapgen.catalogue.methods.method_spec import MOST_BESIDE, MOST_INCREMENTS
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, reserved
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 __all__ = [
     "ALGORITHMS",

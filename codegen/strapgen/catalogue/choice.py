@@ -13,8 +13,8 @@ from strapgen.catalogue.methods.method_spec import MethodSpec
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
 from strapgen.catalogue.user_kernel import UserKernel
+from strapgen.ir.kernel_info import Description
 from strapgen.ir.notebook_display import full_text, short_repr
-from strapgen.ir.recipe import Description
 
 if TYPE_CHECKING:
     from strapgen.kernel.kernel import Kernel

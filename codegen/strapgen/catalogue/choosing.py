@@ -28,9 +28,9 @@ from strapgen.catalogue.methods.windows import EXACT
 from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, reserved
 from strapgen.catalogue.user import loading
 from strapgen.ir import checks
+from strapgen.ir.checks import some
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.recipe import Description
-from strapgen.ir.suggestions import some
+from strapgen.ir.kernel_info import Description
 
 if TYPE_CHECKING:
     from strapgen.catalogue.constants import Constants

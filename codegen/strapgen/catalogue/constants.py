@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 from strapgen.ir import checks
+from strapgen.ir.checks import shown
 from strapgen.ir.exceptions import InputTypeError
-from strapgen.ir.suggestions import shown
 
 #: Constants as a value: the name of each input with its numbers in row-major order, sorted by the names.
 Constants: TypeAlias = tuple[tuple[str, tuple[Fraction, ...]], ...]

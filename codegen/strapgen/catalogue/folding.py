@@ -8,10 +8,10 @@ from dataclasses import replace
 import sympy as sp
 
 from strapgen.catalogue.constants import Constants, number_text, options
+from strapgen.ir.checks import counted, needed, unknown
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
-from strapgen.ir.suggestions import counted, needed, unknown
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel, Stage
 
 #: Parts of an expression without a real value.

@@ -15,7 +15,7 @@ import sympy as sp
 
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 
 THESIS = "MIT Measurement Systems Laboratory thesis on NASA grant NGR 22-009-229"
 SAVAGE = "P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3"
@@ -73,15 +73,13 @@ class Kinematics:
 
 def cayley_klein_derivative(a: sp.Matrix, g: sp.Matrix) -> sp.Matrix:
     """Return da/dt from dU/dt = i (g . s) U, where g is half the body rate."""
-    turning = sp.I * sum((g[k] * rotations.PAULI[k] for k in range(3)), sp.zeros(2, 2))
-    return rotations.cayley_klein_parameters(turning * rotations.cayley_klein_matrix(a))
+    turning = sp.I * sum((g[k] * algebra.PAULI[k] for k in range(3)), sp.zeros(2, 2))
+    return algebra.cayley_klein_parameters(turning * algebra.cayley_klein_matrix(a))
 
 
 def cayley_klein_product(a: sp.Matrix, p: sp.Matrix) -> sp.Matrix:
     """Return the parameters of the matrix product P U of the transition P and the state U."""
-    return rotations.cayley_klein_parameters(
-        rotations.cayley_klein_matrix(p) * rotations.cayley_klein_matrix(a)
-    )
+    return algebra.cayley_klein_parameters(algebra.cayley_klein_matrix(p) * algebra.cayley_klein_matrix(a))
 
 
 def _scalar_first(q: sp.Matrix) -> list[sp.Expr]:
@@ -117,9 +115,9 @@ DCM = Kinematics(
     ),
     identity=sp.eye(3),
     scale=sp.Integer(1),
-    derivative=lambda C, g: C * rotations.skew(g),
+    derivative=lambda C, g: C * algebra.skew(g),
     product=lambda C, A: C * A,
-    exponential=rotations.rotation,
+    exponential=algebra.rotation,
     orthonormalize="dcm-orthonormalize",
     attitude=None,
 )
@@ -152,9 +150,9 @@ EULER = Kinematics(
     ),
     identity=sp.Matrix([0, 0, 0, 1]),
     scale=sp.Rational(1, 2),
-    derivative=lambda e, g: rotations.quaternion_product(e, sp.Matrix([*g, 0])),
-    product=rotations.quaternion_product,
-    exponential=rotations.quaternion,
+    derivative=lambda e, g: algebra.quaternion_product(e, sp.Matrix([*g, 0])),
+    product=algebra.quaternion_product,
+    exponential=algebra.quaternion,
     orthonormalize="euler-normalize",
     attitude="dcm-from-euler",
 )
@@ -189,7 +187,7 @@ CAYLEY_KLEIN = Kinematics(
     scale=sp.Rational(1, 2),
     derivative=cayley_klein_derivative,
     product=cayley_klein_product,
-    exponential=lambda v, *rest: sp.Matrix(_scalar_first(rotations.quaternion(v, *rest))),
+    exponential=lambda v, *rest: sp.Matrix(_scalar_first(algebra.quaternion(v, *rest))),
     orthonormalize="cayley-klein-normalize",
     attitude="dcm-from-cayley-klein",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from strapgen.catalogue.method_names import ALGORITHMS, VECTORS
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 from strapgen.registry import Registry
 
 #: Kernels that take no method.

@@ -26,9 +26,9 @@ from functools import cache
 from typing import Annotated, Any, ClassVar, Protocol, Union, get_args, get_origin, get_type_hints
 
 from strapgen.catalogue import coefficients
-from strapgen.ir import checks, suggestions
+from strapgen.ir import checks
+from strapgen.ir.checks import alternatives, counted, unknown
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import alternatives, counted, unknown
 
 #: Fractions take no time to read, and those of filters for a gyro are long.
 _FRACTION, _MOST_CHARACTERS = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?"), 4000
@@ -116,7 +116,7 @@ def shown(value: Any) -> str:
     if isinstance(value, list):
         text = f"[{', '.join(map(shown, value))}]"
         return text if len(text) <= 60 else f"{text[:60]}..."
-    return suggestions.shown(value) if isinstance(value, str) else str(value).lower()
+    return checks.shown(value) if isinstance(value, str) else str(value).lower()
 
 
 def refused(where: str, value: Any, words: str) -> InputError:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from strapgen.ir.notebook_display import full_text
 
 if TYPE_CHECKING:
-    from strapgen.ir.attitude_step import AttitudeStep
+    from strapgen.ir.kernel_info import AttitudeStep
     from strapgen.kernel.kernel import Kernel, Stage
 
 

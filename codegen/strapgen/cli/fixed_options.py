@@ -29,7 +29,7 @@ RUN_OPTIONS = (
 
 def _rate_of_a_count(option: str, text: str) -> str:
     """Read a rate with its unit."""
-    from strapgen.ir.sensor import Sensor
+    from strapgen.ir.units import Sensor
 
     if text.strip().endswith("rad"):
         raise InputError(f"{option} is {text}, an angle a count; --lsb-rad takes it, without its unit")
@@ -135,7 +135,7 @@ class FixedOptions:
             metavar="NAME",
             help="How products with a constant are computed: product, or shift-add for sums of shifted terms.  "
             "[default: product]",
-            read=names("strapgen.ir.signed_digits:MULTIPLICATIONS"),
+            read=names("strapgen.ir.formats:MULTIPLICATIONS"),
         ),
     ] = None
     digits: Annotated[

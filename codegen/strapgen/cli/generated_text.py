@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from strapgen.ir.decimals import above, places_above
-from strapgen.ir.fixed_interface import Interface
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.formats import above, places_above
+from strapgen.ir.interfaces import Interface, RoundingBounds
 from strapgen.ir.signals import CYCLE, after
 from strapgen.ir.sources import Sources
 from strapgen.targets.contract import argument_text

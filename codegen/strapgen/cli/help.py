@@ -9,8 +9,8 @@ from typing import Any
 from typer.core import TyperCommand, TyperGroup
 
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
+from strapgen.ir.checks import alternatives, suggestions
 from strapgen.ir.exceptions import StrapgenError
-from strapgen.ir.suggestions import alternatives, suggestions
 
 
 class PlainCommand(TyperCommand):

@@ -11,8 +11,8 @@ import typer
 
 from strapgen.cli.options import option
 from strapgen.ir import checks
+from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import alternatives
 
 if TYPE_CHECKING:
     from strapgen.results.result import Result

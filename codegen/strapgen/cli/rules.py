@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence, Sized
 from typing import Any, NamedTuple, TypeVar
 
 from strapgen.cli.values import written
+from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import alternatives
 
 
 class CommandLine(NamedTuple):

@@ -22,8 +22,8 @@ from strapgen.evidence.balls import ball, column_of, multiplied, outcome, outcom
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
-from strapgen.ir.angle_accumulation import AngleAccumulation
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.interfaces import AngleAccumulation
 from strapgen.ir.program import Program
 from strapgen.run.fixed import ModelEvaluator
 

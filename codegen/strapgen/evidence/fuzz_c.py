@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets.c.number_text import numbers_of, types_of
 from strapgen.targets.definitions import word_literal

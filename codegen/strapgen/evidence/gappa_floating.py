@@ -14,7 +14,7 @@ from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression
 from strapgen.fixedpoint.floating.number_formats import NUMBERS
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import is_power_of_two
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import RESOLUTION, Program
 from strapgen.kernel import polynomials
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.ir.fixed_interface import Argument, Interface
+from strapgen.ir.interfaces import Argument, Interface
 from strapgen.lab.motions.motions import GENERAL, Motion, motion
 from strapgen.run.backends import evaluator
 

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import Interface
 from strapgen.ir.program import Operation, Program, walk
 
 __all__ = ["OPERATIONS", "FixedProgram", "Format", "Interface", "Settings", "can_lower", "quantize"]

@@ -16,10 +16,10 @@ from strapgen.fixedpoint.quantities import (
     is_power_of_two,
 )
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Value
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import Signal
 

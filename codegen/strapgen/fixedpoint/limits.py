@@ -10,12 +10,12 @@ from fractions import Fraction
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import TURNING, Settings, rounded_limit
 from strapgen.ir.formats import Format, finest
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
-from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
+from strapgen.ir.units import Sensor
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
 from strapgen.fixedpoint.sums import lower_sum
 from strapgen.fixedpoint.words.alignment import aligning
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, operation_counts, used_by
+from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import CYCLE, Signal
 

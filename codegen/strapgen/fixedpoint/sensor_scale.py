@@ -25,8 +25,8 @@ from strapgen.ir.program import (
     references,
     walk,
 )
-from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
+from strapgen.ir.units import Sensor
 
 #: Changes of a weight that are tried, the smallest first: none stays where no other costs less.
 _CHANGES = sorted(range(-6, 7), key=abs)

@@ -14,10 +14,9 @@ from strapgen.fixedpoint.quantization_context import Quantization, integer_value
 from strapgen.fixedpoint.terms import Aligned, Placed, aligned, binary, largest_wide, nearest, up
 from strapgen.fixedpoint.words.filters import Factor, filter_words, nearest_word
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import ErrorFeedback
-from strapgen.ir.formats import Format, finest
+from strapgen.ir.formats import Format, finest, from_digits, signed_digits
 from strapgen.ir.integer_program import Coefficient, IntegerSum, Term, Value
-from strapgen.ir.signed_digits import from_digits, signed_digits
+from strapgen.ir.interfaces import ErrorFeedback
 
 
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:

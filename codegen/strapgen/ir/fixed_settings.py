@@ -11,10 +11,9 @@ from typing import Any
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.formats import SHORTEST_WORD, Format, check_rounding, check_word
+from strapgen.ir.formats import MULTIPLICATIONS, SHORTEST_WORD, Format, check_rounding, check_word
 from strapgen.ir.notebook_display import short_repr
-from strapgen.ir.sensor import DEFAULT_BITS, Sensor
-from strapgen.ir.signed_digits import MULTIPLICATIONS
+from strapgen.ir.units import DEFAULT_BITS, Sensor
 
 #: Rounding errors that are fed back from step to step.
 CARRIES = {

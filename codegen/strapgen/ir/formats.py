@@ -1,9 +1,11 @@
-"""`Format` is a fixed-point format: a word, its fraction bits, and the notation Qm.n."""
+"""Forms of numbers: fixed-point formats Qm.n, signed digits of constants, decimals on the safe side of a bound."""
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 
 from strapgen.ir import checks
@@ -110,3 +112,71 @@ def check_word(word: int) -> int:
 def check_rounding(rounding: str) -> str:
     """Return the name of a rounding if it is known."""
     return checks.choice("rounding", rounding, ROUNDINGS)
+
+
+#: How products with a constant are computed, and what that is in words.
+MULTIPLICATIONS = {
+    "product": "by the processor's multiplication",
+    "shift-add": "as sums of shifted terms, by the canonical signed digits of the constant",
+}
+
+
+def signed_digits(value: int, most: int = 0) -> tuple[tuple[int, int], ...]:
+    """Return the canonical signed digits of an integer, of which no two are neighbours: the `most` largest, 0 for all.
+
+    Each has a sign and a power of two.
+
+    >>> signed_digits(7), signed_digits(-11), signed_digits(1365, 2)
+    (((1, 3), (-1, 0)), ((-1, 4), (1, 2), (1, 0)), ((1, 10), (1, 8)))
+    """
+    digits: list[tuple[int, int]] = []
+    rest, power = abs(value), 0
+    while rest:
+        if rest & 1:
+            digit = 2 - (rest & 3)
+            digits.append((digit if value > 0 else -digit, power))
+            rest -= digit
+        rest >>= 1
+        power += 1
+    digits.reverse()
+    return tuple(digits[:most] if most else digits)
+
+
+def from_digits(digits: tuple[tuple[int, int], ...]) -> int:
+    """Return the integer that digits stand for."""
+    return sum(sign << power for sign, power in digits)
+
+
+def above(value: Fraction, digits: int = 6, style: str = "g") -> str:
+    """Return a decimal number that is not below a value; the style "e" has a power of ten in any case.
+
+    >>> above(Fraction(2, 3)), above(Fraction(-2, 3), 2), above(Fraction(1, 3000), 3, "e")
+    ('0.666667', '-0.66', '3.34e-04')
+    """
+    return _rounded(value, digits, style, ROUND_CEILING)
+
+
+def below(value: Fraction, digits: int = 6, style: str = "g") -> str:
+    """Return a decimal number that is not above a value, see `above`."""
+    return _rounded(value, digits, style, ROUND_FLOOR)
+
+
+def _rounded(value: Fraction, digits: int, style: str, rounding: str) -> str:
+    quotient = Context(digits, rounding).divide(Decimal(value.numerator), Decimal(value.denominator))
+    return f"{float(quotient):.{digits - (style == 'e')}{style}}"
+
+
+def places_above(value: Fraction, places: int = 4) -> str:
+    """Return a number with so many decimal places that is not below a value."""
+    return f"{Decimal(math.ceil(value * 10**places)).scaleb(-places):.{places}f}"
+
+
+def float_above(value: Fraction) -> float:
+    """Return a float that is not below a value."""
+    near = float(value)
+    return near if Fraction(near) >= value else math.nextafter(near, math.inf)
+
+
+def float_below(value: Fraction) -> float:
+    """Return a float that is not above a value."""
+    return -float_above(-value)

@@ -11,9 +11,8 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any, TypeVar
 
-from strapgen.ir.decimals import above, float_above, float_below
-from strapgen.ir.fixed_interface import ErrorFeedback, Interface
-from strapgen.ir.formats import Format
+from strapgen.ir.formats import Format, above, float_above, float_below
+from strapgen.ir.interfaces import ErrorFeedback, Interface
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.program import Program

@@ -12,15 +12,38 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar, overload
 
-from strapgen.ir.attitude_step import AttitudeStep
-from strapgen.ir.kernel_info import KernelInfo
+from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import notebook_html, short_repr
-from strapgen.ir.once import once
-from strapgen.ir.recursion import Recursion
 from strapgen.ir.renamed import renamed
 from strapgen.ir.signals import Signal
+
+T = TypeVar("T")
+
+
+class once(Generic[T]):  # noqa: N801 - a decorator
+    """A property that is worked out when it is first read, for objects of which there are hundreds of thousands.
+
+    It is `functools.cached_property` without the lock that Python 3.11 takes for every value; where threads read one
+    at once, each may work it out.
+    """
+
+    def __init__(self, function: Callable[[Any], T]) -> None:
+        self._function, self._name = function, function.__name__
+        self.__doc__ = function.__doc__
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> once[T]: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type) -> T: ...
+
+    def __get__(self, instance: object | None, owner: type) -> once[T] | T:
+        if instance is None:
+            return self
+        value = instance.__dict__[self._name] = self._function(instance)
+        return value
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Self
 
-from strapgen.ir.attitude_step import AttitudeStep
-from strapgen.ir.fixed_interface import Interface
-from strapgen.ir.float_interface import RoundingBounds
-from strapgen.ir.kernel_info import KernelInfo
+from strapgen.ir.interfaces import Interface, RoundingBounds
+from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import notebook_html, short_repr
-from strapgen.ir.recursion import Recursion
 from strapgen.ir.renamed import renamed
 from strapgen.ir.signals import Signal
 

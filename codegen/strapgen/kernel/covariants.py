@@ -19,9 +19,8 @@ from typing import Any
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross_elements, dot, exact
 from strapgen.kernel.polynomials import ONE, Monomial, Polynomial, add, substitute
-from strapgen.kernel.rotations import cross_elements, dot
 
 #: The covariant that a coefficient multiplies: () is a scalar or the unit matrix; (i,) is vector i; (i, j) is the cross
 #: product i x j in a vector and the symmetrized product of i and j in a matrix; (i, j, k) is the symmetrized product

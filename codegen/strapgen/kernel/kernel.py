@@ -8,16 +8,14 @@ from typing import Any
 
 import sympy as sp
 
-from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.kernel_info import KernelInfo
+from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import counted_shape, notebook_latex, short_repr
 from strapgen.ir.program import RESOLUTION
-from strapgen.ir.recursion import Recursion
 from strapgen.ir.renamed import current, renamed
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import unknown_values
-from strapgen.kernel.evaluation import evaluate
+from strapgen.kernel import reading
+from strapgen.kernel.algebra import evaluate
 
 #: The distance from 1 to the next number of the target that a kernel is lowered for; 0 in exact arithmetic.
 EPSILON = sp.Symbol(RESOLUTION, real=True)
@@ -223,7 +221,7 @@ class Kernel(KernelInfo):
         >>> kernel.substitute({"a": "1/2"}).expand(), kernel.substitute({"a": "b/2"}).unknowns
         ({'sum': [b + w/2]}, ('b',))
         """
-        chosen = unknown_values.read(f"kernel {self.name}", self.unknowns, values)
+        chosen = reading.values_of_unknowns(f"kernel {self.name}", self.unknowns, values)
 
         def replaced(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
             return tuple(Stage(s.signal, tuple(x.xreplace(chosen) for x in s.expressions)) for s in stages)
@@ -231,7 +229,7 @@ class Kernel(KernelInfo):
         stages, outputs = replaced(self.stages), replaced(self.outputs)
         if any(x.has(sp.nan, sp.zoo) for stage in (*stages, *outputs) for x in stage.expressions):
             raise InputError(f"kernel {self.name} divides by zero with these values of its unknowns")
-        remaining = unknown_values.remaining(self.unknowns, chosen)
+        remaining = reading.remaining_unknowns(self.unknowns, chosen)
         return replace(self, stages=stages, outputs=outputs, unknowns=remaining)
 
 
@@ -371,3 +369,64 @@ class KernelBuilder:
 
 def _expressions(items: Iterable[Any] | Sequence[Any]) -> tuple[sp.Expr, ...]:
     return tuple(sp.sympify(item) for item in items)
+
+
+@dataclass(frozen=True)
+class _Degree:
+    """The degree of a polynomial; sums and products of degrees follow those of the polynomials."""
+
+    value: int
+
+    def __add__(self, other: _Degree) -> _Degree:
+        return max(self, other, key=lambda degree: degree.value)
+
+    def __mul__(self, other: _Degree) -> _Degree:
+        return _Degree(self.value + other.value)
+
+    def __pow__(self, exponent: int) -> _Degree:
+        return _Degree(self.value * exponent)
+
+
+def degree(stages: Iterable[Stage], variables: Iterable[str], results: Sequence[str]) -> int | None:
+    """Return an upper bound of the degree of the elements `results` in the variables; None if they are no polynomials.
+
+    >>> from strapgen import derive
+    >>> step = derive("euler", "rk4", increments=2)
+    >>> degree(step.stages, [e for s in step.inputs for e in s.elements], ["p_x", "p_s"])
+    4
+    """
+    try:
+        known = evaluate_stages(stages, {name: _Degree(1) for name in variables}, lambda number: _Degree(0))
+        return max(int(known[name].value) for name in results)
+    except (AttributeError, TypeError, ValueError):  # SymPy's errors where no sum or product is left
+        return None
+
+
+#: Decimal digits of a rounded constant: twice those of the arithmetic that programs are compared with.
+DIGITS = 80
+
+
+def rationalized(kernel: Kernel) -> Kernel:
+    """Return a kernel with its irrational constants rounded and a note that says so; itself if it has none."""
+    stages, outputs = (tuple(map(_rounded_stage, group)) for group in (kernel.stages, kernel.outputs))
+    if stages == kernel.stages and outputs == kernel.outputs:
+        return kernel
+    note = f"Irrational constants are rounded to {DIGITS} digits, and once more to the format of the target."
+    return replace(kernel, stages=stages, outputs=outputs, notes=(*kernel.notes, note))
+
+
+def _rounded_stage(stage: Stage) -> Stage:
+    return replace(stage, expressions=tuple(map(_rounded, stage.expressions)))
+
+
+def _rounded(expression: sp.Expr) -> sp.Expr:
+    numbers = expression.atoms(sp.Pow, sp.NumberSymbol, sp.Function)
+    if not any(part.is_number and not part.is_Rational for part in numbers):
+        return expression  # rebuilding it could make SymPy multiply it out
+    if expression.is_number:
+        return sp.Rational(sp.N(expression, DIGITS))
+    if expression.is_Mul:  # all its numbers together are one constant
+        numbers, rest = expression.as_independent(*expression.free_symbols, as_Add=False)
+        if numbers != 1:
+            return sp.Mul(_rounded(numbers), _rounded(rest))
+    return expression.func(*map(_rounded, expression.args))

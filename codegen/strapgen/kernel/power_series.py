@@ -14,7 +14,7 @@ import sympy as sp
 from sympy.polys.polyerrors import CoercionFailed
 
 from strapgen.ir.program import RESOLUTION
-from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.algebra import Direction, Wrapped
 from strapgen.kernel.kernel import Kernel, evaluate_stages
 
 _NO_SERIES = "the square root of a series that begins with 0 is no series"
@@ -233,7 +233,7 @@ def outputs(kernel: Kernel, values: Mapping[str, Powers], ring: Any, top: int) -
 
 
 def function(expression: sp.Expr, arguments: list[Any]) -> Any:
-    """Evaluate a function, power, maximum or condition of series, for `strapgen.kernel.evaluation.evaluate`."""
+    """Evaluate a function, power, maximum or condition of series, for `strapgen.kernel.algebra.evaluate`."""
     if isinstance(expression, sp.Pow):
         return _power(arguments[0], expression.exp)
     if isinstance(expression, sp.Max):

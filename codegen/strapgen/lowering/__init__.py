@@ -13,8 +13,7 @@ from dataclasses import replace
 from itertools import count
 
 from strapgen.ir.program import Assignment, Node, Program, Reference, Result
-from strapgen.kernel.kernel import Kernel, Stage
-from strapgen.kernel.rational_constants import rationalized
+from strapgen.kernel.kernel import Kernel, Stage, rationalized
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
 from strapgen.lowering.passes import PASSES, cost, optimize

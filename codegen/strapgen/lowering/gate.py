@@ -15,7 +15,7 @@ from sympy.core.relational import GreaterThan, LessThan, StrictGreaterThan, Stri
 
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.algebra import Direction, Wrapped
 from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
 from strapgen.lowering.names import FACTOR

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 _SHAPES = {"sphere": "a sphere", "ellipsoid": "an ellipsoid"}
 _AZIMUTHS = {"wander": "wander azimuth", "free": "free azimuth", "north": "north-slaved"}

@@ -13,7 +13,7 @@ import sympy as sp
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import ANY, Signal
-from strapgen.kernel.evaluation import Wrapped
+from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_rates import FENNER
 

@@ -24,9 +24,9 @@ from strapgen.results import figures
 from strapgen.results.result import Result
 from strapgen.results.table import ERROR, Column, TextTable
 from strapgen.run.backends import BACKENDS, evaluator
-from strapgen.run.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.increments import pulses, windows
+from strapgen.run.registry import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 
 Array = NDArray[np.float64]
 

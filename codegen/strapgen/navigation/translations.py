@@ -27,7 +27,8 @@ from strapgen.results import figures
 from strapgen.results.records import INTERNAL, entry, properties, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import TextTable
-from strapgen.run.backends import BACKENDS, Backend, Evaluator, backend, evaluator
+from strapgen.run.backends import BACKENDS, Backend, backend, evaluator
+from strapgen.run.evaluators import Evaluator
 from strapgen.run.increments import windows
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.evidence.subjects import Subject
-from strapgen.ir.decimals import above, below
+from strapgen.ir.formats import above, below
 from strapgen.ir.integer_program import FixedProgram, used_by
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.report.dossier import AlgorithmDossier

@@ -14,10 +14,10 @@ import numpy as np
 from strapgen import catalogue
 from strapgen.catalogue import Choice
 from strapgen.catalogue.choice import AnyMethod
-from strapgen.ir import checks, stage_arguments
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.fixed_interface import Interface
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import Entry
@@ -516,7 +516,7 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    stage_arguments.require("evaluator", kernel, str, Choice)
+    checks.require("evaluator", kernel, str, Choice)
     checks.choice("backend", backend, BACKENDS)
     if isinstance(kernel, str):
         checks.choice("kernel", kernel, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
@@ -575,7 +575,7 @@ def backend(
     >>> backend(catalogue.choose("dcm", "rk2"), backend="c").name
     'c'
     """
-    stage_arguments.require("backend", algorithm, str, os.PathLike, Choice)
+    checks.require("backend", algorithm, str, os.PathLike, Choice)
     checks.choice("backend", backend, BACKENDS)
     choice = catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
     if orthonormalization is not None:
@@ -621,5 +621,5 @@ def build(sources: Sources, orthonormalization: str | None = None) -> Backend:
     >>> build(generate(lower(derive("euler")), "numpy")).name
     'numpy'
     """
-    stage_arguments.require("build", sources, Sources)
+    checks.require("build", sources, Sources)
     return Backend(StepSources(sources, None, orthonormalization))

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir import checks
+from strapgen.ir.checks import counted, needed
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
+from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.sources import Sources
-from strapgen.ir.suggestions import counted, needed
 
 Array = NDArray[Any]
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from strapgen import pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir import checks, stage_arguments
+from strapgen.ir import checks
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import OPERATIONS, Program
 from strapgen.ir.sources import Sources
@@ -138,7 +138,7 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
     >>> propagate(lower(derive("euler")), np.full((2, 2, 3), 0.01))[-1].round(6)
     array([0.019996, 0.019996, 0.019996, 0.9994  ])
     """
-    stage_arguments.require("propagate", program, Program)
+    checks.require("propagate", program, Program)
     step = Backend(StepSources(sources_of_program(program, "exact")))
     return step.propagate(checks.numbers("increments", increments), initial=initial)
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import TARGETS

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from strapgen.ir.decimals import above, below, places_above
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface, RoundingAccumulation
 from strapgen.ir.fixed_settings import TURNING, Settings
-from strapgen.ir.formats import Format
+from strapgen.ir.formats import Format, above, below, places_above
 from strapgen.ir.integer_program import FixedProgram, Value
+from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface, RoundingAccumulation
 from strapgen.ir.program import Program
-from strapgen.ir.sensor import Sensor
 from strapgen.ir.signals import Signal
+from strapgen.ir.units import Sensor
 
 
 def argument_text(argument: Argument) -> str:

@@ -13,10 +13,9 @@ from fractions import Fraction
 from itertools import zip_longest
 from typing import ClassVar
 
-from strapgen.ir.decimals import above
-from strapgen.ir.fixed_interface import Argument
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.formats import above
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import Argument, RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.ir.version import VERSION

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.targets.printer import Printer

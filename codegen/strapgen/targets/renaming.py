@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
-from strapgen.ir.fixed_interface import Argument, ErrorFeedback, Interface
 from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
+from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 

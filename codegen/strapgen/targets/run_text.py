@@ -7,9 +7,8 @@ import re
 from fractions import Fraction
 from functools import partial
 
-from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
-from strapgen.ir.decimals import above, below
-from strapgen.ir.fixed_interface import Interface
+from strapgen.ir.formats import above, below
+from strapgen.ir.interfaces import LARGEST_ERROR, AngleAccumulation, Interface
 from strapgen.ir.program import Program
 from strapgen.targets.contract import accumulation_text
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen import derive
-from strapgen.kernel.rotations import cross
+from strapgen.kernel.algebra import cross
 
 
 def test_rotation_compensation_comes_out_of_the_product_rule():

@@ -17,7 +17,7 @@ from strapgen.catalogue.methods.runge_kutta import method
 from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
 from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.methods.tableaux import TABLEAUX, read
-from strapgen.ir.attitude_step import Order
+from strapgen.ir.kernel_info import Order
 from strapgen.kernel.kernel import Kernel
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)

@@ -8,7 +8,7 @@ import sympy as sp
 
 import strapgen
 from strapgen import derive
-from strapgen.kernel.rotations import cross_elements
+from strapgen.kernel.algebra import cross_elements
 from strapgen.run.backends import BACKENDS
 
 RING, T, *SYMBOLS = sp.ring(

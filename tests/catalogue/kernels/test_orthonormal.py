@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import strapgen
 from strapgen import derive, lower
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 
 EPS = np.finfo(float).eps
 SCHEME = "dcm-orthonormalize"
@@ -276,7 +276,7 @@ def test_orthogonality_and_length_of_rows_make_the_whole_correction():
 def test_errors_of_rows_turn_with_the_navigation_frame_and_those_of_columns_with_the_body():
     # (40), from dC/dt = C (w x) - (W x) C (38): rows are preferred, since the navigation frame turns slowly.
     C = GENERAL
-    w, W = (rotations.skew(sp.Matrix(sp.symbols(f"{name}:3"))) for name in "wW")
+    w, W = (algebra.skew(sp.Matrix(sp.symbols(f"{name}:3"))) for name in "wW")
     rate = C * w - W * C
     rows, columns = sp.eye(3) - C * C.T, sp.eye(3) - C.T * C
     rows_rate, columns_rate = -(rate * C.T + C * rate.T), -(rate.T * C + C.T * rate)
@@ -312,8 +312,8 @@ def test_first_order_normalization_is_the_sources(name):
     # (41), (42): the error is q q* - 1, and half of its product with q is taken away.
     e = sp.Symbol("e")
     q = sp.Matrix(sp.symbols("x y z s"))
-    error = rotations.quaternion_product(q, rotations.quaternion_conjugate(q)) - sp.Matrix([0, 0, 0, 1])
-    wanted = q - rotations.quaternion_product(error, q) / 2
+    error = algebra.quaternion_product(q, algebra.quaternion_conjugate(q)) - sp.Matrix([0, 0, 0, 1])
+    wanted = q - algebra.quaternion_product(error, q) / 2
     first = name == "cayley-klein"  # the scalar
     state = [q[3], *q[:3]] if first else list(q)
     made = sp.Matrix(apply(f"{name}-normalize-first-order", state))

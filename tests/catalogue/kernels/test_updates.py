@@ -13,7 +13,7 @@ import strapgen
 from strapgen import derive
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.ir.fixed_settings import Settings
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.run.backends import BACKENDS
 
 ORDERS = [1, 2, 3, 4, 5, 7, pytest.param(12, marks=pytest.mark.long)]
@@ -36,11 +36,11 @@ def test_the_series_cut_off_is_taylors_step_on_one_increment(algorithm, order):
 def test_fifth_order_stops_where_the_source_says():
     # f1 after the fourth power of the angle, f2 after the second; f3 and f4 in the half angle.
     x = sp.Symbol("x")
-    assert sp.expand(rotations.wave_series(x**2, 1, 5) - (1 - x**2 / 6 + x**4 / 120)) == 0
-    assert sp.expand(rotations.wave_series(x**2, 2, 5) - (sp.Rational(1, 2) - x**2 / 24)) == 0
+    assert sp.expand(algebra.wave_series(x**2, 1, 5) - (1 - x**2 / 6 + x**4 / 120)) == 0
+    assert sp.expand(algebra.wave_series(x**2, 2, 5) - (sp.Rational(1, 2) - x**2 / 24)) == 0
     v = sp.Matrix(sp.symbols("v1:4"))
-    A = rotations.dot(v, v)
-    q = rotations.quaternion(v, 4)
+    A = algebra.dot(v, v)
+    q = algebra.quaternion(v, 4)
     assert sp.expand(q[3] - (1 - A / 8 + A**2 / 384)) == 0
     assert (q[:3, :] - v * (1 - A / 24) / 2).expand() == sp.zeros(3, 1)
 
@@ -51,7 +51,7 @@ def test_both_series_begin_as_the_functions(order):
     for first, function in ((1, sp.sin(x) / x), (2, (1 - sp.cos(x)) / x**2), (0, sp.cos(x))):
         if first <= order:
             whole = sp.series(function, x, 0, order - first + 1).removeO()
-            assert sp.expand(rotations.wave_series(x**2, first, order) - whole) == 0
+            assert sp.expand(algebra.wave_series(x**2, first, order) - whole) == 0
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -60,13 +60,13 @@ def test_the_navigation_frame_is_the_sources(order):
     theta = sp.Matrix(sp.symbols("theta_x theta_y theta_z", real=True))
     made = derive(f"dcm-navigation-update-{order}")
     C = sp.Matrix(3, 3, [sp.Symbol(n, real=True) for n in made.inputs[0].elements])
-    K = rotations.skew(theta)
+    K = algebra.skew(theta)
     wanted = (sp.eye(3) - K + (order - 1) * K * K / 2) * C
     assert (sp.Matrix(3, 3, made.expand()["next"]) - wanted).expand() == sp.zeros(3, 3)
     made = derive(f"euler-navigation-update-{order}")
     q = sp.Matrix([sp.Symbol(n, real=True) for n in made.inputs[0].elements])
-    r = sp.Matrix([*(-theta / 2), 1 - (order - 1) * rotations.dot(theta, theta) / 8])
-    wanted = rotations.quaternion_product(r, q)
+    r = sp.Matrix([*(-theta / 2), 1 - (order - 1) * algebra.dot(theta, theta) / 8])
+    wanted = algebra.quaternion_product(r, q)
     assert (sp.Matrix(made.expand()["next"]) - wanted).expand() == sp.zeros(4, 1)
 
 
@@ -210,7 +210,7 @@ def test_what_is_cut_off_at_a_tenth_of_a_radian(name, order):
     values |= dict(zip(update.inputs[1].elements, x * axis, strict=True))
     made = [sp.expand(c) for c in update.expand(values)["next"]]
     if name == "dcm":
-        K = rotations.skew(axis)
+        K = algebra.skew(axis)
         whole = list(sp.eye(3) + sp.sin(x) * K + (1 - sp.cos(x)) * K * K)
     else:
         whole = [*(sp.sin(x / 2) * axis), sp.cos(x / 2)]

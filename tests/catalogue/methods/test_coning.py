@@ -24,7 +24,7 @@ from strapgen.catalogue.methods import rotation_series as series
 from strapgen.catalogue.methods.coning import method, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.ir.fixed_settings import Settings
-from strapgen.kernel.rotations import cross_elements
+from strapgen.kernel.algebra import cross_elements
 from strapgen.run import exact
 from strapgen.run.backends import BACKENDS, evaluator
 

@@ -22,7 +22,7 @@ from peano_baker import (
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS
 from strapgen.catalogue.methods import magnus
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, evaluate_stages
 
 #: Exact series of many methods: with the long tests.
@@ -80,7 +80,7 @@ def test_rates_at_the_nodes_of_gauss_give_the_order_too(algorithm, order):
 @pytest.mark.parametrize(("order", "left"), [(4, 2), (6, 2)])
 @pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 def test_commutators_of_the_other_sign_lose_the_order(algorithm, order, left, monkeypatch):
-    monkeypatch.setattr(magnus, "_commutator", rotations.cross)
+    monkeypatch.setattr(magnus, "_commutator", algebra.cross)
     kernel = derive(algorithm, f"magnus{order}", 4)
     assert local_error(kernel, generic_rate(5), order + 1) == left + 1
 
@@ -88,14 +88,14 @@ def test_commutators_of_the_other_sign_lose_the_order(algorithm, order, left, mo
 def test_the_published_coning_correction_of_two_increments():
     # J. W. Jordan, NASA TN D-5384 (1969); R. B. Miller, J. Guid. Control Dyn. 6 (1983) 287: 2/3 of the cross product.
     found, (d1, d2) = rotation_vector(derive("euler", "magnus4", 2))
-    cross = rotations.cross_elements(list(d1), list(d2))
+    cross = algebra.cross_elements(list(d1), list(d2))
     assert found == [a + b + sp.Rational(2, 3) * c for a, b, c in zip(d1, d2, cross, strict=True)]
 
 
 def test_the_published_coning_correction_with_one_previous_increment():
     # 1/12 of the previous increment times the present one: the two-sample algorithm of a slow gyro (Jordan 1969).
     found, (past, d) = rotation_vector(derive("euler", "magnus4", 1, previous=1))
-    cross = rotations.cross_elements(list(past), list(d))
+    cross = algebra.cross_elements(list(past), list(d))
     assert found == [a + sp.Rational(1, 12) * c for a, c in zip(d, cross, strict=True)]
 
 

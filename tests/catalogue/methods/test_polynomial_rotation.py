@@ -15,8 +15,8 @@ from derived import turns
 import strapgen
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER
 from strapgen.catalogue.methods import polynomial_rotation
-from strapgen.kernel import rotations
-from strapgen.kernel.evaluation import evaluate
+from strapgen.kernel import algebra
+from strapgen.kernel.algebra import evaluate
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.lab.motions.reference_attitudes import KNOT, ReferenceAttitude
 
@@ -67,7 +67,7 @@ def test_the_rotation_is_that_of_the_polynomial(parts):
 def test_all_parameters_are_of_the_same_rotation():
     euler, cayley_klein = transition(EULER, 8), transition(CAYLEY_KLEIN, 8)
     np.testing.assert_allclose(cayley_klein, [euler[3], *euler[:3]], atol=1e-15)
-    matrix = rotations.quaternion_matrix(sp.Matrix(euler))
+    matrix = algebra.quaternion_matrix(sp.Matrix(euler))
     np.testing.assert_allclose(np.array(matrix, float), transition(DCM, 8).reshape(3, 3), atol=1e-15)
 
 

@@ -13,7 +13,7 @@ from peano_baker import Series, generic_rate, lowest_difference, matrix, rotatio
 
 from strapgen.catalogue.methods import rotation_series
 from strapgen.catalogue.methods.rotation_series import legendre_terms, terms
-from strapgen.kernel.rotations import cross_elements, dot
+from strapgen.kernel.algebra import cross_elements, dot
 
 
 def vectors(count: int) -> list[list[Fraction]]:

@@ -10,8 +10,8 @@ import sympy as sp
 from strapgen import derive
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.munthe_kaas import bortz
-from strapgen.kernel import rotations
-from strapgen.kernel.rotations import cross_elements
+from strapgen.kernel import algebra
+from strapgen.kernel.algebra import cross_elements
 
 A = sp.Symbol("alpha", positive=True)
 #: alpha . w, and the coefficients of the derivative of alpha along w, alpha x w and alpha.
@@ -46,7 +46,7 @@ def vanishes(expression: sp.Expr) -> bool:
 
 def test_the_quaternion_is_that_of_the_derivation():
     # h = f3 alpha + f4 with f3 = sin(alpha/2)/alpha, f4 = cos(alpha/2): algebra.quaternion along one axis.
-    h = rotations.quaternion(sp.Matrix([A, 0, 0]))
+    h = algebra.quaternion(sp.Matrix([A, 0, 0]))
     assert sp.simplify(h[0].rewrite(sp.sin) - sp.sin(A / 2)) == 0
     assert (h[1], h[2], h[3]) == (0, 0, sp.cos(A / 2))
 
@@ -76,16 +76,16 @@ def test_bortz_equation_is_that_of_the_codes_quaternions():
     # Component by component: the derivative of the quaternion of alpha, where alpha obeys (20), is the product h w / 2
     # of the kinematics, its order and signs included.
     alpha, w = (sp.Matrix(sp.symbols(f"{name}x {name}y {name}z")) for name in "aw")
-    first = rotations.cross(alpha, w)
-    rate = w + first / 2 + BRACKET * rotations.cross(alpha, first)
+    first = algebra.cross(alpha, w)
+    rate = w + first / 2 + BRACKET * algebra.cross(alpha, first)
     f3, f4 = sp.sin(A / 2) / A, sp.cos(A / 2)
-    angle_rate = rotations.dot(alpha, rate) / A
+    angle_rate = algebra.dot(alpha, rate) / A
     derivative = sp.Matrix([*(sp.diff(f3, A) * angle_rate * alpha + f3 * rate), sp.diff(f4, A) * angle_rate])
     wanted = EULER.derivative(sp.Matrix([*(f3 * alpha), f4]), EULER.scale * w)
     for x, y in zip(derivative, wanted, strict=True):
         polynomial = sp.Poly(halved(x - y), *alpha, *w)
         # The square of the last component is what the others leave of the square of the angle.
-        square = sp.Poly(rotations.dot(alpha, alpha) - A**2, *alpha, *w)
+        square = sp.Poly(algebra.dot(alpha, alpha) - A**2, *alpha, *w)
         rest = sp.rem(polynomial, square, alpha[2])
         assert all(map(vanishes, sp.Poly(rest, *alpha, *w).coeffs()))
 

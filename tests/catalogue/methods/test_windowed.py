@@ -15,9 +15,9 @@ from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS, named_window, read
 from strapgen.design.windows.family import FamilyBrief, design
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
-from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.kernel_info import Truncation
 from strapgen.lab.simulate.drift import angles, drift, steady_drift
 from strapgen.lab.simulate.runs import largest_increment
 
@@ -69,7 +69,7 @@ def rotation_vector(name: str, samples: list[Vector]) -> Vector:
     kernel = derive("rotation-vector", name)
     flat = [element for sample in samples for element in sample]
     values = dict(zip(kernel.inputs[0].elements, flat, strict=True))
-    (phi,) = kernel.expand({n: strapgen.kernel.evaluation.exact(x) for n, x in values.items()}).values()
+    (phi,) = kernel.expand({n: strapgen.kernel.algebra.exact(x) for n, x in values.items()}).values()
     return [Fraction(int(x.p), int(x.q)) for x in phi]
 
 

@@ -148,7 +148,7 @@ def test_what_a_file_says_now_counts(folder):
 STEP = """
 from fractions import Fraction
 import sympy as sp
-from strapgen.ir.attitude_step import AttitudeStep
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage
 from strapgen.ir.signals import Signal
 

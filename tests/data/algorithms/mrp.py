@@ -7,9 +7,9 @@ import sympy as sp
 from strapgen.catalogue.methods.runge_kutta import advance
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.ir.attitude_step import AttitudeStep
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "M. D. Shuster, J. Astronaut. Sci. 41 (1993) 439-517"
@@ -20,14 +20,14 @@ STATE = Signal.vector(
 
 def slope(s, w):
     """Return ds/dt for the body rate w."""
-    return (1 - rotations.dot(s, s)) * w / 4 + rotations.cross(s, w) / 2 + rotations.dot(s, w) * s / 2
+    return (1 - algebra.dot(s, s)) * w / 4 + algebra.cross(s, w) / 2 + algebra.dot(s, w) * s / 2
 
 
 def attitude():
     """Return the kernel of the direction cosine matrix."""
     build = KernelBuilder()
     s = build.input(STATE)
-    S, square = rotations.skew(s), rotations.dot(s, s)
+    S, square = algebra.skew(s), algebra.dot(s, s)
     matrix = sp.eye(3) + (8 * S * S + 4 * (1 - square) * S) / (1 + square) ** 2
     build.output(Signal.matrix("attitude", "C", meaning="direction cosine matrix, body to reference"), matrix)
     return build.kernel("dcm-from-mrp", "Direction cosine matrix from modified Rodrigues parameters", SOURCE)

@@ -4,10 +4,10 @@ from fractions import Fraction
 
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
-from strapgen.ir.attitude_step import AttitudeStep
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross
 
 
 def algorithm():

@@ -16,7 +16,7 @@ from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.fixedpoint.floating.bounds import _accumulation
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.float_interface import RoundingBounds, StepRounding
+from strapgen.ir.interfaces import RoundingBounds, StepRounding
 from strapgen.ir.program import Program
 
 #: Kernels without a bound, and why.

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 import strapgen
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint import quantize
-from strapgen.ir.angle_accumulation import LARGEST_ERROR
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import LARGEST_ERROR
 from strapgen.ir.program import Operation, Program
 from strapgen.run import exact
 from strapgen.run.backends import KEEP_THE_ATTITUDE

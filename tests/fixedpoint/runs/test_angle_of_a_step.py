@@ -23,7 +23,7 @@ from strapgen.fixedpoint.runs.angle_accumulation import (
     _turning,
     _unsteadiness,
 )
-from strapgen.ir.angle_accumulation import LARGEST_ERROR
+from strapgen.ir.interfaces import LARGEST_ERROR
 from strapgen.ir.signals import Signal
 
 HALF = Fraction(1, 2)

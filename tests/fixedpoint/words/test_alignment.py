@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from strapgen.fixedpoint.words.alignment import aligning
-from strapgen.ir.fixed_interface import ErrorFeedback
 from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Scaled, Term, Value
+from strapgen.ir.interfaces import ErrorFeedback
 
 ZERO = Fraction(0)
 

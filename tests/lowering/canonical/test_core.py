@@ -9,9 +9,9 @@ import sympy as sp
 from strapgen import catalogue, derive
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, walk
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import dot, quaternion_product, skew
 from strapgen.kernel.covariants import NotCovariantError
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import dot, quaternion_product, skew
 from strapgen.lowering import lower
 from strapgen.lowering.canonical import extract_core
 from strapgen.lowering.canonical.core import Core, decompose, extract, verify

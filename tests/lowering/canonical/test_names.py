@@ -9,9 +9,9 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.samples import increments_signal
-from strapgen.ir.attitude_step import AttitudeStep
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.lowering import lower
 
@@ -24,12 +24,12 @@ def two_sample(stage: str, prefix: str, transition: tuple[str, ...], increments:
     d = build.input(replace(increments_signal(2), elements=elements))
     first, second = d[0, :].T, d[1, :].T
     total = build.stage(Signal.vector(stage, prefix), first + second)
-    phi = build.stage(Signal.vector("phi", "phi"), total + sp.Rational(2, 3) * rotations.cross(first, second))
+    phi = build.stage(Signal.vector("phi", "phi"), total + sp.Rational(2, 3) * algebra.cross(first, second))
     p = build.stage(
         Signal("p", (4,), transition),
-        [*(phi * (sp.Rational(1, 2) - rotations.dot(phi, phi) / 48)), 1 - rotations.dot(phi, phi) / 8],
+        [*(phi * (sp.Rational(1, 2) - algebra.dot(phi, phi) / 48)), 1 - algebra.dot(phi, phi) / 8],
     )
-    build.output(EULER.next, rotations.quaternion_product(state, p))
+    build.output(EULER.next, algebra.quaternion_product(state, p))
     attitude_step = AttitudeStep("euler-product", "euler-normalize", "dcm-from-euler", (0, 0, 0, 1))
     return build.kernel("two-sample", "Two samples", "this test", transition="p", attitude_step=attitude_step)
 

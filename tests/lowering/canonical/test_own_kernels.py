@@ -8,8 +8,8 @@ import sympy as sp
 
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import cross, dot, quaternion_product, skew
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross, dot, quaternion_product, skew
 from strapgen.lowering import candidates, canonical, lower
 from strapgen.lowering.passes import cost, optimize
 

@@ -10,9 +10,9 @@ import pytest
 from derived import kernel
 
 from strapgen.catalogue import Choice
+from strapgen.kernel.algebra import cross_elements, dot
 from strapgen.kernel.kernel import evaluate_stages
 from strapgen.kernel.polynomials import Polynomial
-from strapgen.kernel.rotations import cross_elements, dot
 from strapgen.lowering.canonical import extract_core
 from strapgen.lowering.canonical.vector_form import Sum, VectorForm, vector_form
 

@@ -20,8 +20,8 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.kernel.algebra import cross_elements, dot
 from strapgen.kernel.polynomials import Polynomial
-from strapgen.kernel.rotations import cross_elements, dot
 from strapgen.lab.motions.motion_files import is_file
 from strapgen.lab.step_series import one_step
 from strapgen.lab.step_series.one_step import Step

@@ -22,7 +22,7 @@ from strapgen.analysis.series.notation import sum_text, vector_texts
 from strapgen.analysis.series.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.power_series import Powers
 from strapgen.lab.step_series import one_step
 from strapgen.results.records import INTERNAL, Record, entry
@@ -119,9 +119,9 @@ def _drift(matrix: sp.Matrix) -> sp.Matrix:
 
 def _swing(drift: sp.Matrix, axis: sp.Matrix) -> sp.Matrix:
     """Return the integral of a drift rate that turns with a frame, without its component along the axis."""
-    square = rotations.dot(axis, axis)
-    across = drift - rotations.dot(drift, axis) / square * axis
-    turned = rotations.cross(axis, drift)
+    square = algebra.dot(axis, axis)
+    across = drift - algebra.dot(drift, axis) / square * axis
+    turned = algebra.cross(axis, drift)
     length = sp.sqrt(sp.expand(square))
     return across.applyfunc(_short) * sp.sin(length * TIME) / length + turned.applyfunc(_short) * (
         1 - sp.cos(length * TIME)
@@ -160,9 +160,9 @@ def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
         (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
         Powers(extended, {}, top),
     )
-    determinant = rotations.dot(m[0], rotations.cross_elements(m[1], m[2]))
+    determinant = algebra.dot(m[0], algebra.cross_elements(m[1], m[2]))
     axis = [extended.from_expr(sp.expand(x)) for x in error.axis]
-    square = rotations.dot(axis, axis)
+    square = algebra.dot(axis, axis)
     value = Powers(extended, {0: y}, top)
     shifts: dict[int, tuple[sp.Expr, sp.Expr]] = {}
     for power in range(first, top + 1):

@@ -18,7 +18,7 @@ from strapgen import catalogue
 from strapgen.analysis.series.motion_rates import CONSTANT
 from strapgen.analysis.series.series import PARTS, STEP
 from strapgen.catalogue import Choice
-from strapgen.kernel import evaluation, rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, evaluate_stages
 from strapgen.kernel.power_series import Powers, constant, field, function
 from strapgen.lab.step_series import one_step
@@ -83,7 +83,7 @@ class ConstantRate:
                 return constant(ring, value, top)
 
             cosine, sine = (
-                evaluation.evaluate(part, angle, number, function)
+                algebra.evaluate(part, angle, number, function)
                 for part in (_plain(self.cosine), _plain(self.sine))
             )
             # d atan2(s, c) = (c ds - s dc) / (c^2 + s^2)
@@ -113,7 +113,7 @@ class ConstantRate:
 
     def _errors(self, stretch: sp.Expr, along: sp.Expr) -> dict[str, list[sp.Expr]]:
         rate = sp.Matrix(CONSTANT)
-        length = sp.sqrt(rotations.dot(rate, rate))
+        length = sp.sqrt(algebra.dot(rate, rate))
         here = {ANGLE: length * STEP}
         gained = _product(
             stretch.subs(here), along.subs(here), self.angle_lost.subs(here), STEPS, *(rate / length)
@@ -130,7 +130,7 @@ def _product(stretch: sp.Expr, along: sp.Expr, lost: sp.Expr, steps: sp.Expr, *a
     """Return the computed matrix times the transposed true one, after a number of steps about a unit vector."""
     u = sp.Matrix(axis)
     projection = u * u.T
-    turned = sp.cos(steps * lost) * (sp.eye(3) - projection) - sp.sin(steps * lost) * rotations.skew(u)
+    turned = sp.cos(steps * lost) * (sp.eye(3) - projection) - sp.sin(steps * lost) * algebra.skew(u)
     return along**steps * projection + stretch**steps * turned
 
 

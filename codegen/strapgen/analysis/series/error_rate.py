@@ -21,7 +21,7 @@ from strapgen.analysis.series.invariants import invariants
 from strapgen.analysis.series.motion_rates import TIME
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.covariants import NotCovariantError
 from strapgen.kernel.power_series import Powers
 from strapgen.lab.step_series import one_step
@@ -116,7 +116,7 @@ def _steady(attitude_step: Step, motion: str, top: int) -> ErrorRate:
     back = one_step.true_matrix(ring, [[ring.from_expr(sp.expand(x)) for x in turning]], top)
     raw = _logarithm(_product(step, _product(_square(true), _square(back))))
     axis = model.rate(sp.S.Zero, *symbols) + turning
-    skew = rotations.skew(axis)
+    skew = algebra.skew(axis)
     matrices = {}
     for power in range(1, top):
         parts = [[element.parts.get(power + 1, ring.zero) for element in row] for row in raw]

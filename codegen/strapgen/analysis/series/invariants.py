@@ -13,8 +13,8 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Decomposition, Frame
-from strapgen.kernel.evaluation import exact
 from strapgen.kernel.polynomials import Polynomial
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients
-from strapgen.kernel.evaluation import exact
 from strapgen.kernel.polynomials import Polynomial
 
 #: Denominators from here on are those of rounded decimals.

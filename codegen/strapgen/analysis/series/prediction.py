@@ -17,7 +17,7 @@ from strapgen.analysis.series.error_rate import ErrorRate, error_rate
 from strapgen.analysis.series.motion_rates import TIME, parameters
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.lab.motions.motions import Motion
 from strapgen.run import exact
 from strapgen.run.exact import interpreter
@@ -189,7 +189,7 @@ def _turning(
     rates: ErrorRate, compiled: dict[int, Callable[..., Matrix]], settings: list[Any], h: Any
 ) -> Transfer:
     """Return the growth of the product between two times for a frame that turns at a constant rate."""
-    axis = sp.lambdify(parameters(rates.motion), rotations.skew(rates.axis), "mpmath")(*settings)
+    axis = sp.lambdify(parameters(rates.motion), algebra.skew(rates.axis), "mpmath")(*settings)
     whole = axis + _sum(compiled, h, [*settings, mpmath.mpf(0)])
     spans: dict[Fraction, Matrix] = {}
 

@@ -21,8 +21,8 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel import power_series, reading
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
-from strapgen.kernel.evaluation import exact
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab.step_series import one_step, sampled_motion

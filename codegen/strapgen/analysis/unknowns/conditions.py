@@ -19,8 +19,8 @@ from strapgen.analysis.series.notation import covariant_text
 from strapgen.analysis.unknowns.demands import Demand
 from strapgen.analysis.unknowns.families import Equation
 from strapgen.ir.exceptions import InputError
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Frame
-from strapgen.kernel.evaluation import exact
 from strapgen.kernel.power_series import Powers
 from strapgen.lab.step_series import one_step, sampled_motion
 from strapgen.lab.step_series.one_step import Step

@@ -9,10 +9,10 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.ir.suggestions import counted
-from strapgen.kernel import power_series, unknown_values
+from strapgen.kernel import power_series, reading
 from strapgen.results.records import entry, properties
 
 
@@ -154,7 +154,7 @@ def shown(polynomial: sp.Expr) -> str:
 
 def member(family: Family, what: str, parameters: Mapping[str, Any]) -> dict[str, sp.Expr]:
     """Return the values of all unknowns of a family that parameters fix."""
-    chosen = unknown_values.read(what, tuple(symbol.name for symbol in family.free), parameters)
+    chosen = reading.values_of_unknowns(what, tuple(symbol.name for symbol in family.free), parameters)
     for excluded in family.nonzero:
         if sp.expand(excluded.subs(chosen)) == 0:
             raise InputError(f"{what}: {shown(excluded)} is 0 with these values; the family excludes it")

@@ -21,7 +21,7 @@ from strapgen.catalogue.toml_models import Key, parse, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.kernel import reading, unknown_values
+from strapgen.kernel import reading
 from strapgen.kernel.power_series import field
 
 #: Highest order for which conditions with unknowns are solved, and most stages.
@@ -138,8 +138,8 @@ class UnknownTableau:
         InputError
             If an unknown has no value, a coefficient is too large or divides by zero, or a condition does not hold.
         """
-        chosen = unknown_values.read(f"tableau {self.title}", self.unknowns, values)
-        if left := unknown_values.remaining(self.unknowns, chosen):
+        chosen = reading.values_of_unknowns(f"tableau {self.title}", self.unknowns, values)
+        if left := reading.remaining_unknowns(self.unknowns, chosen):
             raise InputError(f"tableau {self.title}: {', '.join(left)} has no value")
 
         def known(row: Sequence[sp.Expr]) -> list[str]:

@@ -20,8 +20,8 @@ from strapgen.analysis.series.notation import TEXT, covariant_text, with_forces
 from strapgen.analysis.unknowns.demands import Demand
 from strapgen.analysis.unknowns.families import Equation
 from strapgen.ir.exceptions import InputError
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
-from strapgen.kernel.evaluation import exact
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab.step_series import sampled_motion

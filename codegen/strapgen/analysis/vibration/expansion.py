@@ -10,9 +10,8 @@ import sympy as sp
 
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel import power_series
-from strapgen.kernel.kernel import Kernel
+from strapgen.kernel.kernel import Kernel, rationalized
 from strapgen.kernel.power_series import Powers
-from strapgen.kernel.rational_constants import rationalized
 
 #: An exact number: an element of a field of SymPy.
 Number = Any

@@ -13,7 +13,7 @@ from strapgen.analysis.vibration.response import Form, Pair
 from strapgen.analysis.vibration.systems import ANGLES, F
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 
 
 def through_gyro(

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from strapgen.analysis.vibration.mean_rates import Assessment, Rates
 from strapgen.analysis.vibration.quadrature import integrate
 from strapgen.ir import checks
+from strapgen.ir.checks import counted, needed
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import short_repr
-from strapgen.ir.suggestions import counted, needed
 from strapgen.lab.recordings import delimited
 
 Array = NDArray[Any]

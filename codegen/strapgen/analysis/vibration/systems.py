@@ -17,7 +17,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers
 

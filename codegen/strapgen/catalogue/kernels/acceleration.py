@@ -10,9 +10,9 @@ from strapgen.catalogue.kernels.coning_sculling import ANGLE_SUM, SCULLING, VELO
 from strapgen.catalogue.kernels.updates import NAVIGATION_ROTATION
 from strapgen.catalogue.kinematics import DCM_MEANING, KINEMATICS, SAVAGE, UNIT
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 
 TRANSFORMED = Signal.vector(
     "transformed",
@@ -41,7 +41,7 @@ def rotated(build: KernelBuilder, name: str, state: sp.Matrix, u: sp.Matrix) -> 
     matrix = Signal.matrix(
         "attitude", "C", meaning=DCM_MEANING, bound=UNIT, constraint="rotation", frame="b to n"
     )
-    return build.stage(matrix, rotations.quaternion_matrix(state).applyfunc(sp.expand)) * u
+    return build.stage(matrix, algebra.quaternion_matrix(state).applyfunc(sp.expand)) * u
 
 
 def compensated(

@@ -11,10 +11,10 @@ import sympy as sp
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
-from strapgen.ir.attitude_step import AttitudeStep, Order, Truncation
+from strapgen.ir.kernel_info import AttitudeStep, Order, Truncation
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import dot
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import dot
 
 
 def step(

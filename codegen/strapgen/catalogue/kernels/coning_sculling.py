@@ -9,8 +9,8 @@ import sympy as sp
 from strapgen.catalogue.kernels.updates import ROTATION_VECTOR
 from strapgen.catalogue.kinematics import SAVAGE
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 
 INCREMENT = Signal.vector(
     "increment",

@@ -9,9 +9,9 @@ from typing import Any
 import sympy as sp
 
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, SAVAGE, THESIS, Kinematics
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 _CONVERTED = Signal.matrix(
@@ -29,7 +29,7 @@ def dcm_from_euler() -> Kernel:
     """Derive the direction cosine matrix from v -> e v e*."""
     build = KernelBuilder()
     e = build.input(EULER.state)
-    build.output(_CONVERTED, rotations.quaternion_matrix(e).applyfunc(sp.expand))
+    build.output(_CONVERTED, algebra.quaternion_matrix(e).applyfunc(sp.expand))
     return build.kernel(
         "dcm-from-euler",
         "Direction cosine matrix from Euler parameters",
@@ -41,11 +41,11 @@ def dcm_from_euler() -> Kernel:
 def dcm_from_cayley_klein() -> Kernel:
     """Derive the direction cosine matrix from C_jk = 1/2 tr(s_j U' s_k U), U' the conjugate transpose."""
     build = KernelBuilder()
-    U = rotations.cayley_klein_matrix(build.input(CAYLEY_KLEIN.state))
+    U = algebra.cayley_klein_matrix(build.input(CAYLEY_KLEIN.state))
     build.output(
         _CONVERTED,
         [
-            sp.expand((rotations.PAULI[j] * U.H * rotations.PAULI[k] * U).trace() / 2)
+            sp.expand((algebra.PAULI[j] * U.H * algebra.PAULI[k] * U).trace() / 2)
             for j in range(3)
             for k in range(3)
         ],
@@ -136,7 +136,7 @@ def euler_from_dcm_followed(rule: str) -> Kernel:
         name, words, note = "sheppard", "the largest keeps its sign", "60"
     else:
         before = build.value(
-            "along", rotations.dot(previous, column), "4 times the largest, times their product"
+            "along", algebra.dot(previous, column), "4 times the largest, times their product"
         )
         name, words, note = "continuous", "continued", "180"
     factor = build.value("factor", _sign(before) / (2 * sp.sqrt(largest)), "carries the sign")

@@ -8,9 +8,9 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM, SAVAGE
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import ANY, Signal
-from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.algebra import Direction, Wrapped
 from strapgen.kernel.kernel import EPSILON, Kernel, KernelBuilder
 
 ANGLES = Signal(

@@ -18,12 +18,10 @@ from strapgen.catalogue.kinematics import DCM, EULER, KINEMATICS, Kinematics
 from strapgen.catalogue.methods.method import PHI, Method
 from strapgen.catalogue.methods.samples import Samples, increments_signal
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
-from strapgen.kernel.covariant_derivatives import CovariantFunction
+from strapgen.kernel import algebra
 from strapgen.kernel.covariants import Decomposition, Frame, NotCovariantError
-from strapgen.kernel.degrees import degree
-from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, evaluate_stages
-from strapgen.kernel.tangents import add_tangents
+from strapgen.kernel.derivatives import CovariantFunction, add_tangents
+from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, degree, evaluate_stages
 
 #: Most vectors of a transition that is differentiated as a function of them, and of a rotation vector.
 _FEW, _SOME = 2, 6
@@ -90,7 +88,7 @@ def error_state(method: Method, increments: int, previous: int = 0, ahead: int =
     counts = increments, previous, ahead
     build = KernelBuilder()
     turn = transition(build, EULER, method, counts)
-    matrix = rotations.quaternion_matrix(turn.value).applyfunc(sp.expand)
+    matrix = algebra.quaternion_matrix(turn.value).applyfunc(sp.expand)
     build.output(
         Signal.matrix(
             "right_transition",
@@ -135,12 +133,12 @@ class _Turn:
 
     def angles(self, before: bool) -> list[sp.Matrix]:
         """Add stages for the step's rotations by the increments, axes at its start if `before`, else at its end."""
-        conjugate = rotations.quaternion_conjugate(self.value)
+        conjugate = algebra.quaternion_conjugate(self.value)
         name, axes = ("left", "start") if before else ("right", "end")
         along = []
         for place, part in enumerate(self.parts):
             pair = (part, conjugate) if before else (conjugate, part)
-            turned = 2 * rotations.quaternion_product(*pair)[:3, :]
+            turned = 2 * algebra.quaternion_product(*pair)[:3, :]
             meaning = f"rotation by direction {place}, axes at the {axes} of the step"
             along.append(
                 self.build.stage(Signal.vector(f"{name}_{place}", f"{name}_{place}", meaning=meaning), turned)
@@ -266,7 +264,7 @@ def _exponential(
 ) -> _Turn:
     """Return the transition of a rotation vector, with its derivatives by the elements of that."""
     phi = build.stage(PHI, function.values()[:3])
-    square = build.value("phi_square", rotations.dot(phi, phi), "square of the angle of the step")
+    square = build.value("phi_square", algebra.dot(phi, phi), "square of the angle of the step")
     written = kinematics.exponential(phi, SERIES, square)
     value = build.stage(kinematics.transition, written)
     parts = []

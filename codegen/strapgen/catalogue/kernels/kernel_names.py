@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from strapgen.catalogue.method_names import ALGORITHMS
 from strapgen.catalogue.methods.windows import EXACT_TERMS
-from strapgen.ir.recipe import Recipe
+from strapgen.ir.kernel_info import Recipe
 
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
 MOTIONS = {

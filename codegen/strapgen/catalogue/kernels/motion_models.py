@@ -13,7 +13,7 @@ import sympy as sp
 from strapgen.catalogue.kernels.kernel_names import MOTIONS as MOTION_PARAMETERS
 from strapgen.catalogue.kinematics import DCM_MEANING, THESIS
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 Formula = Callable[..., sp.Matrix]
@@ -56,7 +56,7 @@ def _chord(m: sp.Expr, d: sp.Expr, b: sp.Expr, wave: Callable[[sp.Expr], sp.Expr
 
 
 def _coning_attitude(t: sp.Expr, a: sp.Expr, b: sp.Expr, g: sp.Expr) -> sp.Matrix:
-    return rotations.rotation(t * sp.Matrix([0, b + g, a])) * _about_y(-b * t)
+    return algebra.rotation(t * sp.Matrix([0, b + g, a])) * _about_y(-b * t)
 
 
 MOTIONS = {
@@ -67,7 +67,7 @@ MOTIONS = {
             "constant body rate on three axes",
             rate=lambda t, x, y, z: sp.Matrix([x, y, z]),
             increment=lambda m, d, x, y, z: d * sp.Matrix([x, y, z]),
-            attitude=lambda t, x, y, z: rotations.rotation(t * sp.Matrix([x, y, z])),
+            attitude=lambda t, x, y, z: algebra.rotation(t * sp.Matrix([x, y, z])),
             turning=lambda x, y, z: sp.zeros(3, 1),
         ),
         MotionModel(

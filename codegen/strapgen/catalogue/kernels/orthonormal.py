@@ -6,7 +6,7 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, SAVAGE, THESIS, UNIT, Kinematics
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 _COMPUTED = Signal.matrix(
@@ -26,7 +26,7 @@ _NEAR = "Made for a matrix near a rotation: all products of its transpose and it
 def _normalize(kinematics: Kinematics) -> Kernel:
     build = KernelBuilder()
     x = build.input(kinematics.state)
-    factor = build.value("inverse_norm", 1 / sp.sqrt(rotations.dot(x, x)), "1/|state|")
+    factor = build.value("inverse_norm", 1 / sp.sqrt(algebra.dot(x, x)), "1/|state|")
     build.output(kinematics.next, factor * x)
     return build.kernel(
         kinematics.orthonormalize,
@@ -55,13 +55,13 @@ def dcm() -> Kernel:
     rows = [C[k, :].T for k in range(3)]
     normalized = []
     for k in range(3):
-        dual = rotations.cross(rows[(k + 1) % 3], rows[(k + 2) % 3])
+        dual = algebra.cross(rows[(k + 1) % 3], rows[(k + 2) % 3])
         row = build.stage(
             Signal.vector(f"row_{k + 1}", f"row_{k + 1}", meaning=f"row {k + 1} and its dual, added"),
             rows[k] + dual,
         )
         length = build.value(
-            f"inverse_length_{k + 1}", 1 / sp.sqrt(rotations.dot(row, row)), f"1/|row {k + 1}|"
+            f"inverse_length_{k + 1}", 1 / sp.sqrt(algebra.dot(row, row)), f"1/|row {k + 1}|"
         )
         normalized.append((length * row).T)
     build.output(_RESULT, sp.Matrix.vstack(*normalized))
@@ -96,7 +96,7 @@ def dcm_optimal() -> Kernel:
     B = _symmetric(build, "deviator", "C' C less its mean", G - mean * sp.eye(3))
     spread = build.value("spread", (B * B).trace() / 6, "mean square spread of the eigenvalues, halved")
     half_determinant = build.value(
-        "half_determinant", rotations.dot(B[:, 0], rotations.cross(B[:, 1], B[:, 2])) / 2
+        "half_determinant", algebra.dot(B[:, 0], algebra.cross(B[:, 1], B[:, 2])) / 2
     )
     radicand = sp.Max(0, spread**3 - half_determinant**2, evaluate=False)
     angle = build.value("angle", sp.atan2(sp.sqrt(radicand), half_determinant) / 3, "angle of the cubic")
@@ -112,8 +112,8 @@ def dcm_optimal() -> Kernel:
     i2 = build.value("invariant_2", u * v + v * w + w * u)
     i3 = build.value("invariant_3", u * v * w)
     N = _symmetric(build, "denominator", "i1 C' C + i3 I", i1 * G + i3 * sp.eye(3))
-    adjugate = _symmetric(build, "adjugate", "adjugate of the denominator", rotations.adjugate(N))
-    determinant = rotations.dot(N[0, :], adjugate[:, 0])
+    adjugate = _symmetric(build, "adjugate", "adjugate of the denominator", algebra.adjugate(N))
+    determinant = algebra.dot(N[0, :], adjugate[:, 0])
     factor = build.value("inverse_determinant", 1 / determinant)
     M = build.stage(
         Signal.matrix("root", "root", meaning="inverse root of C' C, times the determinant"),
@@ -168,7 +168,7 @@ def rows_orthogonalized() -> Kernel:
     rows = [C[k, :] for k in range(3)]
     error = {
         frozenset((i, j)): build.value(
-            f"error_{i + 1}{j + 1}", rotations.dot(rows[i], rows[j]), f"rows {i + 1} and {j + 1}, multiplied"
+            f"error_{i + 1}{j + 1}", algebra.dot(rows[i], rows[j]), f"rows {i + 1} and {j + 1}, multiplied"
         )
         for i, j in ((0, 1), (0, 2), (1, 2))
     }
@@ -193,7 +193,7 @@ def rows_normalized() -> Kernel:
     for k in range(3):
         row = C[k, :]
         factor = build.value(
-            f"factor_{k + 1}", 1 + (1 - rotations.dot(row, row)) / 2, f"1/|row {k + 1}| to first order"
+            f"factor_{k + 1}", 1 + (1 - algebra.dot(row, row)) / 2, f"1/|row {k + 1}| to first order"
         )
         corrected.append(factor * row)
     build.output(_RESULT, sp.Matrix.vstack(*corrected))
@@ -210,7 +210,7 @@ def third_row() -> Kernel:
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     rows = [C[k, :].T for k in range(2)]
-    build.output(_RESULT, sp.Matrix.vstack(C[:2, :], rotations.cross(*rows).T))
+    build.output(_RESULT, sp.Matrix.vstack(C[:2, :], algebra.cross(*rows).T))
     return build.kernel(
         "dcm-third-row",
         "Direction cosine matrix: third row from the first two",
@@ -223,7 +223,7 @@ def normalized_first_order(name: str) -> Kernel:
     kinematics = {"euler": EULER, "cayley-klein": CAYLEY_KLEIN}[name]
     build = KernelBuilder()
     x = build.input(kinematics.state)
-    error = build.value("error", rotations.dot(x, x) - 1, "|state|^2 - 1")
+    error = build.value("error", algebra.dot(x, x) - 1, "|state|^2 - 1")
     factor = build.value("factor", 1 - error / 2, "1/|state| to first order")
     build.output(kinematics.next, factor * x)
     return build.kernel(

@@ -8,9 +8,8 @@ from strapgen.catalogue.kernels.attitude_step import chosen
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import increments_signal, sample_names, velocities_signal
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross, exact
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 
 
 def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:

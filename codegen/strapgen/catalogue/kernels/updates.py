@@ -8,9 +8,9 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE, Kinematics
-from strapgen.ir.recursion import Recursion
+from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 ROTATION_VECTOR = Signal.vector(
@@ -49,7 +49,7 @@ def transition(
     build: KernelBuilder, kinematics: Kinematics, phi: sp.Matrix, order: int | None = None, frame: str = "b"
 ) -> sp.Matrix:
     """Name the transition of a rotation vector in rad, exact or to degree `order`, and return its symbols."""
-    square = build.value("angle_squared", rotations.dot(phi, phi), "square of the angle")
+    square = build.value("angle_squared", algebra.dot(phi, phi), "square of the angle")
     turning = replace(kinematics.transition, frame=f"{frame} to {frame}")
     return build.stage(turning, kinematics.exponential(phi, order, square))
 

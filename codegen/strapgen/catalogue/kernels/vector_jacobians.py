@@ -9,8 +9,8 @@ import sympy as sp
 from strapgen.catalogue.kernels import attitude_step, sculling_term, velocity_position
 from strapgen.catalogue.methods.method import Method
 from strapgen.ir.signals import Signal
+from strapgen.kernel.derivatives import add_tangents, tangent
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.tangents import add_tangents, tangent
 
 
 def rotation_vector(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:

@@ -28,10 +28,10 @@ from strapgen.catalogue.methods.samples import Samples, increments_signal, veloc
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windowed import DEGREE
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
+from strapgen.kernel.algebra import cross, dot
+from strapgen.kernel.derivatives import add_tangents
 from strapgen.kernel.kernel import Kernel, KernelBuilder, symbols
-from strapgen.kernel.rotations import cross, dot
-from strapgen.kernel.tangents import add_tangents
 
 #: Highest power of the rotation vector in the left Jacobian, and of the angles in a method's own exponentials.
 SERIES = 12
@@ -161,19 +161,17 @@ class _Turn:
             square = build.value(
                 "turn_square", dot(self._turn, self._turn), "square of the angle of the step"
             )
-            self._first = build.value(
-                "jacobian_1", rotations.wave_series(square, 2, SERIES), "(1 - cos x)/x^2"
-            )
+            self._first = build.value("jacobian_1", algebra.wave_series(square, 2, SERIES), "(1 - cos x)/x^2")
             self._second = build.value(
-                "jacobian_2", rotations.wave_series(square, 3, SERIES), "(x - sin x)/x^3"
+                "jacobian_2", algebra.wave_series(square, 3, SERIES), "(x - sin x)/x^3"
             )
 
     def velocity(self, changes: dict[sp.Symbol, sp.Expr], name: str) -> sp.Matrix:
         """Return the velocity of a step from the changes of its rotation."""
         dual = self._turn.applyfunc(changes.__getitem__)
         if not self._vector:
-            conjugate = rotations.quaternion_conjugate(self._turn)
-            return 2 * rotations.quaternion_product(dual, conjugate)[:3, :]
+            conjugate = algebra.quaternion_conjugate(self._turn)
+            return 2 * algebra.quaternion_product(dual, conjugate)[:3, :]
         crossed = self._build.stage(
             Signal.vector(
                 f"{name}_cross", f"{name}_cross", unit="m/s", meaning=f"phi x change of phi, {name}"

@@ -19,9 +19,8 @@ from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples, sample_names
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross, exact
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross
 
 #: Most Legendre coefficients of the rate in the terms of third and fourth order.
 MOST_COEFFICIENTS = 6

@@ -14,7 +14,7 @@ from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = (

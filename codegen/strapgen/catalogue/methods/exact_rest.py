@@ -21,9 +21,8 @@ from strapgen.catalogue.methods.method import Method
 from strapgen.catalogue.methods.rate_fit import step_order
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross, dot, exact
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross, dot
 
 #: Highest power of the exponential of h. At a tenth of a radian the powers left out are below 1e-15 of h.
 _POWERS = 8

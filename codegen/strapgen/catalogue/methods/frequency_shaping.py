@@ -15,9 +15,8 @@ import sympy as sp
 
 from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.samples import Samples, sample_names
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross, exact
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross
 
 SOURCE = "P. G. Savage, J. Guid. Control Dyn. 33 (2010), least squares over a band"
 #: End of the band in rad, and digits of the arithmetic in which the weights are designed.

@@ -11,9 +11,8 @@ from strapgen.catalogue.methods import rotation_series
 from strapgen.catalogue.methods.method import PHI
 from strapgen.catalogue.methods.rotation_series import Scalars, Words
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross, dot, exact
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross, dot
 
 
 def rotation_vector(

@@ -12,7 +12,7 @@ import sympy as sp
 from strapgen.catalogue.methods.method import PHI, Method, exponential
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "S. Blanes, F. Casas, J. A. Oteo, J. Ros, Phys. Rep. 470 (2009) 151-238, section 5.3"
@@ -87,7 +87,7 @@ def _second_order(samples: Samples, first: int) -> sp.Matrix:
 
 def _commutator(a: sp.Matrix, b: sp.Matrix) -> sp.Matrix:
     """Return [a, b] for dC/dt = C skew(w): the source has dY/dt = A Y, whose transpose reverses every commutator."""
-    return rotations.cross(b, a)
+    return algebra.cross(b, a)
 
 
 def _fourth(build: KernelBuilder, samples: Samples) -> sp.Matrix:

@@ -15,9 +15,9 @@ from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.rate_fit import Fit
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Window
-from strapgen.ir.attitude_step import Order, Truncation
+from strapgen.ir.kernel_info import Order, Truncation
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import KernelBuilder
 
 #: Signal of the rotation vector of a step.

@@ -9,8 +9,8 @@ from strapgen.catalogue.methods.runge_kutta import advance
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross
 
 
 def method(order: int) -> Method:

@@ -17,7 +17,7 @@ import sympy as sp
 from strapgen.catalogue.kinematics import DCM, EULER, Kinematics
 from strapgen.catalogue.methods import rate_fit
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), I.8"
@@ -121,10 +121,10 @@ def centred(
 
 def normalized(build: KernelBuilder, kinematics: Kinematics, series: sp.Matrix) -> sp.Matrix:
     """Add stages that normalize Euler or Cayley-Klein parameters, and return them as a transition."""
-    square = rotations.dot(series, series)
+    square = algebra.dot(series, series)
     if kinematics is DCM:
         factor = build.value("inverse_square", 1 / square, "1/(series . series)")
-        return factor * rotations.quaternion_matrix(series)
+        return factor * algebra.quaternion_matrix(series)
     return build.value("inverse_length", 1 / sp.sqrt(square), "1/|series|") * series
 
 

@@ -10,7 +10,7 @@ from math import comb
 
 import sympy as sp
 
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 
 #: Coefficients of a polynomial of time, in steps from the beginning of the step, the constant one first.
 Coefficients = tuple[sp.Expr, ...]

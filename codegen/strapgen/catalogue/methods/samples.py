@@ -10,7 +10,7 @@ import sympy as sp
 from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.methods import rate_fit
 from strapgen.catalogue.methods.rate_fit import Fit
-from strapgen.ir.attitude_step import Order
+from strapgen.ir.kernel_info import Order
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder

@@ -21,9 +21,9 @@ from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.catalogue.toml_files import UserFile
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.ir.suggestions import counted
 from strapgen.registry import Merged, Registry, Titles
 
 #: What the coefficients are best at: the largest drift over a band, or the drift under a spectrum whose phases are

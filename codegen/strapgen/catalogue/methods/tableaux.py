@@ -20,8 +20,8 @@ from strapgen.catalogue.methods.tableau import Tableau
 from strapgen.catalogue.toml_files import UserFile
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
+from strapgen.ir.checks import counted, needed
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import counted, needed
 from strapgen.registry import Merged, Registry, Titles
 
 #: Highest order and most stages. The number of trees grows nearly threefold from order to order.

@@ -10,9 +10,9 @@ from typing import Annotated, Any, ClassVar
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.ir.suggestions import counted
 
 #: A filter: a weight for each sample of the window, the oldest first.
 Taps = tuple[Fraction, ...]

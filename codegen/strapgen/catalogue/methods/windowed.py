@@ -21,11 +21,10 @@ from strapgen.catalogue.methods.method import PHI, Method
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
 from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Taps, Window
-from strapgen.ir.attitude_step import Truncation
+from strapgen.ir.kernel_info import Truncation
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import cross, dot, exact
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.kernel.rotations import cross, dot
 
 #: Highest degree of the Legendre coefficients in the rotation vector, and order of a step with its terms.
 DEGREE, _FOURTH = 4, 6

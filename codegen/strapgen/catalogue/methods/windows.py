@@ -21,8 +21,8 @@ from strapgen.catalogue.methods.window import Taps, Window, sibling_name, siblin
 from strapgen.catalogue.toml_files import UserFile
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import counted
 from strapgen.registry import Merged, Registry, Titles
 
 OBJECTIVES = ("minimax", "mean square")

@@ -13,11 +13,11 @@ from strapgen.catalogue.derivation import companion as derived_companion
 from strapgen.catalogue.methods.samples import beside
 from strapgen.catalogue.names import reserved
 from strapgen.ir import checks
-from strapgen.ir.attitude_step import AttitudeStep, Order
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.kernel_info import AttitudeStep, Order
 from strapgen.ir.program import RESOLUTION
 from strapgen.kernel import reading
-from strapgen.kernel.evaluation import Direction, Wrapped
+from strapgen.kernel.algebra import Direction, Wrapped
 from strapgen.kernel.kernel import Kernel
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")

@@ -18,8 +18,8 @@ from strapgen.design.commit_late.late_unit import LateUnit, LateUnitOnIntegers, 
 from strapgen.design.commit_late.late_unit_in_c import LateUnitInC
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sources import Sources
 from strapgen.run.backends import fitted

@@ -20,9 +20,9 @@ from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
 from strapgen.fixedpoint.floating.expressions import Expressions
 from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument, Interface
+from strapgen.ir.interfaces import Argument, Interface
+from strapgen.ir.kernel_info import Truncation
 from strapgen.ir.program import Program
 
 #: Binary digits of a square root.

@@ -10,8 +10,8 @@ from typing import TypeVar
 from strapgen.design.commit_late.fixed_filters import NORMALIZED_EVERY, FixedFilters
 from strapgen.design.commit_late.late_filters import NEXT, SHORT, LateFilters
 from strapgen.design.commit_late.lost_samples import REACH
-from strapgen.ir.decimals import above
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.formats import above
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION

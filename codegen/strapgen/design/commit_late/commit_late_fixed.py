@@ -15,11 +15,11 @@ from strapgen.catalogue import Choice
 from strapgen.design.commit_late import commit_late_bounds
 from strapgen.design.commit_late.fixed_filters import FixedFilters, Integers
 from strapgen.design.commit_late.late_filters import LateFilters, Rows
-from strapgen.ir.attitude_step import Truncation
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import finest
+from strapgen.ir.interfaces import Argument, Interface
+from strapgen.ir.kernel_info import Truncation
 from strapgen.ir.sources import Sources
 
 #: Bits of a word, and of a sum of products.

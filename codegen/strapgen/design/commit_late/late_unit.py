@@ -19,7 +19,7 @@ from strapgen.design.commit_late.fixed_filters import NORMALIZED_EVERY
 from strapgen.design.commit_late.late_filters import NEXT, SHORT, short_place
 from strapgen.design.commit_late.lost_samples import REACH
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.run.evaluators import Array, Evaluator, in_units
 from strapgen.run.registry import of_sources

@@ -10,7 +10,7 @@ from typing import Any
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.filters import responses
 from strapgen.design.windows.family_file import number
-from strapgen.ir.suggestions import counted
+from strapgen.ir.checks import counted
 from strapgen.results.records import INTERNAL, entry, plain_record
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable

@@ -11,7 +11,7 @@ from pathlib import Path
 from strapgen.evidence.overflow.c_types import MODELS
 from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets.c_fixed.words import memory_type
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from strapgen import fixedpoint, pipeline
 from strapgen.catalogue import Choice
-from strapgen.ir.attitude_step import AttitudeStep
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.firmware.check_code.foreign_bridge import ForeignSource, bridge_text, definitions
+from strapgen.ir.checks import suggestions
 from strapgen.ir.exceptions import CompilerError
-from strapgen.ir.suggestions import suggestions
 from strapgen.ir.timing import timed
 from strapgen.run import compiler
 from strapgen.storage import cache, drafts

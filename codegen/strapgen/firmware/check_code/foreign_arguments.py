@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
+from strapgen.ir.checks import shown
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import shown
 
 #: Suffixes of files in C++, and of all files with code of users that is compiled; .C is C++ too.
 CPP_SUFFIXES = (".cc", ".cpp", ".cxx", ".c++", ".cp")

@@ -9,7 +9,7 @@ from typing import Any
 
 from strapgen.firmware.vectors.cycle_vectors_c import loop_calls
 from strapgen.firmware.vectors.vectors_c import VectorTable
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed.two_speed_sources import Wiring
 from strapgen.targets.c.number_text import numbers_of, types_of

@@ -13,8 +13,8 @@ from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import CommandOptions, Option
 from strapgen.cli.options import MethodOptions
 from strapgen.design.commit_late import window_generate_command
+from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import alternatives
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from strapgen import pipeline
 from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import CallVector
-from strapgen.ir.decimals import float_above, places_above
 from strapgen.ir.exceptions import CompilerError, InputError
-from strapgen.ir.fixed_interface import Argument, Interface
 from strapgen.ir.fixed_settings import TURNING
+from strapgen.ir.formats import float_above, places_above
+from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.sources import Sources
 from strapgen.results.records import entry, properties
 from strapgen.results.result import Result

@@ -19,9 +19,8 @@ from strapgen.fixedpoint.intervals import Interval, norm
 from strapgen.fixedpoint.limits import largest_magnitude
 from strapgen.fixedpoint.terms import up
 from strapgen.ir import checks
-from strapgen.ir.fixed_interface import RoundingAccumulation
 from strapgen.ir.fixed_settings import TURNING, Settings
-from strapgen.ir.float_interface import Condition, RoundingBounds, StepRounding
+from strapgen.ir.interfaces import Condition, RoundingAccumulation, RoundingBounds, StepRounding
 from strapgen.ir.program import Operation, Program, Result, walk
 
 #: The functions of the C library that operations call.

@@ -25,7 +25,7 @@ from strapgen.fixedpoint.quantities import (
     combined,
 )
 from strapgen.fixedpoint.ranges import Ranges
-from strapgen.ir.float_interface import Condition
+from strapgen.ir.interfaces import Condition
 from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Program
 
 #: Resolutions of the two types.

@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.notebook_display import full_text
 from strapgen.ir.program import Program
 

@@ -18,8 +18,8 @@ from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Quantit
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.runs.singular_values import singular_value_bounds
 from strapgen.fixedpoint.series import Series, Truncated
-from strapgen.ir.fixed_interface import Argument, RoundingAccumulation
 from strapgen.ir.integer_program import IntegerSum, Value
+from strapgen.ir.interfaces import Argument, RoundingAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
 
 #: Terms of the longest series that the norm of the transition is expanded in.

@@ -17,7 +17,7 @@ from strapgen.fixedpoint.intervals import Interval, norm, root
 from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.fixedpoint.runs.accumulation import StepErrors, stretch
 from strapgen.fixedpoint.terms import up
-from strapgen.ir.angle_accumulation import LARGEST_ERROR, AngleAccumulation
+from strapgen.ir.interfaces import LARGEST_ERROR, AngleAccumulation
 from strapgen.ir.program import Constant, Node, Program, Reference, Result
 from strapgen.kernel.polynomials import ONE, OPERATIONS, Polynomial, add, multiply, scale
 

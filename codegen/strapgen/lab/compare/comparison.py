@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapgen.catalogue import Choice, choose_step
 from strapgen.catalogue.choice import AnyMethod
-from strapgen.ir import checks, stage_arguments
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
@@ -160,7 +160,7 @@ def compare(
     >>> [row.backend for row in rows], rows[0].max_abs_rad
     (['numpy', 'c'], 0.0)
     """
-    stage_arguments.require("compare", algorithm, str, os.PathLike, Choice)
+    checks.require("compare", algorithm, str, os.PathLike, Choice)
     choice = choose_step(algorithm, method, samples)
     for name in backends:
         if not isinstance(name, Backend):
@@ -171,7 +171,7 @@ def compare(
     if increments is None:
         raise InputTypeError("increments is None; an array (steps, samples, 3) in rad is needed")
     if settings is not None and not isinstance(settings, Settings):
-        raise InputTypeError(f"settings is {stage_arguments.describe(settings)}; strapgen.Settings is needed")
+        raise InputTypeError(f"settings is {checks.describe(settings)}; strapgen.Settings is needed")
     d = np.asarray(increments, np.float64)
     fixed = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 

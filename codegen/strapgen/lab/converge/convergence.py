@@ -15,10 +15,10 @@ import numpy as np
 
 from strapgen import catalogue
 from strapgen.catalogue import Choice
-from strapgen.ir import checks, stage_arguments
-from strapgen.ir.attitude_step import Order
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.kernel_info import Order
 from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
 from strapgen.lab.motions.exact_attitudes import exact_attitudes, step_of_increments, uncertainty
 from strapgen.lab.motions.motion_files import is_file
@@ -213,7 +213,7 @@ def converge(
     checks.choice("backend", backend, BACKENDS)
     kernel = step_of_increments(choice)
     if not isinstance(motion, Motion):
-        raise InputTypeError(f"motion is {stage_arguments.describe(motion)}; strapgen.motion makes one")
+        raise InputTypeError(f"motion is {checks.describe(motion)}; strapgen.motion makes one")
     total = checks.number("duration", duration, positive=True)
     if isinstance(steps, str) or not isinstance(steps, Iterable):
         raise InputTypeError(f"steps is {steps!r}; a sequence of step lengths is needed")

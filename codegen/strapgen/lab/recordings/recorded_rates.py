@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir import checks
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import counted
 from strapgen.lab.recordings.recorded_columns import PART, Columns, parts, release
 from strapgen.lab.recordings.recorded_rows import LineNumbers, RecordedRows
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir import checks
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.suggestions import counted
 from strapgen.ir.units import TIMES
 from strapgen.lab.recordings import delimited
 from strapgen.lab.recordings.recorded_columns import Columns

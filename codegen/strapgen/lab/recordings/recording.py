@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.ir import checks, stage_arguments, units
+from strapgen.ir import checks, units
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.lab.attitude_limits import require_finite, require_proper
@@ -342,10 +342,10 @@ def propagate(
     >>> history.states.shape, history.unused
     ((5, 4), 1)
     """
-    stage_arguments.require("propagate", backend, Backend)
+    checks.require("propagate", backend, Backend)
     if not isinstance(recording, Recording):
         raise InputTypeError(
-            f"recording is {stage_arguments.describe(recording)}; a Recording is needed "
+            f"recording is {checks.describe(recording)}; a Recording is needed "
             "(an array goes to Backend.propagate)"
         )
     backend.need_increments()

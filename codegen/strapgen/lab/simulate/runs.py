@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import catalogue
-from strapgen.ir import checks, stage_arguments
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import Records, notebook_html, short_repr
 from strapgen.lab.attitude_limits import require_finite
@@ -218,8 +218,8 @@ def simulate(
     >>> round(float(np.degrees(run.mean_drift)), 4)
     0.2855
     """
-    stage_arguments.require("simulate", backend, Backend)
-    stage_arguments.require("simulate", motion, Motion)
+    checks.require("simulate", backend, Backend)
+    checks.require("simulate", motion, Motion)
     h = checks.number("step", step, positive=True)
     total = checks.number("duration", duration, positive=True)
     steps = checks.multiple("duration", total, "step", h)

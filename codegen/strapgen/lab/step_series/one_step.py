@@ -17,7 +17,7 @@ from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.catalogue.coefficients import Number
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.kernel import evaluation, rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.covariants import Frame
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, constant, field, outputs
@@ -71,7 +71,7 @@ class Step:
     @property
     def domain(self) -> Any:
         """The smallest domain that holds the numbers of the step and polynomials in its unknowns."""
-        expressions = [evaluation.exact(node) for node in self.nodes or ()]
+        expressions = [algebra.exact(node) for node in self.nodes or ()]
         for stage in (*self.kernel.stages, *self.kernel.outputs):
             expressions += stage.expressions
         return field(expressions, self.kernel.unknowns)
@@ -255,5 +255,5 @@ def true_matrix(ring: Any, rate: Rate, top: int) -> list[Powers]:
 
 
 def _skew(vector: Sequence[Any]) -> list[list[Any]]:
-    columns = [rotations.cross_elements(vector, [int(axis == k) for k in range(3)]) for axis in range(3)]
+    columns = [algebra.cross_elements(vector, [int(axis == k) for k in range(3)]) for axis in range(3)]
     return [list(row) for row in zip(*columns, strict=True)]

@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.catalogue.coefficients import Number
-from strapgen.kernel import evaluation
+from strapgen.kernel import algebra
 from strapgen.kernel.power_series import Powers
 
 #: The rate and its derivatives, each a vector of polynomials.
@@ -73,4 +73,4 @@ def increment_shares(k: int, count: int, terms: int) -> list[sp.Expr]:
 
 def node_shares(node: Number, terms: int) -> list[sp.Expr]:
     """Return the values of t^j/j!, j from 0 on, at a node of a step of length 1."""
-    return [evaluation.exact(node) ** j / sp.factorial(j) for j in range(terms)]
+    return [algebra.exact(node) ** j / sp.factorial(j) for j in range(terms)]

@@ -11,8 +11,7 @@ import sympy as sp
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.kernel.covariants import Decomposition, Frame, NotCovariantError
-from strapgen.kernel.degrees import degree
-from strapgen.kernel.kernel import Kernel, Stage, evaluate_stages
+from strapgen.kernel.kernel import Kernel, Stage, degree, evaluate_stages
 from strapgen.lowering.canonical.vectors import Form, components, independent
 
 

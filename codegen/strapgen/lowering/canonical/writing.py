@@ -8,8 +8,8 @@ from fractions import Fraction
 
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Reference
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import CROSS
 from strapgen.kernel.polynomials import Polynomial, ratio
-from strapgen.kernel.rotations import CROSS
 from strapgen.lowering.arithmetic import (
     Term,
     chain,

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 
-from strapgen.ir.once import once
-from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in, once
 from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
 from strapgen.lowering.names import is_temporary, shared_names
 from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses

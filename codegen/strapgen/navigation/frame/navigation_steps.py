@@ -12,9 +12,9 @@ from strapgen.catalogue.kernels.updates import NAVIGATION_ROTATION, ROTATION_VEC
 from strapgen.catalogue.kernels.velocity_position import CHANGES
 from strapgen.catalogue.kinematics import DCM, KINEMATICS, SAVAGE, UNIT
 from strapgen.ir.signals import Signal, after
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 from strapgen.navigation.frame.frame_rates import (
     ACCELERATION,
     DERIVED,
@@ -176,7 +176,7 @@ _TITLE = "Two rows of the direction cosine matrix"
 
 def _third(rows: list[sp.Matrix]) -> sp.Matrix:
     """Return the third row as a column, equation (43)."""
-    return rotations.cross(*rows)
+    return algebra.cross(*rows)
 
 
 def update(order: int | None = None) -> Kernel:
@@ -215,10 +215,10 @@ def orthonormalized() -> Kernel:
     """Return two rows made orthonormal to first order, equations (28) to (31)."""
     build = KernelBuilder()
     rows = [build.input(row) for row in ROWS]
-    half = build.value("half_error", rotations.dot(*rows) / 2, "half the rows' product")
+    half = build.value("half_error", algebra.dot(*rows) / 2, "half the rows' product")
     factors = [
         build.value(
-            f"factor_{number}", 1 + (1 - rotations.dot(row, row)) / 2, f"1/|row {number}| to first order"
+            f"factor_{number}", 1 + (1 - algebra.dot(row, row)) / 2, f"1/|row {number}| to first order"
         )
         for number, row in enumerate(rows, 1)
     ]

@@ -11,7 +11,7 @@ import sympy as sp
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.instruments.separation import (
     INCREMENT,

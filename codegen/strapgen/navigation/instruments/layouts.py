@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel.evaluation import exact
+from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.instruments.layout import GyroDescription, Layout
 from strapgen.navigation.instruments.separation import (

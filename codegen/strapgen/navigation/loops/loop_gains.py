@@ -11,7 +11,7 @@ import sympy as sp
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel.evaluation import Wrapped
+from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.loops.loop_kernels import erection, heading_loop, level_loop, vertical_loop
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import DCM
 from strapgen.ir.signals import CYCLE, Signal
-from strapgen.kernel.evaluation import Wrapped
+from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.navigation.frame.frame_rates import CURVATURE
 from strapgen.navigation.instruments.imu_errors import CYCLE as LENGTH

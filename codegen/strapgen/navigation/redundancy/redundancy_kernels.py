@@ -19,8 +19,8 @@ from strapgen.catalogue.toml_files import UserFile
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.signals import CYCLE, Signal
+from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.kernel.rotations import cross
 from strapgen.navigation.redundancy.geometry import HEXAD, Axes, SensorGeometry, Triad, of_rows
 
 SEBRING = (

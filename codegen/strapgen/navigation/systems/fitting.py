@@ -11,9 +11,9 @@ from strapgen import pipeline, targets
 from strapgen.fixedpoint.limits import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings, rounded_limit
 from strapgen.ir.formats import Format
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Operation, Program, Reference
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.sources import Sources

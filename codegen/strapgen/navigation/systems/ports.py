@@ -10,10 +10,10 @@ from fractions import Fraction
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, CYCLE, Signal
-from strapgen.ir.suggestions import counted
 from strapgen.navigation.systems.system_file import StageText
 
 

@@ -12,8 +12,8 @@ from strapgen.fixedpoint.floating.expressions import Expression, Expressions, No
 from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
 from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
 from strapgen.navigation.systems.system import Push, SystemStage

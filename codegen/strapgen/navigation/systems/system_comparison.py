@@ -10,11 +10,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from strapgen.ir.decimals import float_above
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.sensor import Sensor
+from strapgen.ir.formats import float_above
 from strapgen.ir.signals import Signal
+from strapgen.ir.units import Sensor
 from strapgen.navigation.systems.system_bounds import bounds
 from strapgen.navigation.systems.system_runner import (
     CompiledSystem,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from strapgen.ir import checks
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.ir.sources import Function, Sources

@@ -8,8 +8,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from strapgen.ir.decimals import above, float_above
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.formats import above, float_above
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.signals import Signal
 from strapgen.navigation.systems.budget import Budget, lines
 from strapgen.navigation.systems.fitting import Fitted

@@ -12,9 +12,9 @@ import numpy as np
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import CYCLE
 from strapgen.ir.sources import Sources

@@ -14,7 +14,8 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.recordings.recording import History, Recording
+from strapgen.lab.recordings.history import History
+from strapgen.lab.recordings.recording import Recording
 from strapgen.lab.sensor_errors.measured_motions import both_increments
 from strapgen.lab.simulate.runs import Array, Run
 from strapgen.lab.simulate.runs_report import (

@@ -8,12 +8,12 @@ from fractions import Fraction
 from pathlib import Path
 
 from strapgen.catalogue import Choice
+from strapgen.ir.checks import unknown
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, Signal
-from strapgen.ir.suggestions import unknown
 from strapgen.navigation.systems import built_in, system_file
 from strapgen.navigation.systems.ports import (
     Ports,

@@ -16,8 +16,8 @@ import numpy as np
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem

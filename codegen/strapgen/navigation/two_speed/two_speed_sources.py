@@ -17,10 +17,10 @@ from strapgen.catalogue import Choice
 from strapgen.fixedpoint.limits import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir import checks
-from strapgen.ir.decimals import above
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, Settings
+from strapgen.ir.formats import above
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal

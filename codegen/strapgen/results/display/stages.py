@@ -12,7 +12,7 @@ import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
 from strapgen.ir.signals import Signal
-from strapgen.kernel import rotations
+from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, Stage
 from strapgen.results.display.latex import equations, sum_text
 
@@ -51,7 +51,7 @@ class _Quantity:
 
     @property
     def skew(self) -> sp.Matrix:
-        return rotations.skew(sp.Matrix(self.elements))
+        return algebra.skew(sp.Matrix(self.elements))
 
 
 def stages_latex(kernel: Kernel) -> str | None:
@@ -152,8 +152,8 @@ def _exponential(kind: str, expressions: Sequence[sp.Expr], vector: _Quantity) -
     """Return the exponential of a rotation vector, if the expressions are that."""
     v = sp.Matrix(vector.elements)
     makers: dict[str, tuple[Callable[[sp.Matrix], sp.Matrix], str]] = {
-        "quaternion": (rotations.quaternion, rf"\exp(\tfrac{{1}}{{2}} {vector.letter})"),
-        "matrix": (rotations.rotation, rf"\exp [{vector.letter}]_{{\times}}"),
+        "quaternion": (algebra.quaternion, rf"\exp(\tfrac{{1}}{{2}} {vector.letter})"),
+        "matrix": (algebra.rotation, rf"\exp [{vector.letter}]_{{\times}}"),
     }
     if kind not in makers:
         return None
@@ -186,9 +186,9 @@ def _products(kind: str, first: _Quantity, second: _Quantity) -> Iterator[tuple[
     """Yield the products of two quantities that are of a kind."""
     kinds, a, b = (first.kind, second.kind), first.letter, second.letter
     if kind == "quaternion" and set(kinds) <= {"vector", "quaternion"}:
-        yield rf"{a} \circ {b}", list(rotations.quaternion_product(first.quaternion, second.quaternion))
+        yield rf"{a} \circ {b}", list(algebra.quaternion_product(first.quaternion, second.quaternion))
     elif kind == "vector" and kinds == ("vector", "vector"):
-        yield rf"{a} \times {b}", rotations.cross_elements(first.elements, second.elements)
+        yield rf"{a} \times {b}", algebra.cross_elements(first.elements, second.elements)
     elif kind == "vector" and kinds == ("matrix", "vector"):
         yield rf"{a} {b}", list(first.matrix * sp.Matrix(second.elements))
     elif kind == "matrix" and kinds == ("matrix", "matrix"):
@@ -199,7 +199,7 @@ def _products(kind: str, first: _Quantity, second: _Quantity) -> Iterator[tuple[
     elif kind == "matrix" and kinds == ("vector", "matrix"):
         yield rf"[{a}]_{{\times}} {b}", list(first.skew * second.matrix)
     elif kind == "scalar" and kinds[0] == kinds[1]:
-        yield rf"{a} \cdot {b}", [rotations.dot(first.elements, second.elements)]
+        yield rf"{a} \cdot {b}", [algebra.dot(first.elements, second.elements)]
 
 
 def _terms(elements: Sequence[sp.Expr], symbols: Sequence[sp.Expr], domain: Any) -> _Terms | None:

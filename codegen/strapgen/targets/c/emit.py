@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from strapgen.fixedpoint.floating import rounding_bounds
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import Operation, Program, names_in, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.ir.decimals import above, below
-from strapgen.ir.float_interface import Condition, RoundingBounds
+from strapgen.ir.formats import above, below
+from strapgen.ir.interfaces import Condition, RoundingBounds
 from strapgen.ir.program import Program
 
 

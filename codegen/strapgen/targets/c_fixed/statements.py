@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.formats import signed_digits
 from strapgen.ir.integer_program import (
     FixedProgram,
     IntegerOperation,
@@ -18,7 +18,7 @@ from strapgen.ir.integer_program import (
     cases_of,
     used_by,
 )
-from strapgen.ir.signed_digits import signed_digits
+from strapgen.ir.interfaces import Argument
 from strapgen.targets import contract
 from strapgen.targets.c_fixed.words import Word
 from strapgen.targets.lines import fill_expression

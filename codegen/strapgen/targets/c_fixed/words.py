@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from strapgen.ir.fixed_interface import Argument
+from strapgen.ir.interfaces import Argument
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import definitions

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Sequence
 from fractions import Fraction
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import Constant, Node, Operation, Program, Result, walk
 from strapgen.ir.sources import Sources
 from strapgen.targets import contract, contract_lines

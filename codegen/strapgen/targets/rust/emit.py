@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from strapgen.ir.float_interface import RoundingBounds
+from strapgen.ir.interfaces import RoundingBounds
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import definitions

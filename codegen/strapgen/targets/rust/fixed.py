@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from strapgen.ir.fixed_interface import Argument
 from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.targets import definitions
 from strapgen.targets.c_fixed import emit as c_fixed
