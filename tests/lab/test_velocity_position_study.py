@@ -25,8 +25,8 @@ def test_every_method_has_a_velocity_and_windows_beat_the_recursion():
     recursion, step, window = rows.values()
     # Errors begin at the second, fourth and sixth power of the angle by which the motion goes on between samples.
     angle = 2 * math.pi * 2 / 100
-    assert recursion.velocity > step.velocity > window.velocity / angle**2
-    assert recursion.position > window.position / angle**4
+    assert recursion.velocity_m_s > step.velocity_m_s > window.velocity_m_s / angle**2
+    assert recursion.position_m > window.position_m / angle**4
     assert recursion.multiply < step.multiply < window.multiply
 
 
@@ -38,7 +38,7 @@ def test_fixed_point_adds_rounding_alone():
     double, fixed = (
         next(study(candidates(["rk4:2"]), flight(backend))) for backend in ("numpy", "c-fixed32")
     )
-    assert fixed.velocity == pytest.approx(double.velocity, abs=1e-5)
+    assert fixed.velocity_m_s == pytest.approx(double.velocity_m_s, abs=1e-5)
 
 
 def test_a_duration_that_is_no_multiple_of_a_sample_is_refused():

@@ -156,114 +156,7 @@ class PartRates:
 class PartCost:
     """What a part of a form costs."""
 
-    #: Keys of `FORMS` and `PARTS`; the kernel is "" where the form does without the part
-    form: str
-    part: str
-    kernel: str
-    #: How often it runs
-    hz: float
-    #: Operations of a call in floating point, by kind
-    operations: Mapping[str, int]
-    #: Instructions of a call in fixed point; None where none were counted
-    executed: int | None = None
-
-    @property
-    def count(self) -> int:
-        """Operations of a call, of all kinds."""
-        return sum(self.operations.values())
-
-
-@dataclass(frozen=True)
-class VelocityLoss:
-    """What the first-order attitude in a slow cycle costs in velocity."""
-
-    #: In rad/s
-    largest_rate: float
-    #: Angle of a slow cycle at that rate, in rad
-    angle: float
-    #: Errors as parts of the velocity increment
-    along: float
-    across: float
-    #: A stated error, and the slow rate that it takes
-    error: float
-    slowest_hz: float
-
-
-@dataclass(frozen=True)
-class FormStudy:
-    """The costs of all forms."""
-
-    rates: PartRates
-    parts: tuple[PartCost, ...]
-    truncation: VelocityLoss
-    #: Processor on which instructions were counted; "" if none were
-    cpu: str = ""
-
-    def of(self, form: str) -> list[PartCost]:
-        """Return the parts of a form."""
-        return [part for part in self.parts if part.form == form]
-
-    def per_second(self, form: str) -> float:
-        """Return the operations of a form in a second."""
-        return math.fsum(part.count * part.hz for part in self.of(form))
-
-    def executed_per_second(self, form: str) -> float | None:
-        """Return the instructions of a form in a second; None where none were counted."""
-        if not self.cpu:
-            return None
-        return math.fsum((part.executed or 0) * part.hz for part in self.of(form))
-
-    @property
-    def spread(self) -> float:
-        """By what part of the smallest total the largest exceeds it."""
-        totals = [self.per_second(form) for form in FORMS]
-        return max(totals) / min(totals) - 1
-
-
-def pairs(without: Iterable[str] = ()) -> list[tuple[str, str]]:
-    """Return the forms and parts that are counted."""
-    left_out = {checks.choice("without", name, PARTS) for name in without}
-    remaining = [part for part in PARTS if part not in left_out]
-    if not remaining:
-        raise InputError("without names every part; at least one has to be left")
-    return [(form, part) for form in FORMS for part in remaining]
-
-
-def part_costs(
-    which: Iterable[tuple[str, str]], rates: PartRates, cpu: str = "", settings: Settings | None = None
-) -> Iterator[PartCost]:
-    """Count the operations of parts, and where a processor is named their instructions in fixed point."""
-    for form, part in which:
-        kernel = FORMS[form][1][part]
-        if not kernel:
-            yield PartCost(form, part, "", rates.of(part), {}, 0 if cpu else None)
-            continue
-        choice = Choice(kernel)
-        counts = {kind: n for kind, n in pipeline.program(choice).operations.items() if n}
-        executed = cost(pipeline.compile(choice, "c-fixed", settings), cpu).executed if cpu else None
-        yield PartCost(form, part, kernel, rates.of(part), counts, executed)
-
-
-def truncation(rates: PartRates, largest_rate: float, error: float) -> VelocityLoss:
-    """Return what (47) costs at the slow rate, and the slow rate for a stated error.
-
-    `largest_rate`: in rad/s.
-    """
-    slowest = slowest_rate(largest_rate, error)
-    angle = largest_rate / rates.update
-    return VelocityLoss(largest_rate, angle, *velocity_errors(angle), error, slowest)
-
-
-_CONCLUSION = (
-    "printed in 1984: the advantage of one form over the other is insignificant beside the whole system, and the "
-    "choice is the analyst's"
-)
-
-
-@dataclass(frozen=True)
-class PartRow:
-    """What a part of a form costs."""
-
+    #: Keys of `FORMS` and `PARTS`
     form: str
     part: str
     #: None where the form does without the part
@@ -277,13 +170,6 @@ class PartRow:
     instructions_per_s: float | None
     #: Operations of a call by kind
     kinds: Mapping[str, int]
-
-    @staticmethod
-    def of(part: PartCost) -> PartRow:
-        """Return a part with what it costs in a second."""
-        executed = None if part.executed is None else part.executed * part.hz
-        counts = (part.count, part.count * part.hz, part.executed, executed)
-        return PartRow(part.form, part.part, part.kernel or None, part.hz, *counts, part.operations)
 
 
 @dataclass(frozen=True)
@@ -315,12 +201,50 @@ class Truncation:
     #: The slow rate that it takes
     slowest_hz: float
 
-    @staticmethod
-    def of(loss: VelocityLoss) -> Truncation:
-        """Return a loss with the first terms of its series."""
-        series = (along_series(4), across_series(4))
-        errors = (loss.along, loss.across, *series, loss.error, loss.slowest_hz)
-        return Truncation(loss.largest_rate, loss.angle, *errors)
+
+def pairs(without: Iterable[str] = ()) -> list[tuple[str, str]]:
+    """Return the forms and parts that are counted."""
+    left_out = {checks.choice("without", name, PARTS) for name in without}
+    remaining = [part for part in PARTS if part not in left_out]
+    if not remaining:
+        raise InputError("without names every part; at least one has to be left")
+    return [(form, part) for form in FORMS for part in remaining]
+
+
+def part_costs(
+    which: Iterable[tuple[str, str]], rates: PartRates, cpu: str = "", settings: Settings | None = None
+) -> Iterator[PartCost]:
+    """Count the operations of parts, and where a processor is named their instructions in fixed point."""
+    for form, part in which:
+        kernel, hz = FORMS[form][1][part], rates.of(part)
+        counts: dict[str, int] = {}
+        executed = 0 if cpu else None
+        if kernel:
+            counts = {kind: n for kind, n in pipeline.program(Choice(kernel)).operations.items() if n}
+            executed = (
+                cost(pipeline.compile(Choice(kernel), "c-fixed", settings), cpu).executed if cpu else None
+            )
+        total = sum(counts.values())
+        executed_per_s = None if executed is None else executed * hz
+        yield PartCost(form, part, kernel or None, hz, total, total * hz, executed, executed_per_s, counts)
+
+
+def truncation(rates: PartRates, largest_rate: float, error: float) -> Truncation:
+    """Return what (47) costs at the slow rate, and the slow rate for a stated error.
+
+    `largest_rate`: in rad/s.
+    """
+    angle = largest_rate / rates.update
+    series = (along_series(4), across_series(4))
+    return Truncation(
+        largest_rate, angle, *velocity_errors(angle), *series, error, slowest_rate(largest_rate, error)
+    )
+
+
+_CONCLUSION = (
+    "printed in 1984: the advantage of one form over the other is insignificant beside the whole system, and the "
+    "choice is the analyst's"
+)
 
 
 @dataclass(frozen=True)
@@ -329,26 +253,25 @@ class FormResult(Result):
 
     drawn_by = f"{__name__}:attitude_form_image"
 
-    study: FormStudy = field(metadata=INTERNAL)
+    rates: PartRates = field(metadata=INTERNAL)
     #: Processor on which instructions were counted
     cpu: str | None
     #: By what part of the smallest total the largest exceeds it
     spread: float
     totals: list[FormTotal]
-    parts: list[PartRow]
+    parts: list[PartCost]
     truncation: Truncation
 
     @staticmethod
-    def of(study: FormStudy) -> FormResult:
-        """Return the costs of a study."""
-        totals = [
-            FormTotal(form, title, study.per_second(form), study.executed_per_second(form))
-            for form, (title, _) in FORMS.items()
-        ]
-        parts = list(map(PartRow.of, study.parts))
-        return FormResult(
-            study, study.cpu or None, study.spread, totals, parts, Truncation.of(study.truncation)
-        )
+    def of(rates: PartRates, parts: list[PartCost], loss: Truncation, cpu: str | None = None) -> FormResult:
+        """Return the costs of all forms."""
+        totals = []
+        for form, (title, _) in FORMS.items():
+            mine = [part for part in parts if part.form == form]
+            executed = math.fsum(part.instructions_per_s or 0 for part in mine) if cpu else None
+            totals.append(FormTotal(form, title, math.fsum(part.operations_per_s for part in mine), executed))
+        several = [total.operations_per_s for total in totals]
+        return FormResult(rates, cpu, max(several) / min(several) - 1, totals, parts, loss)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the parts without the kinds of their operations."""
@@ -358,64 +281,59 @@ class FormResult(Result):
 
     def text(self) -> str:
         """Return the operations of each part and form, and what the first-order attitude costs."""
-        return "\n".join(_lines(self.study))
+        return "\n".join(_lines(self))
 
 
 def attitude_form_image(result: FormResult, path: str | Path) -> bytes:
     """Return the operations of each form in a second, a bar whose pieces are the parts."""
-    study = result.study
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 3.6))
     axes = grid[0, 0]
-    shown = list(dict.fromkeys(part.part for part in study.parts))
-    places = range(len(FORMS))
+    shown = list(dict.fromkeys(part.part for part in result.parts))
     left = [0.0] * len(FORMS)
     for name, colour in zip(shown, figures.several_colours(len(shown)), strict=True):
-        widths = [
-            math.fsum(part.count * part.hz for part in study.of(form) if part.part == name) for form in FORMS
-        ]
-        axes.barh(places, widths, left=left, color=colour, label=PARTS[name])
+        widths = [part.operations_per_s for part in result.parts if part.part == name]
+        axes.barh(range(len(FORMS)), widths, left=left, color=colour, label=PARTS[name])
         left = [a + b for a, b in zip(left, widths, strict=True)]
-    axes.set_yticks(places, [title for title, _ in FORMS.values()])
+    axes.set_yticks(range(len(FORMS)), [title for title, _ in FORMS.values()])
     axes.invert_yaxis()
     axes.set_xlabel("operations a second")
     figures.style(axes, "x")
     figures.common_legend(figure, [axes], loc="outside right center")
-    figures.title(figure, f"Forms of the attitude at {study.rates.update:g} Hz")
+    figures.title(figure, f"Forms of the attitude at {result.rates.update:g} Hz")
     return figures.image(figure, path)
 
 
-def _table(study: FormStudy) -> TextTable:
+def _table(result: FormResult) -> TextTable:
     """Return operations of a call for each part and form, and what they are in a second."""
     columns = [Column("operations of a call", "<"), Column("Hz", spec="g")]
     columns += [Column(title, spec=",.0f") for title, _ in FORMS.values()]
-    shown = list(dict.fromkeys(part.part for part in study.parts))
     rows: list[list[Any]] = []
-    for name in shown:
-        parts = [part for part in study.parts if part.part == name]
-        rows.append([PARTS[name], parts[0].hz, *(part.count for part in parts)])
-    rows.append(["operations a second", None, *(study.per_second(form) for form in FORMS)])
-    if study.cpu:
-        executed = (study.executed_per_second(form) for form in FORMS)
-        rows.append([f"instructions a second, {study.cpu}", None, *executed])
+    for name in dict.fromkeys(part.part for part in result.parts):
+        parts = [part for part in result.parts if part.part == name]
+        rows.append([PARTS[name], parts[0].hz, *(part.operations for part in parts)])
+    rows.append(["operations a second", None, *(total.operations_per_s for total in result.totals)])
+    if result.cpu:
+        executed = (total.instructions_per_s for total in result.totals)
+        rows.append([f"instructions a second, {result.cpu}", None, *executed])
     return TextTable(columns, rows)
 
 
-def _lines(study: FormStudy) -> Iterator[str]:
-    yield from _table(study).lines()
+def _lines(result: FormResult) -> Iterator[str]:
+    yield from _table(result).lines()
     yield ""
-    yield f"the largest total exceeds the smallest by {100 * study.spread:.1f} %"
+    yield f"the largest total exceeds the smallest by {100 * result.spread:.1f} %"
     yield from fill(_CONCLUSION, "", 100).splitlines()
     yield ""
-    yield from _truncation_lines(study.truncation, study.rates.update)
+    yield from _truncation_lines(result.truncation, result.rates.update)
 
 
-def _truncation_lines(loss: VelocityLoss, hz: float) -> Iterator[str]:
+def _truncation_lines(loss: Truncation, hz: float) -> Iterator[str]:
     """Tell what (47) costs."""
     yield "the first-order attitude (47) in a slow cycle makes a velocity increment too large, phi = w T, by"
     yield f"  along the acceleration  {_series(along_series(3))}"
     yield f"  across it               {_series(across_series(3))}"
     yield (
-        f"at {math.degrees(loss.largest_rate):g} deg/s and {hz:g} Hz phi is {loss.angle:.4g} rad: "
+        f"at {math.degrees(loss.largest_rate_rad_s):g} deg/s and {hz:g} Hz phi is {loss.angle_rad:.4g} rad: "
         f"{loss.along:.9e} along, {loss.across:.6e} across"
     )
     yield f"an error of {loss.error:g} at that rate takes a slow rate of {loss.slowest_hz:.4g} Hz"

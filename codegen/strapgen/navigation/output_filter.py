@@ -151,31 +151,27 @@ _SHORTEST, _LONGEST = 200, 200_000
 class Measured:
     """What a back end makes of the filter."""
 
-    #: The error feedback is "" in floating point
-    backend: str
-    carry: str
     #: Output over input at each frequency
-    responses: tuple[complex, ...]
-    #: Largest error of a constant input, once settled, in the unit of the samples
+    responses: tuple[complex, ...] = field(metadata=INTERNAL)
+    backend: str
+    #: Error feedback; None in floating point
+    carry: str | None
+    #: At each frequency; None for a gain of nothing
+    gains_db: list[float | None]
+    phases_rad: list[float]
+    #: Largest error of a constant input, once settled
     constant: float
     #: Largest output after the input has become zero, once settled
     rest: float
-    #: Certified bound of the output's error in a run of any length; None in floating point
+    #: Certified bound of the error in a run of any length; None in floating point
     bound: float | None
     #: What a bit of the output is worth; None in floating point
     unit: float | None
 
-
-@dataclass(frozen=True)
-class FilterStudy:
-    """The responses of a filter: analog, digital and measured."""
-
-    output_filter: OutputFilter
-    #: Largest magnitude of a sample
-    largest: float
-    #: In Hz
-    frequencies: tuple[float, ...]
-    measured: tuple[Measured, ...]
+    @property
+    def label(self) -> str:
+        """The back end with its error feedback."""
+        return self.backend + _CARRIES[self.carry]
 
 
 def runs(names: Iterable[str]) -> list[tuple[str, str]]:
@@ -259,11 +255,13 @@ def _measured(
     last = outputs[start:]
     constant = float(np.abs(last[:, count] - samples[-1, count]).max())
     rest = float(np.abs(last[:, count + 1]).max())
-    if evaluator.sources.fixed is None:
-        return Measured(name, carry, responses, constant, rest, None, None)
-    unit = float(evaluator.interface.outputs[-1].unit)
-    bound = certified_bound(evaluator, output_filter)
-    return Measured(name, carry, responses, constant, rest, bound, unit)
+    gains = [_finite(decibels(response)) for response in responses]
+    phases = [math.atan2(response.imag, response.real) for response in responses]
+    bound, unit = None, None
+    if evaluator.sources.fixed is not None:
+        unit = float(evaluator.interface.outputs[-1].unit)
+        bound = certified_bound(evaluator, output_filter)
+    return Measured(responses, name, carry or None, gains, phases, constant, rest, bound, unit)
 
 
 def certified_bound(evaluator: Evaluator, output_filter: OutputFilter) -> float:
@@ -309,7 +307,7 @@ def _phasors(values: Array, angles: Array) -> Array:
 
 
 _DB = ".5f"
-_CARRIES = {"": "", "none": ", no feedback", "all": ", feedback"}
+_CARRIES = {None: "", "none": ", no feedback", "all": ", feedback"}
 
 
 def _finite(number: float) -> float | None:
@@ -327,40 +325,14 @@ class KnownResponse:
 
 
 @dataclass(frozen=True)
-class MeasuredResponse:
-    """What a back end makes of the filter."""
-
-    backend: str
-    #: Error feedback; None in floating point
-    carry: str | None
-    #: At each frequency; None for a gain of nothing
-    gains_db: list[float | None]
-    phases_rad: list[float]
-    #: Largest error of a constant input, once settled
-    constant: float
-    #: Largest output after the input has become zero, once settled
-    rest: float
-    #: Certified bound of the error in a run of any length; None in floating point
-    bound: float | None
-    #: What a bit of the output is worth; None in floating point
-    unit: float | None
-
-    @staticmethod
-    def of(one: Measured) -> MeasuredResponse:
-        """Return gains and phases."""
-        gains = [_finite(decibels(response)) for response in one.responses]
-        phases = [math.atan2(response.imag, response.real) for response in one.responses]
-        settled = (one.constant, one.rest, one.bound, one.unit)
-        return MeasuredResponse(one.backend, one.carry or None, gains, phases, *settled)
-
-
-@dataclass(frozen=True)
 class FilterResult(Result):
     """The responses of an output's filter: analog, digital and measured."""
 
     drawn_by = f"{__name__}:output_filter_image"
 
-    study: FilterStudy = field(metadata=INTERNAL)
+    output_filter: OutputFilter = field(metadata=INTERNAL)
+    #: Largest magnitude of a sample
+    largest: float = field(metadata=INTERNAL)
     cutoff_hz: float
     sample_hz: float
     #: Coefficients of the kernel by name
@@ -373,57 +345,66 @@ class FilterResult(Result):
     #: Largest magnitudes of the states
     state_ranges: list[float]
     responses: list[KnownResponse]
-    measured: list[MeasuredResponse]
+    measured: list[Measured]
 
     @staticmethod
-    def of(study: FilterStudy) -> FilterResult:
-        """Return the responses of a study."""
-        edge = study.output_filter
+    def of(
+        edge: OutputFilter, largest: float, frequencies: Sequence[float], measured: list[Measured]
+    ) -> FilterResult:
+        """Return the responses of a filter for samples up to a size, at frequencies in Hz."""
         same = ("cutoff_hz", "sample_hz", "coefficients", "numerator", "denominator", "analog_delay_s")
         return FilterResult(
-            study=study,
+            output_filter=edge,
+            largest=largest,
             **{name: getattr(edge, name) for name in (*same, "digital_delay_s")},
-            state_ranges=[study.largest * part for part in edge.state_ranges],
+            state_ranges=[largest * part for part in edge.state_ranges],
             responses=[
                 KnownResponse(f, _finite(decibels(edge.analog(f))), _finite(decibels(edge.digital(f))))
-                for f in study.frequencies
+                for f in frequencies
             ],
-            measured=list(map(MeasuredResponse.of, study.measured)),
+            measured=measured,
         )
 
-    def rows(self) -> Sequence[float]:
+    def rows(self) -> list[float]:
         """Return the frequencies."""
-        return self.study.frequencies
+        return [one.hz for one in self.responses]
 
     def table(self) -> TextTable:
         """Return the gain at each frequency in dB."""
-        return _responses(self.study)
+        columns = [Column("Hz", spec="g"), Column("analog, dB", spec=_DB), Column("digital, dB", spec=_DB)]
+        columns += [Column(one.label, spec=_DB) for one in self.measured]
+        rows = []
+        for number, frequency in enumerate(self.rows()):
+            known = (self.output_filter.analog(frequency), self.output_filter.digital(frequency))
+            responses = (*known, *(one.responses[number] for one in self.measured))
+            rows.append([frequency, *map(decibels, responses)])
+        return TextTable(columns, rows)
 
     def text(self) -> str:
         """Return coefficients, responses, and what is left once settled."""
-        return "\n".join(_lines(self.study))
+        return "\n".join(_lines(self))
 
 
 def output_filter_image(result: FilterResult, path: str | Path) -> bytes:
     """Return the responses over frequency: analog and digital as lines, measured ones as points."""
-    study, edge = result.study, result.study.output_filter
+    edge, frequencies = result.output_filter, result.rows()
     figure, grid = figures.grid_of_axes(1, 1, (8.5, 4.4))
     axes = grid[0, 0]
-    low = min(edge.cutoff_hz, *study.frequencies) / 3
+    low = min(edge.cutoff_hz, *frequencies) / 3
     line = np.geomspace(low, 0.999 * edge.sample_hz / 2, 400)
     for name, response, style in (("analog", edge.analog, "--"), ("digital", edge.digital, "-")):
         axes.plot(line, [decibels(response(f)) for f in line], style, color="0.35", linewidth=1.2, label=name)
-    for number, measured in enumerate(study.measured):
+    for number, measured in enumerate(result.measured):
         gains = [decibels(response) for response in measured.responses]
         axes.plot(
-            *(study.frequencies, gains, "osD^v<>"[number % 7]),
+            *(frequencies, gains, "osD^v<>"[number % 7]),
             color=figures.several_colours(number + 1)[-1],
             markersize=9 - min(6, number),
             fillstyle="none",
-            label=_name(measured),
+            label=measured.label,
         )
     axes.set_xscale("log")
-    lowest = min(decibels(edge.digital(f)) for f in (*study.frequencies, edge.cutoff_hz))
+    lowest = min(decibels(edge.digital(f)) for f in (*frequencies, edge.cutoff_hz))
     axes.set_ylim(max(-120, lowest) - 10, 5)
     axes.set_xlabel("frequency, Hz")
     axes.set_ylabel("gain, dB")
@@ -435,34 +416,8 @@ def output_filter_image(result: FilterResult, path: str | Path) -> bytes:
     return figures.image(figure, path)
 
 
-def _name(measured: Measured) -> str:
-    return measured.backend + _CARRIES[measured.carry]
-
-
-def _responses(study: FilterStudy) -> TextTable:
-    """Return the gain of each frequency in dB."""
-    columns = [Column("Hz", spec="g"), Column("analog, dB", spec=_DB), Column("digital, dB", spec=_DB)]
-    columns += [Column(_name(measured), spec=_DB) for measured in study.measured]
-    rows = []
-    for number, frequency in enumerate(study.frequencies):
-        known = (study.output_filter.analog(frequency), study.output_filter.digital(frequency))
-        responses = (*known, *(measured.responses[number] for measured in study.measured))
-        rows.append([frequency, *map(decibels, responses)])
-    return TextTable(columns, rows)
-
-
-def _settled(study: FilterStudy) -> TextTable:
-    """Return what is left of a constant and of nothing."""
-    columns = [
-        Column("back end", "<"),
-        *(Column(name, spec=".3g") for name in ("constant", "rest", "bound", "bit")),
-    ]
-    rows = [[_name(m), m.constant, m.rest, m.bound, m.unit] for m in study.measured]
-    return TextTable(columns, rows)
-
-
-def _lines(study: FilterStudy) -> Iterator[str]:
-    edge = study.output_filter
+def _lines(result: FilterResult) -> Iterator[str]:
+    edge = result.output_filter
     yield f"Butterworth filter of second order, {edge.cutoff_hz:g} Hz, {edge.sample_hz:g} samples in a second"
     names = [f"{name} {value:.10f}" for name, value in edge.coefficients.items()]
     yield f"coefficients of the kernel: {', '.join(names)}"
@@ -470,8 +425,13 @@ def _lines(study: FilterStudy) -> Iterator[str]:
     yield f"b0 {edge.numerator[0]:.10f}, a1 {a1:.10f}, a2 {a2:.10f}"
     analog, digital = 1e3 * edge.analog_delay_s, 1e3 * edge.digital_delay_s
     yield f"delay of slow changes: analog {analog:.4f} ms, digital {digital:.4f} ms"
-    first, second = (study.largest * part for part in edge.state_ranges)
-    yield f"ranges for samples up to {study.largest:g}: first {first:.6g}, second {second:.6g}"
-    yield from ["", *_responses(study).lines(), ""]
+    first, second = result.state_ranges
+    yield f"ranges for samples up to {result.largest:g}: first {first:.6g}, second {second:.6g}"
+    yield from ["", *result.table().lines(), ""]
     yield "errors of a constant input and of none, once settled, and the bound of a run of any length"
-    yield from ["", *_settled(study).lines()]
+    columns = [
+        Column("back end", "<"),
+        *(Column(name, spec=".3g") for name in ("constant", "rest", "bound", "bit")),
+    ]
+    rows = [[one.label, one.constant, one.rest, one.bound, one.unit] for one in result.measured]
+    yield from ["", *TextTable(columns, rows).lines()]

@@ -146,7 +146,6 @@ def study_attitude_form(
 
     from strapgen.lab.cost import cost
     from strapgen.navigation import attitude_form as forms
-    from strapgen.navigation.attitude_form import FormResult
 
     rates = forms.PartRates(float(update_hz), float(navigation_hz), float(orthonormalize_hz))
     which = forms.pairs(without or ())
@@ -155,8 +154,8 @@ def study_attitude_form(
         cost.processors(cpus=[cpu])
     settings = fixed.settings(1) if cpu else None
     costs = forms.part_costs(which, rates, cpu or "", settings)
-    study = forms.FormStudy(rates, tuple(track(costs, "counting", len(which))), loss, cpu or "")
-    output.show(FormResult.of(study))
+    parts = list(track(costs, "counting", len(which)))
+    output.show(forms.FormResult.of(rates, parts, loss, cpu))
 
 
 @grouped
@@ -207,7 +206,7 @@ def study_output_filter(
     tones = experiment.check_frequencies(edge, [*map(float, frequencies)])
     which = experiment.runs([*backend])
     measured = track(experiment.measure(which, edge, size, tones), "measuring", len(which))
-    output.show(FilterResult.of(experiment.FilterStudy(edge, size, tones, tuple(measured))))
+    output.show(FilterResult.of(edge, size, tones, list(measured)))
 
 
 @grouped
@@ -411,17 +410,17 @@ def study_loops(
         LoopErrors,
         LoopsResult,
         cycles_of_modes,
-        designs,
         run_loops,
+        schedule_gains,
     )
 
     errors = filled(LoopErrors, settings)
     schedule = read(BUILT_IN if file is None else file)
     modes = schedule.timed(last)
     cycles_of_modes(schedule, modes)
-    gains = designs(schedule)
+    gains = schedule_gains(schedule)
     courses = tuple(track(run_loops(schedule, modes, errors, backend), "running", len(LOOPS)))
-    output.show(LoopsResult(schedule, modes, errors, gains, courses))
+    output.show(LoopsResult.of(schedule, modes, errors, gains, courses))
 
 
 @dataclass(frozen=True)
@@ -539,8 +538,8 @@ def study_velocity_position(
         backend,
         carry,
     )
-    standings = list(track(experiment.study(several, course), "running", len(several)))
-    output.show(TranslationResult(standings, course, flight.described()))
+    rows = list(track(experiment.study(several, course), "running", len(several)))
+    output.show(TranslationResult.of(rows, course, flight.described()))
 
 
 @grouped

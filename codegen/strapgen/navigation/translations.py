@@ -24,7 +24,7 @@ from strapgen.lab.motions.specific_forces import SpecificForce
 from strapgen.lab.recordings.recording import InertialRecording
 from strapgen.navigation.courses import course
 from strapgen.results import figures
-from strapgen.results.records import INTERNAL, entry, properties, reader_table
+from strapgen.results.records import INTERNAL, entry, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import TextTable
 from strapgen.run.backends import BACKENDS, Backend, backend, evaluator
@@ -138,17 +138,14 @@ _ROOM = Fraction(9, 8)
 
 
 @dataclass(frozen=True)
-class TranslationStanding:
-    """What an algorithm costs, and how far its velocity and position are from the true ones."""
+class TranslationRow:
+    """What an algorithm costs for each sample, and the largest errors of its velocity and position."""
 
-    name: str
-    #: Multiplications, and additions and subtractions, for each sample: attitude, velocity and position in body
-    #: axes
-    multiply: float
-    add: float
-    #: Largest length of the error in m/s and m
-    velocity: float
-    position: float
+    name: str = field(metadata=entry("algorithm", align="<"))
+    multiply: float = field(metadata=entry("multiply", ".4g"))
+    add: float = field(metadata=entry("add", ".4g"))
+    velocity_m_s: float = field(metadata=entry("velocity, m/s", ".3g"))
+    position_m: float = field(metadata=entry("position, m", ".3g"))
 
 
 @dataclass(frozen=True)
@@ -190,13 +187,13 @@ def candidates(names: Iterable[str]) -> list[Candidate]:
     return several
 
 
-def study(several: Sequence[Candidate], flight: Flight) -> Iterator[TranslationStanding]:
+def study(several: Sequence[Candidate], flight: Flight) -> Iterator[TranslationRow]:
     """Run algorithms along a flight, and yield what each costs and leads to."""
     truth = flight.force.translation(flight.motion, 1 / flight.sample_hz, flight.count)
     for one in several:
         run = _recursion(one, flight, truth) if one.method == TWO_SPEED else _steps(one, flight, truth)
         operations = _operations(one)
-        yield TranslationStanding(
+        yield TranslationRow(
             one.name, operations["multiply"], operations["add"], run.velocity_error, run.position_error
         )
 
@@ -276,72 +273,33 @@ def _recursion(one: Candidate, flight: Flight, truth: tuple[Array, Array]) -> Tr
     )
 
 
-_ERROR, _COUNT = ".3g", ".4g"
-
-
-@dataclass(frozen=True)
-class TranslationRow:
-    """What an algorithm costs for each sample, and the largest errors of its velocity and position."""
-
-    name: str = field(metadata=entry("algorithm", align="<"))
-    multiply: float = field(metadata=entry("multiply", _COUNT))
-    add: float = field(metadata=entry("add", _COUNT))
-    velocity_m_s: float = field(metadata=entry("velocity, m/s", _ERROR))
-    position_m: float = field(metadata=entry("position, m", _ERROR))
-
-
 @dataclass(frozen=True)
 class TranslationResult(Result):
     """Velocity and position of several algorithms along a motion with a specific force."""
 
     rows_in = "algorithms"
-    computed = properties(
-        motion=entry(),
-        force=entry(),
-        sample_hz=entry(),
-        duration_s=entry(),
-        backend=entry(),
-        algorithms=entry(),
-    )
     drawn_by = f"{__name__}:translation_image"
 
-    standings: Sequence[TranslationStanding] = field(metadata=INTERNAL)
-    flight: Flight = field(metadata=INTERNAL)
     #: The motion and the force in words
     described: str = field(metadata=INTERNAL)
+    #: Name of the motion
+    motion: str
+    #: The specific force: its name and its parameters
+    force: dict[str, Any]
+    #: Sampling rate
+    sample_hz: float
+    #: Length of the run
+    duration_s: float
+    #: Name of the back end
+    backend: str
+    algorithms: Sequence[TranslationRow]
 
-    @property
-    def motion(self) -> str:
-        """Name of the motion."""
-        return self.flight.motion.name
-
-    @property
-    def force(self) -> dict[str, Any]:
-        """The specific force: its name and its parameters."""
-        return {"name": self.flight.force.name, **self.flight.force.parameters}
-
-    @property
-    def sample_hz(self) -> float:
-        """Sampling rate."""
-        return float(self.flight.sample_hz)
-
-    @property
-    def duration_s(self) -> float:
-        """Length of the run."""
-        return float(self.flight.duration)
-
-    @property
-    def backend(self) -> str:
-        """Name of the back end."""
-        return self.flight.backend
-
-    @property
-    def algorithms(self) -> list[TranslationRow]:
-        """The algorithms."""
-        return [
-            TranslationRow(one.name, one.multiply, one.add, one.velocity, one.position)
-            for one in self.standings
-        ]
+    @staticmethod
+    def of(rows: Sequence[TranslationRow], flight: Flight, described: str) -> TranslationResult:
+        """Return what algorithms lead to along a flight, which is described in words."""
+        force = {"name": flight.force.name, **flight.force.parameters}
+        rate, duration = float(flight.sample_hz), float(flight.duration)
+        return TranslationResult(described, flight.motion.name, force, rate, duration, flight.backend, rows)
 
     def table(self) -> TextTable:
         """Return the algorithms under their headers."""
@@ -363,10 +321,10 @@ class TranslationResult(Result):
 def translation_image(result: TranslationResult, path: str | Path) -> bytes:
     """Return the errors of velocity and position over the multiplications for each sample."""
     figure, grid = figures.grid_of_axes(1, 2, (11, 4.6))
-    panels = (("error of the velocity, m/s", "velocity"), ("error of the position, m", "position"))
+    panels = (("error of the velocity, m/s", "velocity_m_s"), ("error of the position, m", "position_m"))
     several = []
     for axes, (label, part) in zip(grid[0], panels, strict=True):
-        points = {one.name: (one.multiply, getattr(one, part)) for one in result.standings}
+        points = {one.name: (one.multiply, getattr(one, part)) for one in result.algorithms}
         for x, y in points.values():
             axes.plot([x], [y], "o", color="0.25", markersize=5)
         axes.set_xscale("log")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -280,17 +279,6 @@ class Earth:
             "centrifugal_ratio": rate**2 * radius**2 * polar / mu,
         }
         return cls("ellipsoid", radius, rate, constants)
-
-
-def schuler_rate(gravity: float, radius: float) -> float:
-    """Return Schuler's frequency sqrt(g/R) in rad/s.
-
-    `gravity`: in m/s^2.
-
-    >>> f"{schuler_rate(9.81, 6373388):.10e}"
-    '1.2406501275e-03'
-    """
-    return math.sqrt(gravity / radius)
 
 
 SOMIGLIANA = "W. A. Heiskanen and H. Moritz, Physical Geodesy (1967), equations (2-78) and (2-123)"

@@ -19,7 +19,7 @@ from strapgen.navigation.loops.loop_gains import closed_loop
 from strapgen.navigation.loops.loop_schedule import LoopMode, LoopSchedule, LoopSetting
 from strapgen.navigation.systems.system_runner import SystemMemory, SystemRun, SystemRunner
 from strapgen.results import figures
-from strapgen.results.records import INTERNAL, entry, properties
+from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.run import backends
@@ -99,15 +99,18 @@ class LoopCourse:
 
 
 @dataclass(frozen=True)
-class LoopDesign:
-    """A loop in a mode: gains, and the slowest pole of a cycle as a time constant."""
+class LoopGains:
+    """The gains of a loop in a mode."""
 
     mode: str
     loop: str
-    setting: LoopSetting
-    gains: tuple[Fraction, ...]
-    #: None for an open loop
-    slowest_s: float | None
+    reference: str
+    #: Time constant
+    tau_s: float | None
+    slowest_pole_s: float | None
+    gains: list[float]
+    #: The same exactly
+    exact: tuple[Fraction, ...] = field(metadata=entry(kind=list[str]))
 
 
 def mode_gains(schedule: LoopSchedule, setting: LoopSetting) -> tuple[Fraction, ...]:
@@ -119,13 +122,13 @@ def mode_gains(schedule: LoopSchedule, setting: LoopSetting) -> tuple[Fraction, 
     )
 
 
-def designs(schedule: LoopSchedule) -> list[LoopDesign]:
-    """Return all loops of all modes with their gains."""
+def schedule_gains(schedule: LoopSchedule) -> list[LoopGains]:
+    """Return the gains of all loops of all modes; unstable ones are refused."""
     rows = []
     for mode in schedule.modes:
         for setting in mode.loops:
-            values, slowest = mode_gains(schedule, setting), None
-            if setting.time_constant_s is not None:
+            values, tau, slowest = mode_gains(schedule, setting), setting.time_constant_s, None
+            if tau is not None:
                 known = (schedule.cycle_s, schedule.gravity, schedule.radius)
                 try:
                     loop_gains.check_stable(setting.loop, values, *known)
@@ -133,7 +136,9 @@ def designs(schedule: LoopSchedule) -> list[LoopDesign]:
                     raise InputError(f"mode {mode.name}: {error}") from None
                 pole = abs(loop_gains.poles_of_a_cycle(setting.loop, values, *known)[0])
                 slowest = -float(schedule.cycle_s) / math.log(pole) if pole else 0.0
-            rows.append(LoopDesign(mode.name, setting.loop, setting, values, slowest))
+            head = (mode.name, setting.loop, setting.reference)
+            numbers = [float(value) for value in values]
+            rows.append(LoopGains(*head, None if tau is None else float(tau), slowest, numbers, values))
     return rows
 
 
@@ -358,126 +363,91 @@ class LoopState:
 
 
 @dataclass(frozen=True)
-class LoopGains:
-    """The gains of a loop in a mode."""
-
-    mode: str
-    loop: str
-    reference: str
-    #: Time constant
-    tau_s: float | None
-    slowest_pole_s: float | None
-    gains: list[float]
-    #: The same exactly
-    exact: tuple[Fraction, ...] = field(metadata=entry(kind=list[str]))
-
-    @staticmethod
-    def of(design: LoopDesign) -> LoopGains:
-        """Return the gains of a design."""
-        tau = design.setting.time_constant_s
-        return LoopGains(
-            mode=design.mode,
-            loop=design.loop,
-            reference=design.setting.reference,
-            tau_s=None if tau is None else float(tau),
-            slowest_pole_s=design.slowest_s,
-            gains=[float(value) for value in design.gains],
-            exact=tuple(design.gains),
-        )
-
-
-@dataclass(frozen=True)
 class LoopsResult(Result):
     """The loops of an attitude and heading reference through their schedule."""
 
     rows_in = "states"
-    computed = properties(title=entry(), cycle_s=entry(), gains=entry(), states=entry(key="rows"))
     drawn_by = f"{__name__}:loops_image"
 
-    schedule: LoopSchedule = field(metadata=INTERNAL)
     #: Those that were run
     modes: tuple[LoopMode, ...] = field(metadata=INTERNAL)
+    courses: Sequence[LoopCourse] = field(metadata=INTERNAL)
     #: What disturbs the loops
     errors: LoopErrors
-    designs: Sequence[LoopDesign] = field(metadata=INTERNAL)
-    courses: Sequence[LoopCourse] = field(metadata=INTERNAL)
+    #: Title of the schedule
+    title: str
+    #: Time of a cycle
+    cycle_s: float
+    #: The gains of all modes
+    gains: Sequence[LoopGains]
+    #: Every state of every case at the end of every mode
+    states: list[LoopState] = field(metadata=entry(key="rows"))
 
-    @property
-    def title(self) -> str:
-        """Title of the schedule."""
-        return self.schedule.title
-
-    @property
-    def cycle_s(self) -> float:
-        """Time of a cycle."""
-        return float(self.schedule.cycle_s)
-
-    @property
-    def gains(self) -> list[LoopGains]:
-        """The gains of all modes."""
-        return list(map(LoopGains.of, self.designs))
-
-    @property
-    def states(self) -> list[LoopState]:
-        """Every state of every case at the end of every mode."""
-        return list(self._states())
-
-    def _states(self) -> Iterator[LoopState]:
-        for course in self.courses:
-            run, exact = (array * factors(course.loop) for array in (course.run, course.exact))
-            for mode, end in zip(self.modes, course.ends, strict=True):
-                for k, case in enumerate(course.cases):
-                    for number, (quantity, (unit, _)) in enumerate(UNITS[course.loop].items()):
-                        one, other = float(run[end, k, number]), float(exact[end, k, number])
-                        facts = (course.loop, mode.name, float(course.times[end]), case, quantity, unit)
-                        yield LoopState(*facts, one, other, one - other)
+    @staticmethod
+    def of(
+        schedule: LoopSchedule,
+        modes: tuple[LoopMode, ...],
+        errors: LoopErrors,
+        gains: Sequence[LoopGains],
+        courses: Sequence[LoopCourse],
+    ) -> LoopsResult:
+        """Return the loops that were run through modes of a schedule."""
+        states = [state for course in courses for state in _states(modes, course)]
+        return LoopsResult(modes, courses, errors, schedule.title, float(schedule.cycle_s), gains, states)
 
     def text(self) -> str:
         """Return the gains, and the states of each loop."""
         return "\n".join(_lines(self))
 
 
-def _lines(study: LoopsResult) -> Iterator[str]:
-    schedule = study.schedule
-    yield f"{schedule.title or 'schedule'}: cycle {float(schedule.cycle_s):g} s"
+def _states(modes: tuple[LoopMode, ...], course: LoopCourse) -> Iterator[LoopState]:
+    """Yield the states of a loop: those of every case at the end of every mode."""
+    run, exact = (array * factors(course.loop) for array in (course.run, course.exact))
+    for mode, end in zip(modes, course.ends, strict=True):
+        for k, case in enumerate(course.cases):
+            for number, (quantity, (unit, _)) in enumerate(UNITS[course.loop].items()):
+                one, other = float(run[end, k, number]), float(exact[end, k, number])
+                facts = (course.loop, mode.name, float(course.times[end]), case, quantity, unit)
+                yield LoopState(*facts, one, other, one - other)
+
+
+def _lines(result: LoopsResult) -> Iterator[str]:
+    yield f"{result.title or 'schedule'}: cycle {result.cycle_s:g} s"
     yield ""
-    yield from _gains(study).lines()
-    for course in study.courses:
+    yield from _gains_table(result.gains).lines()
+    for course in result.courses:
         yield ""
         yield f"{course.loop} loop at the end of each mode: by the kernel, and by the matrix exponential"
         yield ""
-        yield from _states(study, course).lines()
+        yield from _states_table(course.loop, result.states).lines()
 
 
-def _gains(study: LoopsResult) -> TextTable:
+def _gains_table(several: Sequence[LoopGains]) -> TextTable:
     """Return the gains of all modes."""
     columns = [Column(name, "<") for name in ("mode", "loop", "reference")]
     columns += [Column("tau, s", spec="g"), Column("slowest pole, s", spec=".6g")]
     columns += [Column(name, spec=_GAIN) for name in ("k1", "k2", "k3")]
     rows = []
-    for design in study.designs:
-        tau = design.setting.time_constant_s
-        values = [float(value) for value in design.gains] if tau is not None else []
-        gains: list[float | None] = [*values, *[None] * (3 - len(values))]
-        head = (design.mode, design.loop, design.setting.reference)
-        rows.append([*head, None if tau is None else float(tau), design.slowest_s, *gains])
+    for one in several:
+        values = [] if one.tau_s is None else one.gains
+        gains = [*values, *[None] * (3 - len(values))]
+        rows.append([one.mode, one.loop, one.reference, one.tau_s, one.slowest_pole_s, *gains])
     return TextTable(columns, rows)
 
 
-def _states(study: LoopsResult, course: LoopCourse) -> TextTable:
+def _states_table(loop: str, states: Iterable[LoopState]) -> TextTable:
     """Return the states of a loop, a line for each mode and case."""
     columns = [Column("mode", "<"), Column("time, s", spec="g"), Column("case", "<")]
-    for quantity, (unit, _) in UNITS[course.loop].items():
+    for quantity, (unit, _) in UNITS[loop].items():
         columns += [
             Column(header, spec=_STATE, group=f"{quantity}, {unit}") for header in ("kernel", "exponential")
         ]
-    run, exact = (array * factors(course.loop) for array in (course.run, course.exact))
-    rows = []
-    for mode, end in zip(study.modes, course.ends, strict=True):
-        for k, case in enumerate(course.cases):
-            states = [float(value) for pair in zip(run[end, k], exact[end, k], strict=True) for value in pair]
-            rows.append([mode.name, float(course.times[end]), case, *states])
-    return TextTable(columns, rows)
+    rows: dict[tuple[str, str], list[Any]] = {}
+    for state in states:
+        if state.loop == loop:
+            row = rows.setdefault((state.mode, state.case), [state.mode, state.time_s, state.case])
+            row += [state.run, state.matrix_exponential]
+    return TextTable(columns, list(rows.values()))
 
 
 def loops_image(result: LoopsResult, path: str | Path) -> bytes:
@@ -502,7 +472,7 @@ def loops_image(result: LoopsResult, path: str | Path) -> bytes:
         row[0].legend(fontsize=8, frameon=False)
     for axes in grid[-1]:
         axes.set_xlabel("time, s")
-    figures.title(figure, f"{result.schedule.title or 'schedule'}; dashed: matrix exponential")
+    figures.title(figure, f"{result.title or 'schedule'}; dashed: matrix exponential")
     return figures.image(figure, path)
 
 

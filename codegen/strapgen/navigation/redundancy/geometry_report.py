@@ -47,42 +47,10 @@ class TriadData:
 
 
 @dataclass(frozen=True)
-class StatusVerdict:
-    """What a status of the equations says."""
-
-    #: A 1 for each equation that fails, and a 0 for the others
-    status: str
-    #: The failed sensor
-    failed: int | None
-    #: The triad that is selected
-    triad: int | None
-    points: int
-
-
-@dataclass(frozen=True)
-class TableData:
-    """The verdicts with some sensors removed."""
-
-    removed: tuple[int, ...]
-    equations: tuple[int, ...]
-    verdicts: list[StatusVerdict]
-
-    @staticmethod
-    def of(table: FailureTable) -> TableData:
-        """Return a table."""
-        verdicts = [
-            StatusVerdict(status_text(status), one.failed, one.triad, one.points)
-            for status, one in table.verdicts.items()
-        ]
-        return TableData(tuple(table.removed), tuple(table.equations), verdicts)
-
-
-@dataclass(frozen=True)
 class GeometryResult(Result):
     """What redundant sensors tell of their failures; numbers of the field of the axes are text, exact."""
 
     sensor_set: SensorSet = field(metadata=INTERNAL)
-    failure_tables: Sequence[FailureTable] = field(metadata=INTERNAL)
     name: str
     sensor: str
     range: str
@@ -99,7 +67,7 @@ class GeometryResult(Result):
     fail_operate: int
     #: Whether one more is detected
     next_is_detected: bool
-    tables: list[TableData]
+    tables: Sequence[FailureTable]
     #: Files that were written
     files: Sequence[Path]
 
@@ -119,7 +87,6 @@ class GeometryResult(Result):
         ]
         return GeometryResult(
             sensor_set=sensors,
-            failure_tables=tables,
             name=sensors.name,
             sensor=sensors.sensor,
             range=str(sensors.range),
@@ -130,15 +97,13 @@ class GeometryResult(Result):
             least_squares=geometry.least_squares,
             fail_operate=geometry.fail_operate,
             next_is_detected=geometry.fail_safe,
-            tables=list(map(TableData.of, tables)),
+            tables=tables,
             files=files,
         )
 
     def text(self) -> str:
         """Return equations, triads and failures for a reader."""
-        return "\n".join(
-            [*_lines(self.sensor_set, self.failure_tables), *(f"  {path}" for path in self.files)]
-        )
+        return "\n".join([*_lines(self.sensor_set, self.tables), *(f"  {path}" for path in self.files)])
 
 
 def conditions(sensors: SensorSet) -> list[float]:
@@ -204,11 +169,6 @@ def _failures(sensors: SensorSet) -> str:
     return f"{operate} isolated, whichever sensors fail; one more {more}"
 
 
-def status_text(status: Sequence[bool]) -> str:
-    """Return a status as a 1 for each equation that fails and a 0 for the others, the first equation first."""
-    return "".join("01"[fails] for fails in status)
-
-
 def tables_csv(sensors: SensorSet, tables: Sequence[FailureTable]) -> str:
     """Return the tables as comma-separated values: removed sensors, equations, status, failed sensor, triad, points."""
     rows = []
@@ -216,8 +176,8 @@ def tables_csv(sensors: SensorSet, tables: Sequence[FailureTable]) -> str:
         labels = " ".join(equation_label(sensors.geometry.equations[k]) for k in table.equations)
         removed = " ".join(map(str, table.removed))
         rows += [
-            [removed, labels, status_text(status), verdict.failed, verdict.triad, verdict.points]
-            for status, verdict in table.verdicts.items()
+            [removed, labels, verdict.status, verdict.failed, verdict.triad, verdict.points]
+            for verdict in table.verdicts.values()
         ]
     headers = ("removed", "equations", "status", "failed", "triad", "points")
     return TextTable([Column(header) for header in headers], rows).as_csv()
@@ -234,9 +194,11 @@ _EQUAL = 1e-9
 class FailureVerdict:
     """What a table says of one status of the parity equations."""
 
+    #: A 1 for each equation that fails, and a 0 for the others
+    status: str
     #: The sensor that is declared failed: its failure direction is the most aligned for most of the points
     failed: int | None
-    #: Number of the triad whose failure directions are the least aligned, in `SensorGeometry.triads`
+    #: Number of the selected triad, whose failure directions are the least aligned
     triad: int
     #: Points of the scan with this status
     points: int
@@ -244,24 +206,16 @@ class FailureVerdict:
 
 @dataclass(frozen=True)
 class FailureTable:
-    """The tables for one state of the sensors."""
+    """The verdicts with some sensors removed."""
 
     #: Sensors that no longer count
     removed: tuple[int, ...]
     #: Numbers of the parity equations that need none of them; a status has a bit for each
     equations: tuple[int, ...]
     #: By status: whether each of these equations fails
-    verdicts: Mapping[tuple[bool, ...], FailureVerdict]
-
-
-def failure_directions(geometry: SensorGeometry) -> Array:
-    """Return the directions of failures in parity space, one for each sensor, of the length that a failure of 1 has.
-
-    Returns (N - 3, N): in orthonormal coordinates of the space that the independent parity equations span.
-    """
-    basis = np.array(geometry.parity_basis, float)
-    directions: Array = np.linalg.qr(basis.T)[0].T
-    return directions
+    verdicts: Mapping[tuple[bool, ...], FailureVerdict] = field(
+        metadata=entry(write=lambda verdicts: list(verdicts.values()), kind=list[FailureVerdict])
+    )
 
 
 def failure_table(geometry: SensorGeometry, removed: tuple[int, ...] = ()) -> FailureTable:
@@ -289,13 +243,13 @@ def failure_table(geometry: SensorGeometry, removed: tuple[int, ...] = ()) -> Fa
     verdicts = {}
     for number, status in enumerate(statuses):
         here = alignment[:, place == number]
-        verdicts[tuple(map(bool, status))] = FailureVerdict(
-            _failed(here, valid) if status.any() else None,
-            _selected(geometry, dict(zip(valid, here.mean(axis=1), strict=True)))
-            if status.any()
-            else _best(geometry, valid),
-            here.shape[1],
-        )
+        if status.any():
+            failed = _failed(here, valid)
+            triad = _selected(geometry, dict(zip(valid, here.mean(axis=1), strict=True)))
+        else:
+            failed, triad = None, _best(geometry, valid)
+        text = "".join("01"[int(fails)] for fails in status)
+        verdicts[tuple(map(bool, status))] = FailureVerdict(text, failed, triad, here.shape[1])
     return FailureTable(removed, numbers, verdicts)
 
 

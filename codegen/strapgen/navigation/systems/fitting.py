@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -106,6 +106,15 @@ def _generated(
     return pipeline.compile(description.choices[stage.name], target, settings, naming)
 
 
+def without_needless_feedback(generate: Callable[[Settings], Sources], settings: Settings) -> Sources:
+    """Generate a stage; without error feedback where it rounds nothing that goes on to the next call."""
+    result = generate(settings)
+    if settings.carry == "none" or result.fixed is None or result.fixed.residuals:
+        return result
+    # The same sources as from `strapgen generate` without the option.
+    return generate(replace(settings, carry="none"))
+
+
 @dataclass
 class _Fit:
     """The formats while they are worked out."""
@@ -183,11 +192,9 @@ class _Fit:
             del wired[movable[-1]]
 
     def _without_needless_feedback(self, stage: SystemStage, settings: Settings) -> Sources:
-        """Return a stage; without error feedback where it rounds nothing that goes on to the next call."""
-        result = _generated(self.description, stage, self.target, settings)
-        if settings.carry == "none" or result.fixed is None or result.fixed.residuals:
-            return result
-        return _generated(self.description, stage, self.target, replace(settings, carry="none"))
+        return without_needless_feedback(
+            lambda chosen: _generated(self.description, stage, self.target, chosen), settings
+        )
 
     def _settings(self, stage: SystemStage) -> Settings:
         """Return word, error feedback, the ranges of a stage's inputs, and the gyro if it takes counts."""

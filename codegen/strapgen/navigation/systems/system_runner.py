@@ -243,10 +243,7 @@ class SystemRunner:
 
     def _call_stage(self, memory: SystemMemory, stage: SystemStage, samples: Mapping[str, Array]) -> None:
         """Call a stage on every row."""
-        evaluator, fixed = self.evaluators[stage.name], self.fit.sources[stage.name].fixed
-        arguments: dict[str, Argument] = {}
-        if fixed is not None:
-            arguments = {a.signal.name: a for a in (*fixed.inputs, *fixed.outputs)}
+        evaluator, arguments = self.evaluators[stage.name], self.fit.arguments_of(stage)
         rows = []
         for wire in stage.wires:
             held = samples[wire.source] if wire.external else memory.cells[wire.source]

@@ -17,7 +17,6 @@ from strapgen.navigation.systems.budget import Budget, budget, measured_budget
 from strapgen.navigation.systems.system import Cell
 from strapgen.navigation.systems.system_runner import (
     CompiledSystem,
-    SystemMemory,
     SystemRunner,
     system_runner,
 )
@@ -85,7 +84,10 @@ def study(
         runner = system_runner(description, name, settings if fixed else None)
         if isinstance(runner, CompiledSystem):
             needs[name] = measured_budget(runner.fit, cpu) if cpu and fixed else budget(runner.fit)
-        return runner, runner.run(inputs, started(runner, outputs, vehicle)).values
+        memory = None
+        if outputs.attitude is not None:
+            memory, _ = system_runs.begun(runner, vehicle.attitude(np.zeros(1))[0])
+        return runner, runner.run(inputs, memory).values
 
     runner, values = run(REFERENCE)
     errors = tuple(
@@ -152,17 +154,6 @@ class Outputs:
         return NavigationErrors(name, turned(self.attitude), velocity, turned(self.position) * _RADIUS)
 
 
-def started(runner: SystemRunner, outputs: Outputs, vehicle: TurningVehicle) -> SystemMemory:
-    """Return the memory of a system that begins with the attitude of a vehicle."""
-    memory = runner.begin()
-    if outputs.attitude is not None:
-        attitude = vehicle.attitude(np.zeros(1))[0]
-        if outputs.attitude.signal.size == 4:
-            attitude = backends.evaluator("euler-from-dcm")(attitude)
-        runner.set(memory, outputs.attitude.name, attitude)
-    return memory
-
-
 def angles(one: Array, other: Array) -> Array:
     """Return the angle between attitudes in rad, from the antisymmetric part of their quotient."""
     turned = one @ other.swapaxes(-1, -2)
@@ -218,15 +209,14 @@ class NeedsRow:
     @staticmethod
     def of(backend: str, needs: Budget) -> NeedsRow:
         """Return what a back end needs."""
-        sizes = [stage.code_bytes for rate in needs.rates for stage in rate.stages]
         executed = needs.executed_per_second
         return NeedsRow(
             backend,
             needs.memory_bytes,
             needs.constant_bytes,
             float(needs.per_second),
-            needs.cpu or None,
-            None if None in sizes else sum(filter(None, sizes)),
+            needs.cpu,
+            needs.code_bytes,
             None if executed is None else float(executed),
         )
 

@@ -281,10 +281,10 @@ class TwoSpeedLoops:
     def cost(self, carry: str) -> ProcessorCost:
         """Return bytes and instructions of the loops in fixed point."""
         budget = measured_budget(self.fixed, self.brief.processor.cpu)
-        code = sum(stage.code_bytes or 0 for rate in budget.rates for stage in rate.stages)
         executed = budget.executed_per_second
         return ProcessorCost(
-            float(code + budget.constant_bytes), None if executed is None else float(executed)
+            float((budget.code_bytes or 0) + budget.constant_bytes),
+            None if executed is None else float(executed),
         )
 
     def steady(self) -> TwoSpeedLoops:

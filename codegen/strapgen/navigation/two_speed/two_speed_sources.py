@@ -27,7 +27,7 @@ from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
 from strapgen.navigation.systems import built_in, system_file
-from strapgen.navigation.systems.fitting import copies, summed
+from strapgen.navigation.systems.fitting import copies, summed, without_needless_feedback
 from strapgen.navigation.systems.system import DescribedSystem
 from strapgen.navigation.systems.wiring import Description, wired
 from strapgen.targets import BUILT_IN, TARGETS
@@ -129,7 +129,10 @@ def loops(
 
     def loop(name: str, formats: Mapping[str, str]) -> Sources:
         chosen = settings if counted(programs[name]) else settings.without_counts()
-        return _fixed_loop(name, target, _of_inputs(replace(chosen, formats=formats), inputs[name]))
+        return without_needless_feedback(
+            lambda one: pipeline.compile(Choice(name), target, one),
+            _of_inputs(replace(chosen, formats=formats), inputs[name]),
+        )
 
     formats = dict(settings.formats)
     natural = _formats(loop(names[0], formats))
@@ -162,15 +165,6 @@ def _of_inputs(settings: Settings, inputs: set[str]) -> Settings:
         ranges={name: value for name, value in settings.ranges.items() if name in inputs},
         formats={name: text for name, text in settings.formats.items() if name in inputs},
     )
-
-
-def _fixed_loop(kernel: str, target: str, settings: Settings) -> Sources:
-    """Return a loop in fixed point; without error feedback where it rounds nothing that goes on to the next call."""
-    loop = pipeline.compile(Choice(kernel), target, settings)
-    if settings.carry == "none" or loop.fixed is None or loop.fixed.residuals:
-        return loop
-    # The same sources as from `strapgen generate` without the option.
-    return pipeline.compile(Choice(kernel), target, replace(settings, carry="none"))
 
 
 def _formats(sources: Sources) -> dict[str, str]:
