@@ -172,7 +172,7 @@ release-check: $(TOOLS)
 	build/release/.venv/bin/python -m pip install --disable-pip-version-check "$$(ls dist/*.whl)[dev]"
 	cd build/release && GIT_CEILING_DIRECTORIES=$(CURDIR)/build \
 	  .venv/bin/python -m pytest -n auto --dist worksteal -m "not long" \
-	  --ignore tests/test_architecture.py --ignore tests/test_mutants.py tests
+	  --ignore tests/test_architecture.py --ignore tests/test_mutants.py --ignore tests/test_package_files.py tests
 
 faults: $(TOOLS)
 	$(BIN)/python tests/faults.py --seconds 240

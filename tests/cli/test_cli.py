@@ -32,11 +32,12 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.lab.motions.motions import motion as make_motion
 from strapgen.lab.recordings.recording import read_inertial
-from strapgen.lab.simulate.runs import largest_increment
+from strapgen.lab.runs import largest_increment
 from strapgen.navigation.courses import NavigationFrame, course
 from strapgen.results.display import formulas
 from strapgen.run import standard_tree
-from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, fitted
+from strapgen.run.backends import BACKENDS, fitted
+from strapgen.run.registry import DEFAULT_BACKENDS
 from strapgen.targets import TARGETS
 from strapgen.thesis.thesis_tables import TABLES
 

@@ -19,7 +19,7 @@ from strapgen.cli.options import option
 from strapgen.cli.rules import Excludes, Needs, OneOf, rules
 from strapgen.cli.values import NotNegative, Number, Positive, Vector, names, whole, written
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import SampleSource
+from strapgen.lab.run_options import SampleSource
 
 Speed = Annotated[str, typer.Option("--speed", help="Speed in m/s.")]
 Course = Annotated[str | None, typer.Option("--course", help="Course in deg.")]

@@ -14,7 +14,7 @@ from strapgen.catalogue import choose
 from strapgen.evidence import long_run
 from strapgen.evidence.subjects import Subject
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost.runners import RUNNERS, Runner
+from strapgen.lab.processors import RUNNERS, Runner
 
 flint = pytest.importorskip("flint", reason="python-flint is not installed")
 

@@ -15,8 +15,8 @@ from strapgen.evidence.motion_rows import motion_rows
 from strapgen.evidence.same_bits import Part, of_model, parts_of
 from strapgen.evidence.subjects import Subject
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost.runner_c import MOST, NEEDED, CallRun
-from strapgen.lab.cost.runners import RUNNERS, Runner
+from strapgen.lab.processors import RUNNERS, Runner
+from strapgen.lab.runner_c import MOST, NEEDED, CallRun
 
 #: The machine itself: a program that runs its argument stands for an emulator.
 HOST = Runner("host", ("cc",), ("env",), "cc", "gcc")

@@ -21,10 +21,8 @@ from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Verdict
 from strapgen.ir.version import VERSION
 from strapgen.report.algorithm_view import view
-from strapgen.report.conditions import Conditions
-from strapgen.report.content import Content
-from strapgen.report.dossier import dossier
-from strapgen.report.page import report_page
+from strapgen.report.dossier import Conditions, dossier
+from strapgen.report.page import Content, report_page
 from strapgen.thesis import thesis_tables
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,7 +98,7 @@ def test_all_numbers_are_those_of_the_commands_that_stand_beside_them(page, data
 
 
 def test_the_program_of_the_documentation_reads_the_data(page, monkeypatch, capsys, data):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "report.md").read_text(), re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "evidence.md").read_text(), re.DOTALL)
     assert "out/report.html" in code
     monkeypatch.chdir(page.parent)
     (page.parent / "out").mkdir()

@@ -24,8 +24,8 @@ from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost.runner_c import LongRun, long_run_files
-from strapgen.lab.cost.runners import RUNNERS
+from strapgen.lab.processors import RUNNERS
+from strapgen.lab.runner_c import LongRun, long_run_files
 from strapgen.storage.files import write_files
 from strapgen.targets.contract import options
 

@@ -16,8 +16,8 @@ from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.firmware.vectors.vectors import MODEL, model_call
 from strapgen.firmware.vectors.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError
-from strapgen.lab.cost.runner_c import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
-from strapgen.lab.cost.runners import RUNNERS, Runner
+from strapgen.lab.processors import RUNNERS, Runner
+from strapgen.lab.runner_c import MOST, NEEDED, NOISE, SEED, UNTOUCHED, CallRun, run_files
 from strapgen.run.fixed import ModelEvaluator
 from strapgen.storage.files import write_files
 

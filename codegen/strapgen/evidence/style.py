@@ -16,7 +16,7 @@ from strapgen.evidence.subjects import Subject
 from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
 from strapgen.firmware.vectors.vectors import vectors_of_choice
 from strapgen.firmware.vectors.vectors_c import table_files
-from strapgen.lab.cost.runner_c import CallRun, run_files
+from strapgen.lab.runner_c import CallRun, run_files
 from strapgen.storage.files import write_files
 
 #: Checks of clang-tidy. That parameters of one type can be swapped is left out: an input, an output and a state are

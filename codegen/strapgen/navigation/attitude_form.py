@@ -14,7 +14,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost.cost import cost
+from strapgen.lab.cost import cost
 from strapgen.results import figures
 from strapgen.results.records import INTERNAL, plain_record
 from strapgen.results.result import Result

@@ -15,16 +15,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.lab.recordings.recording import InertialRecording
-from strapgen.lab.simulate.runs import Array
-from strapgen.lab.simulate.runs_report import (
-    ANGLES,
-    AXES,
-    TIME_COLUMN,
-    RunSettings,
-    settings_text,
-    table_of,
-    thinned,
-)
+from strapgen.lab.runs import Array
+from strapgen.lab.runs_report import ANGLES, AXES, TIME_COLUMN, RunSettings, settings_text, table_of, thinned
 from strapgen.navigation.two_speed import two_speed_runner, two_speed_sources
 from strapgen.results import figures
 from strapgen.results.records import INTERNAL, entry

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.lab.simulate.runs_report import ANGLES, AXES
+from strapgen.lab.runs_report import ANGLES, AXES
 from strapgen.navigation.courses import Course, course_figure, course_table
 from strapgen.results.display.frames import VECTOR, Variables, table, variables
 from strapgen.results.display.objects import figure

@@ -13,7 +13,7 @@ from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.progress import say_unused
 from strapgen.cli.values import Number, Vector
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.sensor_errors.sensor_options import SensorFile, read_errors, with_errors
+from strapgen.lab.run_options import SensorFile, read_errors, with_errors
 from strapgen.navigation.systems.built_in import is_system
 
 if TYPE_CHECKING:

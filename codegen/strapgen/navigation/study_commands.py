@@ -17,7 +17,7 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Number, Positive, Vector, filled, names, whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import in_words, motion_option
+from strapgen.lab.run_options import in_words, motion_option
 
 
 @grouped
@@ -144,7 +144,7 @@ def study_attitude_form(
     output.check()
     import math
 
-    from strapgen.lab.cost import cost
+    from strapgen.lab import cost
     from strapgen.navigation import attitude_form as forms
 
     rates = forms.PartRates(float(update_hz), float(navigation_hz), float(orthonormalize_hz))

@@ -22,7 +22,7 @@ from strapgen.cli.rules import Excludes, Needs, OneOf, Rule, rules
 from strapgen.cli.values import Positive
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, in_words
+from strapgen.lab.run_options import MOTION_NAMES, MotionSettings, in_words
 
 if TYPE_CHECKING:
     from strapgen.analysis.agreement.agreement import Agreement

@@ -14,7 +14,7 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track, waiting
 from strapgen.cli.values import whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.study.worker_options import WorkerOptions
+from strapgen.lab.run_options import WorkerOptions
 
 if TYPE_CHECKING:
     from strapgen.design.brief import DesignBrief

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapgen import catalogue
 from strapgen.catalogue.methods.coning_coefficients import FORMS, Design
 from strapgen.lab.motions.motions import Motion, motion
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.runs import simulate
 from strapgen.run.backends import backend as attitude_backend
 
 Array = NDArray[np.float64]

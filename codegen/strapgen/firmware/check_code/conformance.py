@@ -20,11 +20,10 @@ from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.lab.compare.comparison import certified_angle
-from strapgen.lab.converge.convergence import converge
-from strapgen.lab.motions.exact_attitudes import step_of_increments
+from strapgen.lab.comparison import certified_angle
+from strapgen.lab.convergence import converge
 from strapgen.lab.motions.motions import GENERAL, motion
-from strapgen.lab.simulate.runs import attitude, drift_between, simulate
+from strapgen.lab.runs import attitude, drift_between, simulate, step_of_increments
 from strapgen.results.records import Record
 from strapgen.run import exact
 from strapgen.run.backends import Backend, sources_to_build

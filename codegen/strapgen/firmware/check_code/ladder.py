@@ -22,9 +22,9 @@ from strapgen.firmware.check_code.cone import (
 )
 from strapgen.firmware.check_code.conformance import ORDER_WITHIN, Finding
 from strapgen.firmware.check_code.runs import ENDS, ForeignStep, Segment, SegmentRun
-from strapgen.lab.converge.convergence import MOST_ERROR, Convergence, fitted
+from strapgen.lab.convergence import MOST_ERROR, Convergence, fitted
 from strapgen.lab.motions.motions import GENERAL, Motion, motion
-from strapgen.lab.simulate.runs import drift_between, simulate
+from strapgen.lab.runs import drift_between, simulate
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.backends import evaluator
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from strapgen.firmware.check_code.runs import ENDS, ForeignStep, Segment, SegmentRun, rotation_vectors
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.simulate.runs import drift_between
+from strapgen.lab.runs import drift_between
 from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from strapgen.firmware.check_code.foreign_arguments import RATES
 from strapgen.firmware.check_code.foreign_bridge import ForeignSource
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.runs import drift_between
+from strapgen.lab.runs import drift_between
 from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows
 

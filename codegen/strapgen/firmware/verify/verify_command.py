@@ -11,8 +11,8 @@ from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.compare.compare_command import RunDiffering
-from strapgen.lab.simulate.sample_source import SampleSource
+from strapgen.lab.compare_command import RunDiffering
+from strapgen.lab.run_options import SampleSource
 
 if TYPE_CHECKING:
     from strapgen.firmware.verify.header_command import HeaderCommand

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.program import Constant, Node, Operation, Program
-from strapgen.lab.cost import cost as costs
+from strapgen.lab import cost as costs
 from strapgen.navigation.systems.fitting import Fitted
 from strapgen.navigation.systems.system import Rate
 from strapgen.results.records import INTERNAL, entry, properties

@@ -161,7 +161,7 @@ def fitted_stages(
 ) -> tuple[Fitted, Budget, str]:
     """Return the generated stages, what they need, and the command that makes the files again."""
     from strapgen.ir.fixed_settings import Settings
-    from strapgen.lab.cost.cost import processors
+    from strapgen.lab.cost import processors
     from strapgen.navigation.systems.budget import budget, measured_budget
     from strapgen.navigation.systems.fitting import fitted
     from strapgen.navigation.systems.wiring import read_system

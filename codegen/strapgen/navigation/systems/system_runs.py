@@ -14,18 +14,10 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.recordings.history import History
-from strapgen.lab.recordings.recording import Recording
+from strapgen.lab.recordings.recording import History, Recording
+from strapgen.lab.runs import Array, Run
+from strapgen.lab.runs_report import TIME_COLUMN, RunSettings, places, settings_text, table_of, thinned
 from strapgen.lab.sensor_errors.measured_motions import both_increments
-from strapgen.lab.simulate.runs import Array, Run
-from strapgen.lab.simulate.runs_report import (
-    TIME_COLUMN,
-    RunSettings,
-    places,
-    settings_text,
-    table_of,
-    thinned,
-)
 from strapgen.navigation.systems.system import Cell, DescribedSystem
 from strapgen.navigation.systems.system_runner import SystemMemory, SystemRunner
 from strapgen.navigation.systems.wiring import Description

@@ -11,8 +11,7 @@ import typer
 
 from strapgen.cli.option_groups import stated
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.described import DescribedAlgorithms
-from strapgen.lab.sensor_errors.sensor_options import read_errors, with_errors
+from strapgen.lab.run_options import DescribedAlgorithms, read_errors, with_errors
 from strapgen.navigation.systems.built_in import is_system
 
 if TYPE_CHECKING:
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
     from strapgen.cli.options import MethodOptions, SeveralMethods
     from strapgen.cli.output import Output
     from strapgen.lab.recordings.recording import Recording
-    from strapgen.lab.simulate.run_options import RunOptions, RunOutput
-    from strapgen.lab.simulate.sample_source import SampleSource
+    from strapgen.lab.run_options import RunOptions, RunOutput, SampleSource
     from strapgen.navigation.strapdown_command import CourseOutput, Start
     from strapgen.navigation.systems.system_runner import SystemRunner
     from strapgen.navigation.systems.wiring import Description
@@ -54,7 +52,7 @@ def simulated_system(
     if output.print_every is not None:
         raise InputError("--print does not go with a described system; --record and --format csv do")
     from strapgen.cli.progress import waiting
-    from strapgen.lab.simulate.runs_report import RunResult
+    from strapgen.lab.runs_report import RunResult
     from strapgen.navigation.systems.system_runs import simulate_system
 
     description = described_at(name, source)
@@ -78,7 +76,7 @@ def _on_recording(
     name: str, backend: str, source: SampleSource, fixed: FixedOptions, output: RunOutput
 ) -> None:
     """Run along recorded gyro data, and deliver the attitude."""
-    from strapgen.lab.simulate.runs_report import HistoryResult
+    from strapgen.lab.runs_report import HistoryResult
     from strapgen.navigation.systems.system_runs import attitude_output, system_history
 
     data = recorded(source)
@@ -152,7 +150,7 @@ def compared_system(
     output.check(name, *source.files)
     from strapgen import registration
     from strapgen.cli.progress import waiting
-    from strapgen.lab.compare.file_counts import counted
+    from strapgen.lab.compare_command import counted
     from strapgen.navigation.systems.system_comparison import SystemComparisonResult, compare_system
 
     names, reference = backends
