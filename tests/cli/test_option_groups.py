@@ -14,9 +14,8 @@ import typer
 from typer.main import get_command
 
 from strapgen.cli import app
-from strapgen.cli.option_groups import Shown, _fields, grouped
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, Shown, _fields, grouped, rules
 from strapgen.cli.options import option
-from strapgen.cli.rules import Excludes, Needs, OneOf, rules
 from strapgen.cli.values import NotNegative, Number, Positive, Vector, names, whole, written
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.run_options import SampleSource

@@ -15,10 +15,9 @@ from commands import run
 
 from strapgen.catalogue import choose, standard
 from strapgen.cli import main
-from strapgen.evidence import subjects
+from strapgen.evidence import collection
+from strapgen.evidence.collection import Subject, Verdict
 from strapgen.evidence.evidence_report import evidence_page, read_page
-from strapgen.evidence.subjects import Subject
-from strapgen.evidence.verdicts import Verdict
 from strapgen.ir.version import VERSION
 from strapgen.report.algorithm_view import view
 from strapgen.report.dossier import Conditions, dossier
@@ -170,7 +169,7 @@ def test_a_new_version_that_generates_the_same_code_keeps_the_evidence(monkeypat
     newer = Subject(choose("euler-product"))
     newer.__dict__["sources"] = replace(subject.sources, files=files)
     assert newer.digest != digest
-    monkeypatch.setattr(subjects, "VERSION", "9.8.7")
+    monkeypatch.setattr(collection, "VERSION", "9.8.7")
     assert newer.digest == digest
 
 

@@ -11,7 +11,7 @@ import typer
 
 from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
-from strapgen.cli.option_groups import Shown, grouped, stated
+from strapgen.cli.option_groups import Shown, grouped, rules, stated
 from strapgen.cli.options import (
     STEP_OPTIONS,
     FastBackends,
@@ -22,7 +22,6 @@ from strapgen.cli.options import (
     option,
 )
 from strapgen.cli.output import Output
-from strapgen.cli.rules import rules
 from strapgen.cli.values import NotNegative
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.run_options import ONE_SCALE, SOURCE_NEEDED, SampleSource, described

@@ -7,11 +7,10 @@ from typing import Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Excludes, OneOf, Shown, grouped, rules
 from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import waiting
-from strapgen.cli.rules import Excludes, OneOf, rules
 from strapgen.ir.exceptions import InputError
 
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 import typer
 
 from strapgen import registration
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, Rule
 from strapgen.cli.options import option
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.progress import say_unused, waiting
-from strapgen.cli.rules import Excludes, Needs, OneOf, Rule
 from strapgen.cli.values import Positive, Vector, line, names, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

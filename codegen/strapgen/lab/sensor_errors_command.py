@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import OneOf, Shown, grouped, rules
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepName, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.rules import OneOf, rules
 from strapgen.cli.values import whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

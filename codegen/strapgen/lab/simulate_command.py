@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from strapgen import registration
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Needs, Shown, grouped, rules
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm
 from strapgen.cli.progress import say_unused
-from strapgen.cli.rules import Needs, rules
 from strapgen.cli.values import Positive, written
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -7,10 +7,10 @@ from typing import Annotated, ClassVar
 
 import typer
 
-from strapgen.cli.help import PlainCommand, PlainGroup
 from strapgen.cli.option_groups import grouped
 from strapgen.cli.options import Duration, StepName, option
 from strapgen.cli.output import Output
+from strapgen.cli.program import PlainCommand, PlainGroup
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Positive
 from strapgen.ir.exceptions import InputError

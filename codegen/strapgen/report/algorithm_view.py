@@ -10,8 +10,8 @@ from typing import Any
 from strapgen.cli.generated_result import GeneratedSources, GenerateResult
 from strapgen.design.frontier.frontier import Standing
 from strapgen.design.frontier.frontier_report import FrontierResult
+from strapgen.evidence.collection import Subject
 from strapgen.evidence.evidence_report import EvidencePage
-from strapgen.evidence.subjects import Subject
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import above, below

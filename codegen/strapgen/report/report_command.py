@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.option_groups import Needs, Rule, Shown, command_line, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, GyroRate, SeveralMethods, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Needs, Rule, rules
 from strapgen.cli.values import Positive
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.run_options import (

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Excludes, Shown, grouped, rules
 from strapgen.cli.options import FastBackends, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Excludes, rules
 from strapgen.cli.values import Positive, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -115,7 +115,7 @@ def _simulated(
 
 def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Path, report: str) -> None:
     """Write the firmware of the cheapest algorithm that meets the brief."""
-    from strapgen.cli.source_options import SourceOptions
+    from strapgen.cli.generate_command import SourceOptions
     from strapgen.design.selection.firmware import firmware_files
     from strapgen.design.selection.simulated import algorithm_named
 
