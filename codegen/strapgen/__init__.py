@@ -33,11 +33,11 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
+    from strapgen.design import family as _family
     from strapgen.design.commit_late.commit_late import CommitLate as CommitLate
     from strapgen.design.commit_late.late_recording import recording_attitudes as recording_attitudes
     from strapgen.design.commit_late.late_unit import GapError as GapError
     from strapgen.design.commit_late.late_unit import SampleKind as SampleKind
-    from strapgen.design.windows import family as _family
     from strapgen.firmware.check_code.conformance import Finding as Finding
     from strapgen.firmware.check_code.conformance import check as check
     from strapgen.fixedpoint.floating.bounds import rounding_bounds as rounding_bounds
@@ -97,11 +97,11 @@ if _typing.TYPE_CHECKING:
     from strapgen.run import exact as exact
     from strapgen.run import increments as _increments
     from strapgen.run.backends import Backend as Backend
+    from strapgen.run.backends import Evaluator as Evaluator
     from strapgen.run.backends import backend as backend
     from strapgen.run.backends import build as build
     from strapgen.run.backends import evaluator as evaluator
     from strapgen.run.compiler import compile_together as compile_together
-    from strapgen.run.evaluators import Evaluator as Evaluator
     from strapgen.run.registry import BACKENDS as BACKENDS
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
@@ -248,7 +248,7 @@ _NAMESPACES = {
     "tableaux": "catalogue.methods.tableaux",
     "unknowns": "analysis.unknowns.unknowns",
     "vibration": "analysis.vibration",
-    "window_design": "design.windows.family",
+    "window_design": "design.family",
     "windows": "catalogue.methods.windows",
 }
 #: Present names by those of the version before, which give a warning.

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.analysis.vibration.curves import Curve
-from strapgen.analysis.vibration.vibration_plot import vibration_image
+from strapgen.analysis.analysis_plots import vibration_image
+from strapgen.analysis.vibration.mean_rates import Curve
 from strapgen.analysis.vibration.vibration_report import VibrationResult
-from strapgen.design.frontier.frontier import MOTIONS, Standing
-from strapgen.design.frontier.frontier_plot import frontier_image
-from strapgen.design.frontier.frontier_report import FrontierResult
+from strapgen.design.design_plots import frontier_image
+from strapgen.design.frontier import MOTIONS, FrontierResult, Standing
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.ir.kernel_info import Order
 from strapgen.lab.comparison import AngleHistory, Comparison

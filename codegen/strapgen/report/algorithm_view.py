@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.cli.generated_result import GeneratedSources, GenerateResult
-from strapgen.design.frontier.frontier import Standing
-from strapgen.design.frontier.frontier_report import FrontierResult
+from strapgen.design.frontier import FrontierResult, Standing
 from strapgen.evidence.collection import Subject
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.ir import checks

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapgen import pipeline
 from strapgen.catalogue import ALGORITHMS, Choice
-from strapgen.design.frontier import frontier
-from strapgen.design.frontier.frontier import Candidate, Standing
+from strapgen.design import frontier
+from strapgen.design.frontier import Candidate, Standing
 from strapgen.fixedpoint import can_lower
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

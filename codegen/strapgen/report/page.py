@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.design.frontier.frontier import Standing, pareto
+from strapgen.design.frontier import Standing, pareto
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.report.algorithm_view import (
     AlgorithmView,

@@ -146,7 +146,7 @@ def _page(
 ) -> str:
     """Run all that a page shows, and return it."""
     from strapgen import catalogue
-    from strapgen.design.frontier import frontier
+    from strapgen.design import frontier
     from strapgen.report import dossier
     from strapgen.report.page import Content, report_page
     from strapgen.run.versions import versions

@@ -13,7 +13,7 @@ from strapgen import choose, derive, lower
 from strapgen.analysis.series.series import series
 from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS, named_window, read
-from strapgen.design.windows.family import FamilyBrief, design
+from strapgen.design.family import FamilyBrief, design
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings

@@ -10,8 +10,8 @@ from typing import Annotated, Any, ClassVar
 
 import sympy as sp
 
-from strapgen.analysis.unknowns import elimination, families
-from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
+from strapgen.analysis.unknowns import elimination
+from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
 from strapgen.catalogue.methods import coefficient_files, tableaux
 from strapgen.catalogue.methods.coefficient_files import Source, Title
 from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text, word_text, words
@@ -117,14 +117,14 @@ class UnknownTableau:
         terms = []
         for tree in trees(self.order + 1):
             value = self.stages.number(self.stages.tree_residual(tree)) / symmetry(tree)
-            left = families.simple(value.xreplace(family.values))
+            left = elimination.simple(value.xreplace(family.values))
             if left != 0:
                 terms.append(Equation(weight_text(tree), self.order + 1, left))
         return terms
 
     def member(self, family: Family, parameters: Mapping[str, Any]) -> Tableau:
         """Return the method of a family with these parameters; errors are those of `substitute`."""
-        return self.substitute(families.member(family, f"tableau {self.title}", parameters))
+        return self.substitute(elimination.member(family, f"tableau {self.title}", parameters))
 
     def substitute(self, values: Mapping[str, Any]) -> Tableau:
         """Return the tableau with values for all unknowns, its order verified.
