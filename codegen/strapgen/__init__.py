@@ -96,13 +96,13 @@ if _typing.TYPE_CHECKING:
     from strapgen.results.display import formulas as formulas
     from strapgen.run import exact as exact
     from strapgen.run import increments as _increments
+    from strapgen.run.backend_names import BACKENDS as BACKENDS
     from strapgen.run.backends import Backend as Backend
     from strapgen.run.backends import Evaluator as Evaluator
     from strapgen.run.backends import backend as backend
     from strapgen.run.backends import build as build
     from strapgen.run.backends import evaluator as evaluator
     from strapgen.run.compiler import compile_together as compile_together
-    from strapgen.run.registry import BACKENDS as BACKENDS
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
 
@@ -126,7 +126,7 @@ _NAMES = {
         "GapError",
         "SampleKind",
     ),
-    "run.registry": ("BACKENDS",),
+    "run.backend_names": ("BACKENDS",),
     "navigation.systems.system_runner": (
         "SystemRunner",
         "system_runner",

@@ -100,8 +100,8 @@ class Registration:
         What it adds to others, by the extension point that the compiler or another application defines, such as
         "lab.described".
     requires : tuple of str, optional
-        Folders of strapgen that it needs, as "lab" or "targets.c_fixed"; without one of them it is not there either,
-        and it comes after them.
+        Folders of strapgen that it needs, as "lab"; without one of them it is not there either, and it comes after
+        them.
     """
 
     title: str
@@ -145,7 +145,7 @@ def table(kind: str, place: str) -> Mapping[str, Any]:
 
 @cache
 def built_in() -> dict[str, Registration]:
-    """Return what strapgen's folders register, by their names as "lab" and "targets.c", each after what it requires."""
+    """Return what strapgen's folders register, by their names as "lab", each after what it requires."""
     top = Path(__file__).parent
     found: dict[str, Registration] = {}
     for path in [*sorted(top.glob("*/registration.py")), *sorted(top.glob("*/*/registration.py"))]:

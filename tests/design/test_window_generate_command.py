@@ -15,7 +15,7 @@ from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
 from strapgen.design.commit_late.commit_late_sources import sources
 from strapgen.design.family import written
-from strapgen.run.generated_files import command_of
+from strapgen.run.standard_tree import command_of
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from strapgen.cli import main
 from strapgen.cli.option_groups import stated
 from strapgen.firmware import header_command, verification
 from strapgen.ir.exceptions import InputError
-from strapgen.run.generated_files import command_of, text_of
+from strapgen.run.standard_tree import command_of, text_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAME = "euler_rk4_2_w32"

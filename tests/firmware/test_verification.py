@@ -16,7 +16,7 @@ from strapgen.cli import main
 from strapgen.firmware.verification import _Exact
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.version import VERSION
-from strapgen.run.generation import Request
+from strapgen.run.kernel_sources import Request
 
 NAME = "euler_rk4_2_w32"
 GENERATED = Path(__file__).resolve().parents[2] / "generated" / "c_fixed"

@@ -16,7 +16,7 @@ from strapgen.navigation.navigation_kernels import HEXAD_TRIADS, REDUNDANCY
 from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, geometry
 from strapgen.navigation.redundancy.geometry_report import GeometryResult
 from strapgen.navigation.redundancy.redundancy_kernels import SensorSet, kernels, read
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 #: The parity vectors of the six sensors, by the sensors of each.
 VECTORS = {

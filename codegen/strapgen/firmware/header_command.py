@@ -20,7 +20,7 @@ from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
-from strapgen.run.generated_files import command_of, text_of
+from strapgen.run.standard_tree import command_of, text_of
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from strapgen.navigation.systems.fitting import Fitted
     from strapgen.navigation.systems.system_comparison import RunsSamples
     from strapgen.navigation.systems.wiring import Description
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
 
 
 #: The commands that generate C; a header can state these alone.

@@ -19,7 +19,7 @@ from strapgen.results import figures
 from strapgen.results.records import INTERNAL, plain_record
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
-from strapgen.targets.lines import fill
+from strapgen.targets.printer import fill
 
 #: Below this angle in rad the closed forms lose digits, and their series has these.
 _SMALL = 0.5

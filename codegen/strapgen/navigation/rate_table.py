@@ -23,10 +23,10 @@ from strapgen.navigation.two_speed import two_speed_runner, two_speed_sources
 from strapgen.results import figures
 from strapgen.results.result import Result
 from strapgen.results.table import ERROR, Column, TextTable
+from strapgen.run.backend_names import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.run.backends import BACKENDS, evaluator
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.increments import pulses, windows
-from strapgen.run.registry import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 
 Array = NDArray[np.float64]
 

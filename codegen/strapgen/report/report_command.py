@@ -149,7 +149,7 @@ def _page(
     from strapgen.design import frontier
     from strapgen.report import dossier
     from strapgen.report.page import Content, report_page
-    from strapgen.run.versions import versions
+    from strapgen.run.compiler import versions
     from strapgen.storage import cache
 
     shown = choices or catalogue.standard()

@@ -27,9 +27,9 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sources import Sources
+from strapgen.run.backend_names import BACKENDS
 from strapgen.run.backends import fitted
 from strapgen.run.evaluators import Array, integers, numbers
-from strapgen.run.registry import BACKENDS
 
 
 class CommitLate:

@@ -28,9 +28,8 @@ from strapgen.design.commit_late.late_filters import (
     NowErrors,
     Rows,
 )
+from strapgen.fixedpoint.floating.errors import Expressions, sensitivities, slopes
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
-from strapgen.fixedpoint.floating.expressions import Expressions
-from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings

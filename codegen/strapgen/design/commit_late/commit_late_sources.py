@@ -34,7 +34,7 @@ from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
 from strapgen.results.result import Result
 from strapgen.targets import BUILT_IN, contract
-from strapgen.targets.c.emit import CPrinter, real_of
+from strapgen.targets.c import CPrinter, real_of
 from strapgen.targets.rendering import render
 
 #: Kinds of C that commit late.

@@ -20,9 +20,9 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
-from strapgen.run.c import array_type, real_type
+from strapgen.run.backend_names import of_sources
+from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array, Evaluator, in_units
-from strapgen.run.registry import of_sources
 
 
 class SampleKind(IntEnum):

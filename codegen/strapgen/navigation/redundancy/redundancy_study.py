@@ -20,9 +20,9 @@ from strapgen.navigation.redundancy.redundancy_kernels import SensorSet
 from strapgen.results import figures
 from strapgen.results.records import INTERNAL, entry, properties, reader_table
 from strapgen.results.result import Result
+from strapgen.run.backend_names import BACKENDS, of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.kernel_sources import sources_of_program
-from strapgen.run.registry import BACKENDS, of_sources
 
 Array = NDArray[np.float64]
 _ARCSEC = float(np.radians(1 / 3600))

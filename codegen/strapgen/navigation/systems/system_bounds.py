@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from strapgen.fixedpoint.floating import rounding_bounds
+from strapgen.fixedpoint.floating.errors import Expression, Expressions, NoBoundError, sensitivities, slopes
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
-from strapgen.fixedpoint.floating.expressions import Expression, Expressions, NoBoundError
-from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings

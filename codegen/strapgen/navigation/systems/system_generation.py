@@ -17,7 +17,7 @@ from strapgen.navigation.systems.fitting import Fitted, fitted
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, Rate, SystemStage
 from strapgen.navigation.systems.wiring import Description
 from strapgen.targets import TARGETS, system_targets
-from strapgen.targets.c.emit import real_of
+from strapgen.targets.c import real_of
 from strapgen.targets.contract import argument_text, range_text
 from strapgen.targets.rendering import render, render_c, runs_of
 

@@ -24,12 +24,12 @@ from strapgen.navigation.systems.system import Push, Rate, SystemStage
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.wiring import Description
 from strapgen.run import compiler
+from strapgen.run.backend_names import BACKENDS, evaluator_class
 from strapgen.run.backends import fitted as fitted_settings
-from strapgen.run.c import array_type, real_type
+from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array, Evaluator, fresh_feedback, in_si, stored
 from strapgen.run.increments import pulses
 from strapgen.run.kernel_sources import sources_of_choice
-from strapgen.run.registry import BACKENDS, evaluator_class
 from strapgen.targets import TARGETS
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.

@@ -27,7 +27,7 @@ from strapgen.results.records import INTERNAL, entry, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.run import backends
-from strapgen.targets.lines import fill
+from strapgen.targets.printer import fill
 
 Array = NDArray[np.float64]
 #: The back end that the others are compared with.

@@ -25,11 +25,11 @@ from strapgen.navigation.systems.system_runner import EXACT_BITS, SystemMemory, 
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.two_speed_sources import LOOPS, wiring
 from strapgen.run import compiler
+from strapgen.run.backend_names import BACKENDS, evaluator_class
 from strapgen.run.backends import fitted
-from strapgen.run.c import array_type, real_type
+from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array, Evaluator, in_si, stored
 from strapgen.run.kernel_sources import sources_of_choice
-from strapgen.run.registry import BACKENDS, evaluator_class
 from strapgen.targets import BUILT_IN
 
 

@@ -32,7 +32,7 @@ from strapgen.design.brief import DesignBrief
 from strapgen.design.selection import causes
 from strapgen.design.selection.candidates import FREE, ProcessorCost, reference
 from strapgen.design.selection.causes import Rounding
-from strapgen.fixedpoint.runs.angle_accumulation import turning_of_matrices
+from strapgen.fixedpoint.angle_accumulation import turning_of_matrices
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program

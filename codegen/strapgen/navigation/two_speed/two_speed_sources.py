@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from strapgen import pipeline, targets
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint.limits import ranges_of_copies
+from strapgen.fixedpoint.format_plan import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -31,9 +31,8 @@ from strapgen.navigation.systems.fitting import copies, summed, without_needless
 from strapgen.navigation.systems.system import DescribedSystem
 from strapgen.navigation.systems.wiring import Description, wired
 from strapgen.targets import BUILT_IN, TARGETS
-from strapgen.targets.c.emit import real_of
-from strapgen.targets.c.number_text import types_of
-from strapgen.targets.c_fixed.words import WORDS
+from strapgen.targets.c import real_of
+from strapgen.targets.c_numbers import WORDS, types_of
 from strapgen.targets.contract import options
 from strapgen.targets.rendering import render_c, runs_of
 
