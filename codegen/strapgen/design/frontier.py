@@ -150,7 +150,7 @@ class Trial:
     motions: Motions = field(default_factory=lambda: MOTIONS)
 
     def moved(self, begin: Path, end: Path) -> Trial:
-        """Return the trial with the files of the user in another folder, see `clusters.Movable`."""
+        """Return the trial with the files of the user in another folder, see `parallel_cases.Bundle`."""
         one, motions = self.candidate, dict(self.motions)
         if one.method.endswith(".py"):
             one = replace(one, method=moved(one.method, begin, end))

@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -311,25 +312,17 @@ def tables(choices: Iterable[Choice], backends: tuple[str, ...]) -> list[TableEn
     return [*thesis_tables.run_tables(backends)]
 
 
-@dataclass(frozen=True)
-class DossierCase:
-    """What a process needs for the dossier of an algorithm: the parameters of `dossier`."""
-
-    choice: Choice
-    conditions: Conditions
-    settings: Settings | None
-    backends: tuple[str, ...]
-
-
-def dossiers(cases: Sequence[DossierCase], jobs: int | None = None) -> Iterator[AlgorithmDossier]:
-    """Yield the dossiers of algorithms, in the order in which they come."""
+def dossiers(
+    cases: Sequence[tuple[Choice, Conditions, Settings | None, Sequence[str]]], jobs: int | None = None
+) -> Iterator[AlgorithmDossier]:
+    """Yield the dossiers of algorithms, whose cases are the parameters of `dossier`, as they are ready."""
     numbered = {str(place): case for place, case in enumerate(cases)}
     for _, known in side_by_side(_gathered, numbered, jobs):
         yield known
 
 
-def _gathered(case: DossierCase) -> AlgorithmDossier:
-    return dossier(case.choice, case.conditions, case.settings, case.backends)
+def _gathered(case: tuple[Any, ...]) -> AlgorithmDossier:
+    return dossier(*case)
 
 
 def standings(

@@ -185,7 +185,7 @@ class UnknownTableauFile:
 
     name: Title
     source: Source
-    order: Annotated[int, Key("Order that the method is to have", "1", least=1, most=MOST_ORDER)]
+    order: Annotated[int, Key("Required order of the method", "1", least=1, most=MOST_ORDER)]
     unknowns: Annotated[
         tuple[str, ...], Key("Names; where there is a choice, the first ones express the last", least=1)
     ]

@@ -81,7 +81,7 @@ class Question:
     contender: Contender
 
     def moved(self, begin: Path, end: Path) -> Question:
-        """Return the question with its brief in another folder, see `clusters.Movable`."""
+        """Return the question with its brief in another folder, see `parallel_cases.Bundle`."""
         return replace(self, path=moved(self.path, begin, end))
 
 

@@ -89,7 +89,7 @@ class GyroFile:
         Unbalance, Key("Mass unbalance: a number, or a multiple of a symbol", "rad/s per m/s^2")
     ]
     y: Annotated[Axis | None, Key("The other torquer axis", "1")] = None
-    spin: Annotated[Axis | None, Key("The spin axis, in the place of y", "1")] = None
+    spin: Annotated[Axis | None, Key("The spin axis, in place of y", "1")] = None
     turn_deg: Annotated[
         Fraction, Key("Angle by which the torquer axes are turned about the spin axis", "deg")
     ] = Fraction(0)
