@@ -421,7 +421,7 @@ def boresight() -> Kernel:
 
 
 _NAME = Key(
-    "What the names of kernels end with; by default that of the file",
+    "Ending of the names of kernels; by default that of the file",
     pattern="[a-z][a-z0-9]{0,7}",
     form="at most eight small letters and digits, a letter first,",
 )
@@ -433,7 +433,7 @@ class GeometryFile:
 
     axes: Axes
     name: Annotated[str, _NAME] = ""
-    sensor: Annotated[str, Key("What the sensors are", choices=tuple(KINDS))] = "gyro"
+    sensor: Annotated[str, Key("Kind of the sensors", choices=tuple(KINDS))] = "gyro"
     range: Annotated[
         Fraction | None,
         Key("Largest increment of a cycle; by default 1/8 rad or 4 m/s", "rad or m/s", above=0),
