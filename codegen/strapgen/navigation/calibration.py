@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue.coefficients import Number
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel.kernel import evaluate_stages
 from strapgen.results import figures

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.updates import TURN
+from strapgen.catalogue.kernels.two_speed_kernels import TURN
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.euler_angles import ANGLES, followed_angles
+from strapgen.catalogue.kernels.conversions import ANGLES, followed_angles
 from strapgen.catalogue.kinematics import DCM
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder

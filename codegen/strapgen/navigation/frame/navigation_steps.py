@@ -7,8 +7,12 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.acceleration import rotated
-from strapgen.catalogue.kernels.updates import NAVIGATION_ROTATION, ROTATION_VECTOR, transition
+from strapgen.catalogue.kernels.two_speed_kernels import (
+    NAVIGATION_ROTATION,
+    ROTATION_VECTOR,
+    rotated,
+    transition,
+)
 from strapgen.catalogue.kernels.velocity_position import CHANGES
 from strapgen.catalogue.kinematics import DCM, KINEMATICS, SAVAGE, UNIT
 from strapgen.ir.signals import Signal, after

@@ -15,8 +15,7 @@ import sympy as sp
 from strapgen.catalogue import toml_models
 from strapgen.catalogue.coefficients import Number, root
 from strapgen.catalogue.kinematics import DCM
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.kernel.algebra import cross

@@ -1,4 +1,4 @@
-"""Builds sums, products and polynomials as trees of nodes.
+"""Builds and rewrites trees of nodes: sums, products and polynomials, and the names of temporaries.
 
 Every module that writes arithmetic builds it here, so that signs, constants and equal coefficients are treated alike.
 """
@@ -6,11 +6,14 @@ Every module that writes arithmetic builds it here, so that signs, constants and
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from fractions import Fraction
+from itertools import count
+from operator import is_not
 from typing import Any
 
-from strapgen.ir.program import Constant, Node, Operation
+from strapgen.ir.program import Constant, Node, Operation, Program, references
 from strapgen.kernel.polynomials import Polynomial
 
 #: A sign, True for plus, and the node that is added or subtracted.
@@ -135,3 +138,62 @@ def horner(polynomial: Polynomial, node: Callable[[Any], Node]) -> Term:
 def operation_count(node: Node) -> int:
     """Return the number of operations in a tree."""
     return node.size if isinstance(node, Operation) else 0
+
+
+#: Prefix of the temporaries that hold common subexpressions.
+SHARED = "shared_"
+#: Prefix of the temporaries that hold partial products of a power.
+FACTOR = "factor_"
+
+
+def is_temporary(name: str) -> bool:
+    """Return whether a name is that of a temporary, which stands for no quantity of the algorithm."""
+    return name.startswith((SHARED, FACTOR))
+
+
+def shared_names(program: Program) -> Iterator[str]:
+    """Yield names for further common subexpressions, none of which the program uses yet."""
+    names = {assignment.name for assignment in program.body}
+    names |= {element for signal in program.inputs for element in signal.elements}
+    return (name for k in count(1) if (name := f"{SHARED}{k}") not in names)
+
+
+#: Outcomes of a pass for single values that are remembered: the candidates of a kernel have most values in common, and
+#: passes run again until nothing changes.
+REMEMBERED = 10_000
+
+
+def rewritten(node: Node, rule: Callable[[Node], Node]) -> Node:
+    """Return a node after a rule has been applied to all nodes in it, to arguments before their operation."""
+    if isinstance(node, Operation):
+        arguments = tuple([rewritten(argument, rule) for argument in node.arguments])
+        if any(map(is_not, arguments, node.arguments)):
+            node = Operation(node.kind, arguments)
+    return rule(node)
+
+
+def with_values(program: Program, change: Callable[[Node], Node]) -> Program:
+    """Return a program with every assigned value changed."""
+    return with_each(program, [change(assignment.value) for assignment in program.body])
+
+
+def with_each(program: Program, values: list[Node]) -> Program:
+    """Return a program with other values; the program itself if they are equal."""
+    body = [
+        assignment if value == assignment.value else replace(assignment, value=value)
+        for assignment, value in zip(program.body, values, strict=True)
+    ]
+    if not any(map(is_not, body, program.body)):
+        return program
+    return replace(program, body=tuple(body))
+
+
+def uses(program: Program) -> Counter[str]:
+    """Count the uses of each name, in assignments and in results."""
+    counts: Counter[str] = Counter()
+    for assignment in program.body:
+        counts.update(references(assignment.value))
+    for result in program.results:
+        for node in result.nodes:
+            counts.update(references(node))
+    return counts

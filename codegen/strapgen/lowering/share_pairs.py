@@ -13,9 +13,17 @@ from functools import lru_cache
 from itertools import combinations
 
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, names_in, once
-from strapgen.lowering.arithmetic import Term, chain, plain, signed_sum
-from strapgen.lowering.names import is_temporary, shared_names
-from strapgen.lowering.passes.rewriting import REMEMBERED, rewritten, uses
+from strapgen.lowering.trees import (
+    REMEMBERED,
+    Term,
+    chain,
+    is_temporary,
+    plain,
+    rewritten,
+    shared_names,
+    signed_sum,
+    uses,
+)
 
 #: The kind of the sum or product, two members, and whether their signs are equal; those of factors always are.
 _Pair = tuple[str, Node, Node, bool]
