@@ -50,6 +50,15 @@ def test_an_output_tells_its_error_and_whether_it_saturates_and_an_input_neither
     assert [argument_text(argument) for argument in interface.outputs] == [f"{limits}; {error}"]
 
 
+def test_limits_of_an_argument_are_rounded_outward():
+    settings = Settings(word=16, largest_angle=Fraction(1, 10))
+    increments = quantized(Choice("euler", "rk2", 1), settings).interface.inputs[1]
+    low, high = re.search(r"\((\S+) to (\S+)\)", argument_text(increments)).groups()
+    assert (
+        Fraction(low) < increments.low * increments.unit < increments.high * increments.unit < Fraction(high)
+    )
+
+
 def test_a_value_tells_its_format_and_its_range_outward_and_its_error_upward():
     """Of integers from -7 to 1001 in Q5.10 the range is -0.0068359... to 0.97753..., rounded away from each other."""
     value = Value("x", IntegerSum(()), 10, False, -7, 1001, Fraction(0), Fraction(1, 999), 1001)

@@ -110,20 +110,16 @@ BACKENDS = _Backends("backends", Entry)
 DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.own.items() if entry.by_default and not entry.slow)
 
 
-def _of_target(target: str) -> Entry:
+def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
+    """Return the class that runs a kernel for a target."""
     for entry in BACKENDS.values():
         if entry.target == target:
-            return entry
+            loaded: Callable[[Sources], Evaluator] = registration.load(entry.evaluator)
+            return loaded
     runnable = ", ".join(
         dict.fromkeys(e.target for e in BACKENDS.own.values() if e.target in targets.BUILT_IN)
     )
     raise InputError(f"no back end runs code for target {target}; those for these targets run: {runnable}")
-
-
-def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
-    """Return the class that runs a kernel for a target."""
-    loaded: Callable[[Sources], Evaluator] = registration.load(_of_target(target).evaluator)
-    return loaded
 
 
 def of_sources(sources: Sources) -> Evaluator:
