@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
+from strapgen import registration
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
 from strapgen.ir.checks import alternatives, suggestions
 from strapgen.ir.exceptions import StrapgenError
@@ -23,6 +25,10 @@ class PlainCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line; an option's name is not the value of the option before it."""
         _refuse_missing_values(self, ctx, args)
+        if name := _value_of("--variant", args):
+            words = registration.extension("cli.variant", "--variant")
+            path = ctx.command_path.partition(" ")[2]
+            ctx.default_map = words(name, path, args)
         return list(super().parse_args(ctx, args))
 
     def invoke(self, ctx: Any) -> Any:
@@ -47,6 +53,16 @@ class PlainGroup(TyperGroup):
     def get_help(self, ctx: Any) -> str:
         """Return usage, text, options and the commands under their headings."""
         return lay_out(help_parts(self, ctx), self.listed())
+
+
+def _value_of(option: str, words: Sequence[str]) -> str:
+    """Return the value of an option of a command line; "" if it is not there."""
+    for word, following in pairwise([*words, ""]):
+        if word == "--":
+            break
+        if word.partition("=")[0] == option:
+            return word.partition("=")[2] or following
+    return ""
 
 
 def help_parts(command: Any, context: Any) -> CommandHelp:

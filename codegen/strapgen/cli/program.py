@@ -11,6 +11,7 @@ import typer
 from strapgen import registration
 from strapgen.cli import top_help
 from strapgen.cli.help import PlainCommand, PlainGroup
+from strapgen.cli.option_groups import CommandOptions
 from strapgen.ir.exceptions import InputError
 from strapgen.registration import Command
 
@@ -108,6 +109,19 @@ def _add_asked(words: Sequence[str], completing: bool) -> None:
         for name, command, function in registration.installed_commands():
             if not isinstance(function, InputError):
                 _add(name, command, function)
+
+
+def commands() -> list[str]:
+    """Return the names of the commands of strapgen; one of a group has the name of the group and its own."""
+    return [*_OWN]
+
+
+def options_of(command: str) -> CommandOptions:
+    """Return the options of a command."""
+    function = registration.load(_OWN[command].function)
+    if not isinstance(options := getattr(function, "options", None), CommandOptions):
+        raise InputError(f"strapgen {command} takes no options of a variant")
+    return options
 
 
 def app() -> typer.Typer:
