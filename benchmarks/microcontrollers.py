@@ -1,6 +1,6 @@
 """What a step costs on microcontrollers, beside one written by hand; prints the tables of docs/microcontrollers.md.
 
-The counts come from `strapgen.lab.cost.cost`, as those of ``strapgen cost``; they are the same on any machine
+The counts come from `strapgen.lab.cost`, as those of ``strapgen cost``; they are the same on any machine
 with the compilers that the page names.
 """
 
@@ -21,9 +21,9 @@ from strapgen import catalogue, pipeline
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.lab.cost import cost
-from strapgen.lab.cost.cost import Cost
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab import cost
+from strapgen.lab.cost import Cost
+from strapgen.lab.processors import PROCESSORS
 
 HERE = Path(__file__).resolve().parent / "fixed_point"
 BY_HAND = "by hand"

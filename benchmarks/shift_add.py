@@ -18,8 +18,8 @@ import strapgen
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
-from strapgen.lab.cost.cost import cost
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab.cost import cost
+from strapgen.lab.processors import PROCESSORS
 
 #: Kernels with their constants and settings.
 KERNELS: dict[str, tuple[Choice, dict]] = {

@@ -12,8 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 import strapgen
-from strapgen.lab.simulate.drift import angles
-from strapgen.lab.simulate.runs import attitude, drift_between
+from strapgen.lab.runs import angles, attitude, drift_between
 from strapgen.run.backends import Backend
 from strapgen.run.increments import pulses
 

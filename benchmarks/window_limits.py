@@ -21,8 +21,7 @@ from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.filters import responses
 from strapgen.design.windows.family import FamilyBrief, design
 from strapgen.lab.motions.motions import IntegratedMotion, Motion
-from strapgen.lab.simulate.drift import angles, drift, steady_drift
-from strapgen.lab.simulate.runs import Run, attitude, drift_between
+from strapgen.lab.runs import Run, angles, attitude, drift, drift_between, steady_drift
 from strapgen.run.backends import Backend
 from strapgen.run.increments import pulses
 

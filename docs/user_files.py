@@ -40,7 +40,7 @@ def examples() -> dict[Path, str]:
 
 
 def _section(kind: str, schema: dict[str, Any]) -> str:
-    """Return the section of a kind: what it is, examples, and a row for each key."""
+    """Return the section of a kind: what it is, examples, and a row for each key; keys in several tables share it."""
     named = [path for path, other in examples().items() if other == kind]
     shown = ", ".join(f"[{path.name}](../{path.relative_to(ROOT).as_posix()})" for path in named[:4])
     lines = [
@@ -51,10 +51,14 @@ def _section(kind: str, schema: dict[str, Any]) -> str:
         "| key | unit | meaning | allowed | without it |",
         "|---|---|---|---|---|",
     ]
+    rows: dict[tuple[str, ...], list[str]] = {}
     for path, key, needed in _keys("", schema):
         default = "refused" if needed else f"`{key['default']}`" if "default" in key else ""
         description = key.get("description", "").partition(" [")[0]
-        cells = (f"`{path}`", key.get("unit", ""), description, _allowed(key), default)
+        cells = (key.get("unit", ""), description, _allowed(key), default)
+        rows.setdefault((path.rpartition(".")[2], *cells), []).append(f"`{path}`")
+    for (_, *others), paths in rows.items():
+        cells = (", ".join(paths), *others)
         lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -99,8 +103,8 @@ def _allowed(schema: dict[str, Any]) -> str:
             return "table"
         names = schema.get("propertyNames", {}).get("enum")
         return f"table of {', '.join(f'`{name}`' for name in names)}" if names else "table by name"
-    if kind == "string":
-        return "text"
+    if kind in ("string", "boolean"):
+        return {"string": "text", "boolean": "`true`, `false`"}[kind]
     words = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
     limits = "".join(f" {word} {float(schema[name]):.7g}" for name, word in words.items() if name in schema)
     return f"{'whole number' if kind == 'integer' else 'number'}{limits}"

@@ -183,8 +183,8 @@ def fuzz_with_atheris(name: str, seconds: float, seed: int, keeps: bool) -> int:
 def fuzz_c(kernel: str, seconds: float, seed: int, keeps: bool) -> int:
     """Fuzz the C of a kernel of the standard catalogue with libFuzzer."""
     from strapgen import catalogue
-    from strapgen.evidence import fuzzing
-    from strapgen.evidence.subjects import Subject
+    from strapgen.evidence import clang_checks
+    from strapgen.evidence.collection import Subject
 
     subject = next(Subject(choice) for choice in catalogue.standard() if choice.kernel == kernel)
     with tempfile.TemporaryDirectory() as name:
@@ -192,15 +192,15 @@ def fuzz_c(kernel: str, seconds: float, seed: int, keeps: bool) -> int:
         inputs.mkdir()
         for place, data in enumerate(corpus(f"c_{subject.name}")):
             (inputs / f"{place}").write_bytes(data)
-        for file, text in fuzzing.fuzz_files(subject).items():
+        for file, text in clang_checks.fuzz_files(subject).items():
             (folder / file).write_text(text)
-        report = fuzzing.built(folder, subject.sources)
-        report = report or fuzzing.run_fuzzer(
+        report = clang_checks.built(folder, subject.sources)
+        report = report or clang_checks.run_fuzzer(
             folder, [f"-max_total_time={_left(seconds)}", f"-seed={seed}", "inputs"]
         )
         if keeps and not report:
             (folder / "least").mkdir()
-            fuzzing.run_fuzzer(folder, ["-merge=1", "least", "inputs"])
+            clang_checks.run_fuzzer(folder, ["-merge=1", "least", "inputs"])
             keep(f"c_{subject.name}", [path.read_bytes() for path in (folder / "least").iterdir()])
     if report:
         print(report)
@@ -214,11 +214,13 @@ def jobs(seconds: float, only: Sequence[str], cores: int) -> list[tuple[str, flo
     """Return what is fuzzed, and for how long each, so that all cores are busy for the time in all."""
     from fuzz_targets import TARGETS
 
-    from strapgen.evidence import fuzzing
-    from strapgen.evidence.subjects import standard
+    from strapgen.evidence import clang_checks
+    from strapgen.evidence.collection import standard
 
     kinds = {
-        "c": [f"c:{subject.choice.kernel}" for subject in standard()] if fuzzing.FUZZER.installed() else [],
+        "c": [f"c:{subject.choice.kernel}" for subject in standard()]
+        if clang_checks.FUZZER.installed()
+        else [],
         "readers": [name for name in TARGETS if name != "command-line"],
         "command-line": ["command-line"] * cores,
     }

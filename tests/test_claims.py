@@ -17,7 +17,7 @@ from tolerances import certified, roundoff
 
 import strapgen
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.runs import simulate
 
 #: Every combination has its own number in the source.
 pytestmark = pytest.mark.every_combination

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import strapgen
-from strapgen.results.dark_mode import DARK_PAPER, PAPER, contrast, on_dark
+from strapgen.results.figures import DARK_PAPER, PAPER, contrast, on_dark
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "figures"))

@@ -10,8 +10,8 @@ import fuzz_targets
 import pytest
 from fuzz_targets import TARGETS, FindingError
 
-from strapgen.evidence import fuzzing
-from strapgen.evidence.subjects import standard
+from strapgen.evidence import clang_checks
+from strapgen.evidence.collection import standard
 from strapgen.ir.exceptions import InputError
 
 
@@ -58,7 +58,7 @@ def test_the_corpus_of_the_c_keeps_the_contract(tmp_path):
             continue
         folder = tmp_path / subject.name
         folder.mkdir()
-        files = fuzzing.fuzz_files(subject)
+        files = clang_checks.fuzz_files(subject)
         for name, text in files.items():
             (folder / name).write_text(text)
         inputs = fuzz.corpus(f"c_{subject.name}")

@@ -15,10 +15,9 @@ import pytest
 from derived import FIXED_POINT
 
 from strapgen import pipeline
-from strapgen.lab.cost import cost
-from strapgen.lab.cost.cost import EVERYWHERE, REFERENCE, Cost
-from strapgen.lab.cost.cost_report import CostResult
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab import cost
+from strapgen.lab.cost import EVERYWHERE, REFERENCE, Cost, CostResult
+from strapgen.lab.processors import PROCESSORS
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "microcontrollers.md").read_text()

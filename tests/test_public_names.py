@@ -148,7 +148,7 @@ SCRIPT = """
     run = strapgen.simulate(backend, strapgen.motion("constant", x_deg_s=1), "0.1", 1)
     reveal_type(kernel)  # strapgen.kernel.kernel.Kernel
     reveal_type(backend)  # strapgen.run.backends.Backend
-    reveal_type(run)  # strapgen.lab.simulate.runs.Run
+    reveal_type(run)  # strapgen.lab.runs.Run
     reveal_type(strapgen.compare)  # def (
     reveal_type(gyro.pulses)  # def (
     reveal_type(tableaux.read("heun.toml"))  # strapgen.catalogue.methods.tableau.Tableau

@@ -63,11 +63,12 @@ if _typing.TYPE_CHECKING:
     from strapgen.kernel.kernel import KernelBuilder as KernelBuilder
     from strapgen.kernel.kernel import Stage as Stage
     from strapgen.lab import sensor_errors as _sensor_errors
-    from strapgen.lab.compare.comparison import Comparison as Comparison
-    from strapgen.lab.compare.comparison import Comparisons as Comparisons
-    from strapgen.lab.compare.comparison import compare as compare
-    from strapgen.lab.converge.convergence import Convergence as Convergence
-    from strapgen.lab.converge.convergence import converge as converge
+    from strapgen.lab import word_length as _word_length
+    from strapgen.lab.comparison import Comparison as Comparison
+    from strapgen.lab.comparison import Comparisons as Comparisons
+    from strapgen.lab.comparison import compare as compare
+    from strapgen.lab.convergence import Convergence as Convergence
+    from strapgen.lab.convergence import converge as converge
     from strapgen.lab.motions.motions import Motion as Motion
     from strapgen.lab.motions.motions import motion as motion
     from strapgen.lab.motions.users_motions import read_motion as read_motion
@@ -78,11 +79,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.recordings.recording import read_increments as read_increments
     from strapgen.lab.recordings.recording import read_inertial as read_inertial
     from strapgen.lab.recordings.recording import read_rates as read_rates
-    from strapgen.lab.simulate.runs import Run as Run
-    from strapgen.lab.simulate.runs import simulate as simulate
-    from strapgen.lab.simulate.scipy_rotations import from_rotation as from_rotation
-    from strapgen.lab.simulate.scipy_rotations import to_rotation as to_rotation
-    from strapgen.lab.word_length import word_length as _word_length
+    from strapgen.lab.runs import Run as Run
+    from strapgen.lab.runs import simulate as simulate
+    from strapgen.lab.scipy_rotations import from_rotation as from_rotation
+    from strapgen.lab.scipy_rotations import to_rotation as to_rotation
     from strapgen.navigation.courses.courses import Course as Course
     from strapgen.navigation.courses.courses import course as course
     from strapgen.navigation.systems.system_backends import SystemRunner as SystemRunner
@@ -157,7 +157,7 @@ _NAMES = {
         "AttitudeAlgorithm",
         "algorithm",
     ),
-    "lab.compare.comparison": (
+    "lab.comparison": (
         "Comparison",
         "Comparisons",
         "compare",
@@ -166,7 +166,7 @@ _NAMES = {
         "Finding",
         "check",
     ),
-    "lab.converge.convergence": (
+    "lab.convergence": (
         "Convergence",
         "converge",
     ),
@@ -207,11 +207,11 @@ _NAMES = {
         "read_inertial",
         "read_rates",
     ),
-    "lab.simulate.runs": (
+    "lab.runs": (
         "Run",
         "simulate",
     ),
-    "lab.simulate.scipy_rotations": (
+    "lab.scipy_rotations": (
         "from_rotation",
         "to_rotation",
     ),
@@ -244,7 +244,7 @@ _NAMESPACES = {
     "gyro": "run.increments",
     "runge_kutta": "catalogue.methods.runge_kutta",
     "sensors": "lab.sensor_errors",
-    "study": "lab.word_length.word_length",
+    "study": "lab.word_length",
     "tableaux": "catalogue.methods.tableaux",
     "unknowns": "analysis.unknowns.unknowns",
     "vibration": "analysis.vibration",

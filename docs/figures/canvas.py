@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from strapgen.results.dark_mode import DARK_INK, DARK_PAPER, FONTS, INK, PAPER, on_dark
+from strapgen.results.figures import DARK_INK, DARK_PAPER, FONTS, INK, PAPER, on_dark
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]

@@ -8,9 +8,9 @@ from typing import Any
 
 import typer.main
 
-from strapgen.cli import app, top_help
-from strapgen.cli.help import help_parts
+from strapgen.cli import app, help_layout
 from strapgen.cli.help_layout import CommandHelp
+from strapgen.cli.program import help_parts
 
 
 def commands() -> dict[str, tuple[Any, CommandHelp]]:
@@ -40,7 +40,7 @@ def pages() -> dict[str, str]:
 def _index(known: dict[str, tuple[Any, CommandHelp]]) -> str:
     about = "Every command with its arguments and options, as its `--help` shows them. "
     lines = ["# Commands", "", f"{about}[The command line](/command-line.md) shows them at work."]
-    for heading, names in top_help.commands().items():
+    for heading, names in help_layout.commands().items():
         lines += ["", f"## {heading}", "", "| command | what it does |", "|---|---|"]
         for name in names:
             for words in (name, *(other for other in known if other.startswith(f"{name} "))):
@@ -48,7 +48,7 @@ def _index(known: dict[str, tuple[Any, CommandHelp]]) -> str:
                 lines.append(
                     f"| [`{words}`]({page}.md{anchor}) | {_escaped(known[words][1].paragraphs[0])} |"
                 )
-    entries = [f"{name} <{name}>" for names in top_help.commands().values() for name in names]
+    entries = [f"{name} <{name}>" for names in help_layout.commands().values() for name in names]
     return "\n".join([*lines, "", "```{toctree}", ":hidden:", "", *entries, "```", ""])
 
 

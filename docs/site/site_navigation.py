@@ -44,30 +44,25 @@ SECTIONS = (
         "Firmware",
         "docs/paths/firmware.md",
         "You need C for a processor, with bounds that you can sign and tests that come with it.",
-        (
-            *_docs(
-                "fixed-point", "design", "generated-code", "report", "microcontrollers", "evidence", "misra"
-            ),
-            *_docs(
-                "check-foreign-code", "recorded-data", "sensor-errors", "redundancy", "calibration", "speed"
-            ),
+        _docs(
+            *("fixed-point", "design", "generated-code", "microcontrollers", "evidence"),
+            *("check-foreign-code", "sensor-data", "redundancy"),
         ),
     ),
     Section(
         "Paper",
         "docs/paths/paper.md",
         "You compare algorithms, and print their formulas, errors and orders.",
-        (
-            *_docs("series", "coning", "windows", "vibration", "velocity-position", "frontier"),
-            *_docs("jacobians", "unknowns", "comparison"),
+        _docs(
+            *("series", "coning", "windows", "vibration", "velocity-position"),
+            *("unknowns", "canonical-form", "comparison"),
         ),
     ),
     Section(
         "Extend",
-        "docs/paths/extend.md",
+        "docs/own-algorithms.md",
         "You bring a method, an algorithm, a motion or a language of your own.",
         (
-            "docs/own-algorithms.md",
             "docs/languages.md",
             "examples/toy_target/README.md",
             "docs/architecture.md",
@@ -75,25 +70,22 @@ SECTIONS = (
         ),
     ),
     Section(
-        "Understand",
-        "docs/paths/understand.md",
-        "You want to know which frames and signs apply, and why the code is short and its bounds hold.",
-        _docs("conventions", "canonical-form", "attitude-form"),
+        "Conventions",
+        "docs/conventions.md",
+        "You want to know which frames, signs, units and measures of error apply.",
+        (),
     ),
     Section(
         "The thesis",
-        "docs/paths/thesis.md",
+        "docs/thesis.md",
         "You want to see the tables and statements of the thesis beside runs of today.",
-        _docs("thesis-tables", "thesis-statements"),
+        (),
     ),
     Section(
-        "1984",
-        "docs/paths/savage-1984.md",
-        "You follow the lecture of 1984 equation by equation, up to a whole navigator in C.",
-        (
-            *_docs("two-speed", "navigation", "compensation", "outputs"),
-            *_docs("ahrs", "pulse-torque", "systems"),
-        ),
+        "Navigation",
+        "docs/two-speed.md",
+        "You follow the lectures of 1984 equation by equation, up to a whole navigator in C.",
+        _docs("navigation", "compensation", "ahrs", "systems"),
     ),
     Section(
         "Reference",

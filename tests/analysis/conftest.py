@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.runs import simulate
 from strapgen.run.backends import backend
 
 DATA = Path(__file__).resolve().parents[1] / "data" / "algorithms"

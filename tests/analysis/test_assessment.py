@@ -25,7 +25,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.lab.simulate.runs import attitude
+from strapgen.lab.runs import attitude
 from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 from strapgen.run import backends, exact
 from strapgen.run.increments import windows

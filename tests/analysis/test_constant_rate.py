@@ -14,8 +14,8 @@ import sympy as sp
 from strapgen.analysis.series.constant_rate import ANGLE, STEPS, ConstantRate, constant_rate, errors_after
 from strapgen.analysis.series.prediction import parts_of
 from strapgen.catalogue import ALGORITHMS, choose
-from strapgen.lab.motions.exact_attitudes import exact_attitudes
 from strapgen.lab.motions.motions import motion
+from strapgen.lab.runs import exact_attitudes
 from strapgen.run import exact
 
 RATES = {

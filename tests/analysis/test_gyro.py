@@ -18,9 +18,8 @@ from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import IntegratedMotion
-from strapgen.lab.motions.rate_profiles import CosineSum, ThroughGyro
-from strapgen.lab.motions.reference_attitudes import ReferenceAttitude
-from strapgen.lab.simulate.drift import steady_drift
+from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude, ThroughGyro
+from strapgen.lab.runs import steady_drift
 
 #: A gyro of 40 Hz; the closed form takes its damping as it is, the simulated filter has the root of 1/2.
 GYRO, DAMPING = 40.0, math.sqrt(0.5)

@@ -14,7 +14,7 @@ from strapgen.analysis.series import invariants
 from strapgen.catalogue import ALGORITHMS, Choice, choose, derive
 from strapgen.kernel.covariants import Frame
 from strapgen.kernel.kernel import Kernel
-from strapgen.lab.step_series.one_step import errors, step
+from strapgen.lab.one_step import errors, step
 from strapgen.run import exact
 
 CASES = [

@@ -11,7 +11,7 @@ import sympy as sp
 import strapgen
 from strapgen import catalogue
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.step_series.quantization_noise import (
+from strapgen.lab.quantization_noise import (
     PULSE,
     RATE,
     STEP,

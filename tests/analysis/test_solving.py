@@ -22,7 +22,7 @@ from strapgen.catalogue.choice import Choice
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.step_series.one_step import step
+from strapgen.lab.one_step import step
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = str(ROOT / "examples" / "three_samples.py")

@@ -14,7 +14,7 @@ from strapgen import catalogue
 from strapgen.analysis import vibration
 from strapgen.analysis.vibration import Spectrum, random_rates, read_spectrum
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.lab.simulate.runs import attitude
+from strapgen.lab.runs import attitude
 from strapgen.run.increments import windows
 
 choose = catalogue.choose

@@ -24,8 +24,8 @@ from strapgen.cli import main
 from strapgen.firmware.check_code import conformance
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel.kernel import Kernel
-from strapgen.lab.compare.comparison import compare
-from strapgen.lab.converge.convergence import converge
+from strapgen.lab.comparison import compare
+from strapgen.lab.convergence import converge
 from strapgen.lab.motions.motions import GENERAL
 from strapgen.run.backends import backend
 

@@ -711,7 +711,7 @@ def test_python_s_warnings_of_a_coefficient_are_not_shown(entry, folder, capsys)
     "source", ["--motion constant --set x_deg_s=1 --step 1e-3 --duration 3e3", "--increments-csv log.csv"]
 )
 def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
-    from strapgen.lab.simulate import simulate_command
+    from strapgen.lab import simulate_command
     from strapgen.run.backends import Backend
 
     Path("log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(102)))
@@ -731,7 +731,7 @@ def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
 
 
 def test_run_that_the_memory_does_not_hold(folder, capsys, monkeypatch):
-    from strapgen.lab.simulate import runs
+    from strapgen.lab import runs
 
     def exhausted(*_: object) -> None:
         raise MemoryError

@@ -32,7 +32,7 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.lab.motions.motions import motion as make_motion
 from strapgen.lab.recordings.recording import read_inertial
-from strapgen.lab.simulate.runs import largest_increment
+from strapgen.lab.runs import largest_increment
 from strapgen.navigation.courses.courses import NavigationFrame, course
 from strapgen.results.display import formulas
 from strapgen.run import standard_tree

@@ -9,7 +9,7 @@ import pytest
 
 import strapgen
 from strapgen.catalogue.methods import coning_coefficients
-from strapgen.results.display import methods
+from strapgen.results.display import objects
 from strapgen.results.display.latex import PAGE, broken, equations, width
 
 ALGORITHM = strapgen.algorithm("euler", "rk4", increments=2)
@@ -57,7 +57,7 @@ def test_coning_coefficients_show_the_rotation_vector():
 
 
 def test_a_wide_tableau_is_written_stage_by_stage():
-    text = methods.tableau_latex(strapgen.TABLEAUX["dormand-prince8"])
+    text = objects.tableau_latex(strapgen.TABLEAUX["dormand-prince8"])
     assert "array" not in text
     assert text.count("&= ") == 13 + 2
     assert "a_{13,12}" not in text  # it is zero

@@ -9,9 +9,9 @@ import pytest
 from typer.main import get_command
 
 from strapgen import registration
-from strapgen.cli import app, main, top_help
-from strapgen.cli.help import PlainCommand, _label
+from strapgen.cli import app, help_layout, main
 from strapgen.cli.help_layout import summary
+from strapgen.cli.program import PlainCommand, _label
 from strapgen.ir.checks import SYNONYMS
 
 
@@ -52,23 +52,23 @@ def test_commands_stand_in_groups_with_a_whole_sentence_each(monkeypatch):
         ]
         for heading in headings[-5:]
     }
-    assert shown == {heading: [*names] for heading, names in top_help.commands().items()}
+    assert shown == {heading: [*names] for heading, names in help_layout.commands().items()}
     assert not [line for line in lines[1:] if line.endswith("...")]
     assert "stress" not in " ".join(lines)
 
 
 def test_help_of_the_program_has_its_options(capsys):
     """It is printed without the library that reads them."""
-    labels = [label for label, _ in top_help.PROGRAM.panels["Options"]]
+    labels = [label for label, _ in help_layout.PROGRAM.panels["Options"]]
     with EVERY[""].make_context("strapgen", [], resilient_parsing=True) as context:
         options = EVERY[""].get_params(context)
     assert labels == [_label(option) for option in options]
-    known = {label: text for label, text in top_help.PROGRAM.panels["Options"]}
+    known = {label: text for label, text in help_layout.PROGRAM.panels["Options"]}
     assert all(known[_label(option)] == option.help for option in options if option.help)
     for words in ([], ["-h"], ["--help"], ["--verbose", "--help"]):
         with pytest.raises(SystemExit) as stop:
             main(words)
-        assert (stop.value.code, capsys.readouterr().out) == (0, f"{top_help.text()}\n")
+        assert (stop.value.code, capsys.readouterr().out) == (0, f"{help_layout.program_help()}\n")
 
 
 def test_summaries_of_the_list_are_first_sentences_of_the_commands():

@@ -20,7 +20,7 @@ from strapgen.design.commit_late.late_recording import recording_attitudes
 from strapgen.design.commit_late.late_unit import GapError, SampleKind
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.simulate.runs import drift_between
+from strapgen.lab.runs import drift_between
 from strapgen.run import compiler
 
 WINDOW = "window-3-3"

@@ -12,7 +12,7 @@ from c_programs import COMPILERS, complaints, needed, written
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.commit_late.commit_late_sources import NORMALIZATIONS, TARGETS, family, kernels, sources
-from strapgen.evidence import style
+from strapgen.evidence import clang_checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.pipeline import program
@@ -64,7 +64,7 @@ def test_compilers_do_not_complain(algorithm, target, compiler, tmp_path):
         code = [name for name in unit.files if name.endswith(".c")]
         assert complaints(compiler, place, code) == ""
         if compiler == "clang":
-            assert style.found_by_clang(place) == []
+            assert clang_checks.found_by_clang(place) == []
 
 
 @pytest.mark.long
@@ -73,7 +73,7 @@ def test_the_style_is_that_of_other_files(algorithm, target, tmp_path):
     needed("clang-tidy")
     settings = Settings(carry="full") if target == "c-fixed" else None
     written(tmp_path, sources("window-7-7", algorithm, target, settings=settings).files)
-    assert style.found_by_clang_tidy(tmp_path) == []
+    assert clang_checks.found_by_clang_tidy(tmp_path) == []
 
 
 def test_the_header_counts_operations_and_memory():

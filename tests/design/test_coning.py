@@ -27,9 +27,8 @@ from strapgen.design.coning.lines import Lines, of_spectrum
 from strapgen.design.filters.band_grid import REAL
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import IntegratedMotion
-from strapgen.lab.motions.rate_profiles import CosineSum
-from strapgen.lab.motions.reference_attitudes import ReferenceAttitude
-from strapgen.lab.simulate.drift import steady_drift
+from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude
+from strapgen.lab.runs import steady_drift
 
 BAND = Fraction(13, 10)
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))

@@ -17,7 +17,7 @@ from strapgen.design.filters.band_grid import BITS, ONE
 from strapgen.design.windows import family_file
 from strapgen.design.windows.family import FamilyBrief, design
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.drift import drift
+from strapgen.lab.runs import drift
 
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
 SMALL = FamilyBrief(2, 2, Fraction(1), conditions=3, degree=2)

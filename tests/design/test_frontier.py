@@ -15,7 +15,7 @@ from strapgen.design.frontier.frontier import CANDIDATES, MOTIONS, Candidate, ca
 from strapgen.design.frontier.frontier_plot import frontier_image
 from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate import drift
+from strapgen.lab import runs
 
 FEW = ("coning-compressed:1+1", "rk4:2", "coning-compressed:4")
 
@@ -110,7 +110,7 @@ def test_a_drift_that_rounding_hides_is_that_of_its_series(half_angle):
 
 def test_both_arithmetics_agree_where_both_show_a_drift(monkeypatch):
     plain = on_cone("coning-combined:3+3", "1", "5", "1.2")
-    monkeypatch.setattr(drift, "_UNITS_A_STEP", math.inf)
+    monkeypatch.setattr(runs, "_UNITS_A_STEP", math.inf)
     # Rounding of double precision is a unit in the last place at most in each of the 40 steps.
     rounding = math.degrees(40 * 2.0**-52) / 1.2 * 3600
     many_digits = on_cone("coning-combined:3+3", "1", "5", "1.2")

@@ -11,8 +11,8 @@ from derived import program
 
 from strapgen.catalogue import choose, choose_step
 from strapgen.evidence import state_lengths
+from strapgen.evidence.collection import Subject
 from strapgen.evidence.state_lengths import Stretch
-from strapgen.evidence.subjects import Subject
 
 flint = pytest.importorskip("flint")
 
@@ -97,3 +97,64 @@ def test_a_header_without_a_number_is_not_examined(tmp_path):
     verdicts = state_lengths.check(Subject(choose_step("euler", "rk1", 2)), tmp_path)
     assert [verdict.claim for verdict in verdicts] == ["state: stays in its format", "state: stays proper"]
     assert {verdict.result for verdict in verdicts} == {"not examined"}
+
+
+PLANE = flint.fmpq_mpoly_ctx.get(["x", "y", "z"], flint.Ordering.lex)
+
+
+def test_what_turns_with_rotations_of_all_vectors_is_told():
+    d = flint.fmpq_mpoly_ctx.get([f"d{k}" for k in range(6)], flint.Ordering.lex).gens()
+    dot = sum(d[k] * d[k + 3] for k in range(3))
+    assert state_lengths.turns_alone([[dot**2 + 3 * dot]])
+    assert not state_lengths.turns_alone([[dot + d[0] * d[3]]])
+    products = [[d[i] * d[3 + j] + d[j] * d[3 + i] for j in range(3)] for i in range(3)]
+    assert state_lengths.turns_alone(products)
+    assert not state_lengths.turns_alone([[*products[0][:2], 2 * products[0][2]], *products[1:]])
+
+
+@pytest.mark.long
+def test_the_largest_eigenvalue_is_bounded_where_variables_may_lie():
+    """They are x and z from 0 to 1 and y from -1 to 1, with y^2 + z^2 up to 1."""
+    x, y, z = PLANE.gens()
+    zero = PLANE.constant(0)
+
+    def largest(*rows) -> Fraction:
+        return state_lengths.largest([[list(row) for row in rows]])
+
+    assert 2 <= largest([x + z]) <= 2.05
+    assert 1 <= largest([y**2 + z**2]) <= 1.1
+    assert 0 <= largest([-(x**2)]) <= 1e-3
+    assert 1 <= largest([zero, x * y], [x * y, zero]) <= 1.02  # eigenvalues x y and -x y
+    assert 1 <= largest([x * z, zero], [zero, -x]) <= 1.05
+
+
+def test_the_largest_of_several_matrices_counts():
+    x, y, _ = PLANE.gens()
+    assert 3 <= state_lengths.largest([[[x]], [[3 * x * y]]]) <= 3.1
+
+
+def test_a_matrix_of_polynomials_below_zero_has_the_bound_zero():
+    """What is divided by a power of x is below zero up to x = 0."""
+    x, y, z = PLANE.gens()
+    assert state_lengths.largest([[[-(x**4) * (1 + y * y + z)]]]) < 1e-100
+
+
+def test_numbers_above_eigenvalues_are_above_them():
+    matrix = flint.fmpq_mat([[0, 3], [3, 0]])
+    assert 3 < state_lengths._above(matrix) < 3 + 1e-6
+    assert state_lengths._above(flint.fmpq_mat(3, 3)) > 0
+    third = flint.fmpq_mat([[flint.fmpq(1, 3)]])
+    assert Fraction(1, 3) < Fraction(state_lengths._above(third)) < Fraction(1, 3) + Fraction(1, 10**6)
+    for one, eigenvalue in ((third, flint.fmpq(1, 3)), (matrix, flint.fmpq(3))):
+        tiny = flint.fmpq(1, 10**20)
+        assert state_lengths._exceeds(eigenvalue + tiny, one) and not state_lengths._exceeds(eigenvalue, one)
+
+
+def test_what_is_curved_in_a_box_counts():
+    """About the middle of the box, x^2 is 1/4 + (2 u + u^2)/4 for u from -1 to 1: the last term is a quarter."""
+    x = PLANE.gens()[0]
+    zero, box = PLANE.constant(0), ((Fraction(0), Fraction(1)),) * 3
+    for matrix in ([[x**2]], [[zero, x**2], [x**2, zero]]):
+        middle, above = state_lengths._eigenvalues(matrix, box)
+        assert middle == pytest.approx(1 / 4)
+        assert 1 <= above < 1 + 1e-6

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from strapgen.firmware.check_code.check_foreign import check_foreign
-from strapgen.firmware.check_code.foreign_arguments import read_arguments
-from strapgen.firmware.check_code.foreign_bridge import ForeignSource
-from strapgen.firmware.check_code.runs import Convention, ForeignStep
+from strapgen.firmware.check_code.foreign import Convention, ForeignStep
+from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 
 
 @pytest.fixture

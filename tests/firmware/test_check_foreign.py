@@ -14,13 +14,11 @@ from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.firmware.check_code import coning_causes as causes
-from strapgen.firmware.check_code.check_foreign import check_foreign
-from strapgen.firmware.check_code.cone import closed_form_deg_h, cone
-from strapgen.firmware.check_code.conformance_report import ForeignResult
-from strapgen.firmware.check_code.foreign_arguments import read_arguments
-from strapgen.firmware.check_code.foreign_bridge import ForeignSource
-from strapgen.firmware.check_code.replacement import FIRST_ORDER
-from strapgen.firmware.check_code.runs import Convention, ForeignStep
+from strapgen.firmware.check_code.check_foreign import ForeignResult, check_foreign
+from strapgen.firmware.check_code.foreign import Convention, ForeignStep
+from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
+from strapgen.firmware.check_code.ladder import closed_form_deg_h, cone
+from strapgen.firmware.check_code.rotation import FIRST_ORDER
 from strapgen.ir.exceptions import InputError
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "check_foreign_c"

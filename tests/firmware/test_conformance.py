@@ -10,7 +10,7 @@ import pytest
 from strapgen import catalogue
 from strapgen.catalogue import choose
 from strapgen.firmware.check_code import conformance
-from strapgen.firmware.check_code.conformance_report import finding_text
+from strapgen.firmware.check_code.check_foreign import finding_text
 from strapgen.ir.exceptions import InputError
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "modified_rodrigues.py"

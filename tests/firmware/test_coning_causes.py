@@ -7,9 +7,9 @@ import pytest
 
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
 from strapgen.firmware.check_code import coning_causes as causes
+from strapgen.firmware.check_code.foreign import Convention, rotation_vectors
 from strapgen.firmware.check_code.probes import Products, pairs
-from strapgen.firmware.check_code.replacement import IN_PLACE, explanation
-from strapgen.firmware.check_code.runs import Convention, rotation_vectors
+from strapgen.firmware.check_code.rotation import IN_PLACE, explanation
 
 DESIGNS = [
     (samples, previous, form)

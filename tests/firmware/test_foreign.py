@@ -9,8 +9,7 @@ import pytest
 
 from strapgen.firmware.check_code import foreign
 from strapgen.firmware.check_code.foreign import compile_foreign, run_foreign
-from strapgen.firmware.check_code.foreign_arguments import read_arguments
-from strapgen.firmware.check_code.foreign_bridge import ForeignSource
+from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 from strapgen.ir.exceptions import CompilerError, InputError
 
 #: Functions that write what they are called with, or do what they must not.

@@ -13,7 +13,7 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.cli.option_groups import stated
-from strapgen.firmware.verify import header_command, verification
+from strapgen.firmware import header_command, verification
 from strapgen.ir.exceptions import InputError
 from strapgen.run.generated_files import command_of, text_of
 

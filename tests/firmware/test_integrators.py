@@ -9,11 +9,10 @@ import pytest
 
 from strapgen.firmware.check_code import coning_causes as causes
 from strapgen.firmware.check_code import ladder
-from strapgen.firmware.check_code.cone import cone
-from strapgen.firmware.check_code.foreign_arguments import read_arguments
-from strapgen.firmware.check_code.foreign_bridge import ForeignSource
-from strapgen.firmware.check_code.replacement import FIRST_ORDER
-from strapgen.firmware.check_code.runs import ENDS, Convention, ForeignStep
+from strapgen.firmware.check_code.foreign import ENDS, Convention, ForeignStep
+from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
+from strapgen.firmware.check_code.ladder import cone
+from strapgen.firmware.check_code.rotation import FIRST_ORDER
 
 #: Parts of the integrators. A state of four elements has the scalar part first.
 PARTS = r"""

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from strapgen.firmware.vectors.program_evaluator import ProgramEvaluator
+from strapgen.firmware.vectors import ProgramEvaluator
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal

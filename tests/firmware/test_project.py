@@ -12,10 +12,9 @@ from c_programs import COMPILERS, complaints, needed, said, written
 
 from strapgen import pipeline
 from strapgen.catalogue import choose
-from strapgen.firmware import changed_files
-from strapgen.firmware.project import project, two_speed_project
-from strapgen.firmware.vectors.vectors import vectors_of_choice
-from strapgen.firmware.vectors.vectors_c import file_names, table_files
+from strapgen.firmware import project, two_speed_project
+from strapgen.firmware.vectors import vectors_of_choice
+from strapgen.firmware.vectors_c import file_names, table_files
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.two_speed import two_speed_sources
@@ -144,7 +143,7 @@ def test_what_a_user_has_changed_is_not_written_over(tmp_path):
     files = files_of(*PROJECTS[0][:3])
     written(tmp_path, files)
     project.refuse_changed(tmp_path, files)  # the same files once more
-    for name in changed_files.YOURS:
+    for name in project.YOURS:
         changed = tmp_path / name
         changed.write_text("mine")
         with pytest.raises(InputError, match=f"{name} exists and differs from what --project writes"):

@@ -11,8 +11,8 @@ from c_programs import COMPILERS, complaints, line_of_avr, needed, said, written
 
 from strapgen import pipeline
 from strapgen.catalogue import choose
-from strapgen.firmware.vectors.vectors import vectors_of_choice
-from strapgen.firmware.vectors.vectors_c import VectorTable, file_names, table_files
+from strapgen.firmware.vectors import vectors_of_choice
+from strapgen.firmware.vectors_c import VectorTable, file_names, table_files
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 

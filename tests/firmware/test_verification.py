@@ -13,7 +13,7 @@ import pytest
 from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.cli import main
-from strapgen.firmware.verify.verification import _Exact
+from strapgen.firmware.verification import _Exact
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.version import VERSION
 from strapgen.run.generation import Request

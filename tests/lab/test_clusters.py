@@ -13,9 +13,8 @@ import pytest
 from commands import run
 
 from strapgen.ir.exceptions import InputError, StrapgenError
-from strapgen.lab.study import clusters
-from strapgen.lab.study.clusters import Bundle, Cluster
-from strapgen.lab.study.resumable import side_by_side
+from strapgen.lab import parallel_cases
+from strapgen.lab.parallel_cases import Bundle, Cluster, side_by_side
 from strapgen.storage import cache
 
 BRIEFS = Path(__file__).resolve().parents[2] / "examples" / "briefs"
@@ -51,9 +50,9 @@ def test_files_move_with_their_folders(tmp_path):
     files = [tmp_path / "here" / name for name in ("a/brief.toml", "a/../log.csv")]
     bundle = Bundle.of(files)
     assert bundle == Bundle(tmp_path / "here", {"a/brief.toml": b"a/brief.toml", "log.csv": b"log.csv"})
-    placed = clusters._placed(bundle.contents)
-    assert clusters._placed(bundle.contents) == placed
-    again = Path(clusters.moved(str(files[1]), bundle.folder, placed))
+    placed = parallel_cases._placed(bundle.contents)
+    assert parallel_cases._placed(bundle.contents) == placed
+    again = Path(parallel_cases.moved(str(files[1]), bundle.folder, placed))
     assert again.read_text() == "log.csv" and again.parent == placed
     assert Bundle.of([]) is None
     with pytest.raises(InputError, match="cannot be read"):
@@ -61,14 +60,14 @@ def test_files_move_with_their_folders(tmp_path):
 
 
 def test_a_worker_with_another_version_refuses(monkeypatch):
-    assert clusters._remote(Fraction, "1/3", cache.generator_digest(), None) == Fraction(1, 3)
+    assert parallel_cases._remote(Fraction, "1/3", cache.generator_digest(), None) == Fraction(1, 3)
     with pytest.raises(StrapgenError, match="another version of strapgen"):
-        clusters._remote(Fraction, "1/3", "0" * 24, None)
+        parallel_cases._remote(Fraction, "1/3", "0" * 24, None)
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(clusters, "_PATIENCE_S", 1)
+    monkeypatch.setattr(parallel_cases, "_PATIENCE_S", 1)
     with pytest.raises(StrapgenError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
         list(side_by_side(Fraction, {"a": "1"}, cluster=Cluster("tcp://127.0.0.1:9")))
 

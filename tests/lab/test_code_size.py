@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from strapgen import pipeline
-from strapgen.lab.cost import code_size
+from strapgen.lab import cost
 
 
 @pytest.fixture(autouse=True)
@@ -22,14 +22,14 @@ def test_the_cache_keeps_the_size_of_each_code(monkeypatch):
         pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c")
         for kernel in ("euler-normalize", "euler-product")
     )
-    sizes = [code_size.code_size(sources) for sources in (small, large)]
+    sizes = [cost.code_size(sources) for sources in (small, large)]
     assert None not in sizes and sizes[0] != sizes[1]
 
     def never(*_: object) -> None:
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(code_size, "_measured_size", never)
-    assert [code_size.code_size(sources) for sources in (small, large)] == sizes
+    monkeypatch.setattr(cost, "_measured_size", never)
+    assert [cost.code_size(sources) for sources in (small, large)] == sizes
 
 
 def test_a_compiler_that_fails_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
@@ -38,6 +38,6 @@ def test_a_compiler_that_fails_leaves_nothing_in_the_cache(tmp_path, monkeypatch
     failing.write_text(f'#!/bin/sh\ntest -e {tmp_path}/works || exit 1\nexec cc "$@"\n')
     failing.chmod(0o755)
     monkeypatch.setenv("CC", os.fspath(failing))
-    assert code_size.code_size(sources) is None
+    assert cost.code_size(sources) is None
     (tmp_path / "works").touch()
-    assert code_size.code_size(sources) > 0
+    assert cost.code_size(sources) > 0

@@ -14,8 +14,8 @@ import pytest
 import strapgen
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.compare import comparison
-from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
+from strapgen.lab import comparison
+from strapgen.lab.comparison_report import ComparedKernel, ComparisonResult
 from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
 from strapgen.targets.registry import BUILT_IN
 

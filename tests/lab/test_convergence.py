@@ -17,9 +17,9 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Order
-from strapgen.lab.converge import convergence
-from strapgen.lab.converge.convergence import Convergence, Rung, converge
-from strapgen.lab.converge.convergence_report import ConvergenceResult, ladder_table
+from strapgen.lab import convergence
+from strapgen.lab.convergence import Convergence, Rung, converge
+from strapgen.lab.convergence_report import ConvergenceResult, ladder_table
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.
 WITHIN = 0.15

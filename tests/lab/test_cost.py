@@ -12,8 +12,8 @@ from strapgen import pipeline
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost import cost
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab import cost
+from strapgen.lab.processors import PROCESSORS
 
 #: Instructions of a call at most, by processor and kernel, with -O2.
 EXECUTED = {

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.recordings import delimited
+from strapgen.lab.recordings import recorded_rows
 
 
 def read(path: Path) -> list[tuple[int, list[str]]]:
-    return [*delimited.rows(path, chain.from_iterable(delimited.blocks(path)))]
+    return [*recorded_rows.csv_rows(path, chain.from_iterable(recorded_rows.line_blocks(path)))]
 
 
 def test_rows_have_the_numbers_of_the_lines_at_which_they_end(tmp_path):
@@ -22,12 +22,12 @@ def test_rows_have_the_numbers_of_the_lines_at_which_they_end(tmp_path):
 
 
 def test_what_is_at_the_bounds_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(delimited, "MOST_ROWS", 3)
+    monkeypatch.setattr(recorded_rows, "MOST_ROWS", 3)
     path = tmp_path / "x.csv"
     path.write_text(
-        "1\n" + "x" * (delimited.MOST_CHARACTERS - 1) + "\n" + "," * (delimited.MOST_CELLS - 1) + "\n"
+        "1\n" + "x" * (recorded_rows.MOST_CHARACTERS - 1) + "\n" + "," * (recorded_rows.MOST_CELLS - 1) + "\n"
     )
-    assert [len(cells) for _, cells in read(path)] == [1, 1, delimited.MOST_CELLS]
+    assert [len(cells) for _, cells in read(path)] == [1, 1, recorded_rows.MOST_CELLS]
 
 
 @pytest.mark.parametrize("block", [1, 2, 8192])
@@ -36,15 +36,15 @@ def test_what_is_at_the_bounds_is_read(tmp_path, monkeypatch):
     [
         ("1\n2\n3\n4\n", "{path} has over 3 lines; that is too many"),
         (
-            "1\n" + "x" * delimited.MOST_CHARACTERS + "\n",
+            "1\n" + "x" * recorded_rows.MOST_CHARACTERS + "\n",
             "{path}, line 2: over 20000 characters, which no line may have",
         ),
         ("1\n2\n" + "," * 1000, "{path}, line 3: 1001 cells; at most 1000 are allowed"),
     ],
 )
 def test_what_is_beyond_bounds_is_refused_in_one_line(text, said, block, tmp_path, monkeypatch):
-    monkeypatch.setattr(delimited, "MOST_ROWS", 3)
-    monkeypatch.setattr(delimited, "_BLOCK", block)
+    monkeypatch.setattr(recorded_rows, "MOST_ROWS", 3)
+    monkeypatch.setattr(recorded_rows, "_BLOCK", block)
     path = tmp_path / "x.csv"
     path.write_text(text)
     with pytest.raises(InputError) as refusal:
@@ -56,14 +56,14 @@ def test_what_is_beyond_bounds_is_refused_in_one_line(text, said, block, tmp_pat
 def test_a_line_without_an_end_is_not_read_to_its_end():
     """The device never ends a line, nor itself."""
     with pytest.raises(InputError, match="line 1: over 20000 characters"):
-        next(delimited.blocks(Path("/dev/zero")))
+        next(recorded_rows.line_blocks(Path("/dev/zero")))
 
 
 def test_no_more_is_read_than_is_used(tmp_path, monkeypatch):
-    monkeypatch.setattr(delimited, "_BLOCK", 2)
+    monkeypatch.setattr(recorded_rows, "_BLOCK", 2)
     path = tmp_path / "x.csv"
     path.write_text("1\n2\n3\n4\n5\n")
-    blocks = delimited.blocks(path)
+    blocks = recorded_rows.line_blocks(path)
     assert next(blocks) == ["1\n", "2\n"]
     with path.open("a") as file:
         file.write("6\n")

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.lab.simulate.drift import angles, drift, steady_drift
-from strapgen.lab.simulate.runs import Run
+from strapgen.lab.runs import Run, angles, drift, steady_drift
 
 #: Algorithms with their samples, and their drifts in deg/h at 100 Hz over 60 s on the motions below.
 ALGORITHMS = {

@@ -10,8 +10,8 @@ import pytest
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import STANDARD_GRAVITY
-from strapgen.lab.sensor_errors.dither import dither_amplitude, dithered_laser_noise
 from strapgen.lab.sensor_errors.error_file import CLASSES, read
+from strapgen.lab.sensor_errors.instruments import dither_amplitude, dithered_laser_noise
 
 ROOT = Path(__file__).resolve().parents[2]
 DEG_H = np.radians(1 / 3600)

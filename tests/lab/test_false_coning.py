@@ -12,11 +12,10 @@ import strapgen
 from strapgen import choose
 from strapgen.analysis.vibration import of, through_gyro, through_gyros
 from strapgen.lab.motions.motions import IntegratedMotion
-from strapgen.lab.motions.rate_profiles import CosineSum
-from strapgen.lab.motions.reference_attitudes import ReferenceAttitude
+from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude
+from strapgen.lab.runs import drift_between, simulate
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
 from strapgen.lab.sensor_errors.measured_motions import measured
-from strapgen.lab.simulate.runs import drift_between, simulate
 
 
 class Angles(IntegratedMotion):

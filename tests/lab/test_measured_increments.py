@@ -11,6 +11,7 @@ from tolerances import roundoff
 
 import strapgen
 from strapgen.lab.recordings.recording import InertialRecording, Recording
+from strapgen.lab.runs import simulate
 from strapgen.lab.sensor_errors.instruments import (
     CAUSES,
     Heating,
@@ -21,9 +22,7 @@ from strapgen.lab.sensor_errors.instruments import (
     WarmUp,
 )
 from strapgen.lab.sensor_errors.measured_motions import measured, measured_recording
-from strapgen.lab.sensor_errors.response import bounded_noise, second_order
-from strapgen.lab.sensor_errors.sensors import MeasurementUnit
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.sensor_errors.sensors import MeasurementUnit, bounded_noise, second_order
 from strapgen.run.backends import evaluator
 
 CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}

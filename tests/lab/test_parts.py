@@ -7,8 +7,8 @@ import pytest
 
 import strapgen
 from strapgen.ir.exceptions import InputError
+from strapgen.lab import runs
 from strapgen.lab.recordings.recording import Recording, propagate
-from strapgen.lab.simulate import runs
 from strapgen.run import backends, numpy_evaluator
 from strapgen.run import increments as gyro
 from strapgen.run.increments import StepWindows, pulses, run_parts, windows

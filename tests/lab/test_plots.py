@@ -20,24 +20,19 @@ from strapgen.design.frontier.frontier_plot import frontier_image
 from strapgen.design.frontier.frontier_report import FrontierResult
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.ir.kernel_info import Order
-from strapgen.lab.compare.comparison import AngleHistory, Comparison
-from strapgen.lab.compare.comparison_plot import comparison_image
-from strapgen.lab.compare.comparison_report import ComparedKernel, ComparisonResult
-from strapgen.lab.converge.convergence import Convergence, Rung
-from strapgen.lab.converge.convergence_plot import convergence_image
-from strapgen.lab.converge.convergence_report import ConvergenceResult
+from strapgen.lab.comparison import AngleHistory, Comparison
+from strapgen.lab.comparison_report import ComparedKernel, ComparisonResult, comparison_image
+from strapgen.lab.convergence import Convergence, Rung
+from strapgen.lab.convergence_report import ConvergenceResult, convergence_image
 from strapgen.lab.recordings.recording import History
-from strapgen.lab.simulate.runs import Run, simulate
-from strapgen.lab.simulate.runs_plot import history_image, run_image
-from strapgen.lab.simulate.runs_report import HistoryResult, RunResult
+from strapgen.lab.runs import Run, simulate
+from strapgen.lab.runs_report import HistoryResult, RunResult, history_image, run_image
 from strapgen.navigation.rate_table.rate_table import Row
 from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
 from strapgen.navigation.rate_table.rate_table_report import RateTableResult
 from strapgen.results import figures as drawing
-from strapgen.thesis.predicted_tables import PredictedEntry
-from strapgen.thesis.predicted_tables_report import PredictedTablesResult
-from strapgen.thesis.tables_plot import predicted_tables_image, thesis_tables_image
-from strapgen.thesis.tables_report import ThesisTablesResult
+from strapgen.thesis.predicted_tables import PredictedEntry, PredictedTablesResult
+from strapgen.thesis.tables_report import ThesisTablesResult, predicted_tables_image, thesis_tables_image
 from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES, TableEntry
 
 pyplot = pytest.importorskip("matplotlib.pyplot")

@@ -10,8 +10,8 @@ from commands import run
 
 from strapgen import catalogue
 from strapgen.cli import main
-from strapgen.lab.monte_carlo import random_runs as experiment
-from strapgen.lab.monte_carlo.random_runs import (
+from strapgen.lab import random_runs as experiment
+from strapgen.lab.random_runs import (
     Errors,
     MeanSquare,
     SteadyRuns,

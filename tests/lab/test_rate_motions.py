@@ -16,9 +16,8 @@ import strapgen
 from strapgen.analysis.series.series import series
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.motions.jets import Jets, UnboundedError
-from strapgen.lab.motions.rate_expressions import operations_of, time_symbol
-from strapgen.lab.motions.rate_integration import DIGITS, RATE_DEGREE, Integrated
+from strapgen.lab.motions.rate_expressions import Jets, UnboundedError, operations_of, time_symbol
+from strapgen.lab.motions.rate_motion import DIGITS, RATE_DEGREE, Integrated
 from strapgen.lab.motions.users_motions import read_motion
 from strapgen.run.exact import interpreter
 

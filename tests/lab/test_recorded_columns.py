@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.recordings import recorded_columns
-from strapgen.lab.recordings.recorded_columns import Columns, SampleIntervals, largest_magnitude, parts
+from strapgen.lab.recordings import recorded_rows
+from strapgen.lab.recordings.recorded_rows import Columns, SampleIntervals, largest_magnitude, parts
 
 
 @pytest.fixture
 def on_disk(monkeypatch, tmp_path):
     """Keep all but the shortest columns on the disk, and work on few rows together."""
-    monkeypatch.setattr(recorded_columns, "_IN_MEMORY", 10)
-    monkeypatch.setattr(recorded_columns, "PART", 4)
+    monkeypatch.setattr(recorded_rows, "_IN_MEMORY", 10)
+    monkeypatch.setattr(recorded_rows, "PART", 4)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
 
@@ -67,7 +67,7 @@ def test_the_median_of_a_long_row_is_that_of_numpy(numbers):
     time = np.cumsum([0.0, *numbers])
     exact = np.diff(time)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recorded_columns, "PART", 3)
+        patch.setattr(recorded_rows, "PART", 3)
         intervals = SampleIntervals(time)
         if intervals.shortest[0] <= 0:
             return  # refused before it is used

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.recordings import delimited, recorded_columns, recorded_rates, recorded_rows, recording
+from strapgen.lab.recordings import recorded_rows, recording
 from strapgen.lab.recordings.recorded_header import ColumnLayout, named_layout
 from strapgen.lab.recordings.recorded_rows import LineNumbers, read_rows
 
@@ -52,7 +52,7 @@ def test_a_block_is_read_as_its_rows_are(lines, end):
     path.write_bytes(end.join([*good, *lines, *good, ""]).encode())
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(delimited, "_BLOCK", 3)
+            patch.setattr(recorded_rows, "_BLOCK", 3)
             by_block = outcome(path)
             patch.setattr(recorded_rows._Reading, "_plain", lambda self, block: None)
             assert outcome(path) == by_block
@@ -61,7 +61,7 @@ def test_a_block_is_read_as_its_rows_are(lines, end):
 
 
 def test_most_blocks_are_read_by_numpy(tmp_path, monkeypatch):
-    monkeypatch.setattr(delimited, "_BLOCK", 10)
+    monkeypatch.setattr(recorded_rows, "_BLOCK", 10)
     path = tmp_path / "gyro.csv"
     path.write_text("t,dz,dy,dx\n" + "".join(f"{k},3,2,1\n" for k in range(100)))
     plain, taken = recorded_rows._Reading._plain, []
@@ -91,10 +91,10 @@ def test_line_numbers_come_back(blocks):
 
 @pytest.fixture
 def on_disk(monkeypatch):
-    monkeypatch.setattr(recorded_columns, "_IN_MEMORY", 1000)
-    for module in (recorded_columns, recorded_rates):
+    monkeypatch.setattr(recorded_rows, "_IN_MEMORY", 1000)
+    for module in (recorded_rows, recording):
         monkeypatch.setattr(module, "PART", 1000)
-    monkeypatch.setattr(delimited, "_BLOCK", 1000)
+    monkeypatch.setattr(recorded_rows, "_BLOCK", 1000)
 
 
 def long_file(path: Path, count: int) -> Path:
@@ -156,6 +156,6 @@ def test_points_of_the_grid_on_last_rows_of_parts_have_the_bits_of_all_at_once(r
     rates = rng.normal(size=(200, 3)).tolist()
     path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
     at_once = recording.read_rates(path, "rad/s", 64).increments
-    for module in (recorded_columns, recorded_rates):
+    for module in (recorded_rows, recording):
         monkeypatch.setattr(module, "PART", 4)
     np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).increments, at_once)

@@ -10,7 +10,7 @@ import pytest
 import strapgen
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions import rate_profiles
-from strapgen.lab.motions.reference_attitudes import KNOT, ReferenceAttitude
+from strapgen.lab.motions.rate_profiles import KNOT, ReferenceAttitude
 
 #: What the reference may be off after 60 s, in rad; runs are compared with it down to 3e-12 rad (1e-8 deg/h).
 ACCURACY = 5e-13

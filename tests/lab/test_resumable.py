@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from strapgen.ir.exceptions import InputError, StrapgenError
-from strapgen.lab.study.resumable import resume, side_by_side
+from strapgen.lab.parallel_cases import resume, side_by_side
 
 CASES = {f"case {k}": k for k in range(7)}
 IDENTITY = {"version": "1", "rate": 100}
@@ -144,7 +144,7 @@ def test_places_that_cannot_be_written(tmp_path):
 STUDY = """
 import sys, time
 from pathlib import Path
-from strapgen.lab.study.resumable import resume
+from strapgen.lab.parallel_cases import resume
 
 def wait(number):
     # The first cases come at once; the others wait for a file that the test writes after it has killed this process.

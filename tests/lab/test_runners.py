@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from strapgen.ir.exceptions import CompilerError
-from strapgen.lab.cost import runners
-from strapgen.lab.cost.runners import RUNNERS, Runner
+from strapgen.lab import processors
+from strapgen.lab.processors import RUNNERS, Runner
 
 HOST = Runner("host", ("cc",), ("env",), "cc", "gcc")
 
@@ -34,7 +34,7 @@ def test_a_program_is_compiled_and_run_from_another_folder(tmp_path):
 
 
 def test_a_program_that_does_not_end_is_stopped(monkeypatch, tmp_path):
-    monkeypatch.setattr(runners, "_PATIENCE", 0.2)
+    monkeypatch.setattr(processors, "_PATIENCE", 0.2)
     (tmp_path / "program.c").write_text("int main(void)\n{\n    for (volatile int k = 0;; ++k) {\n    }\n}\n")
     with pytest.raises(CompilerError, match=r"env: the program has not ended in 0\.2 s"):
         HOST.run(tmp_path, ["program.c"])

@@ -10,7 +10,7 @@ from tolerances import certified
 
 import strapgen
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.runs import simulate
 
 CONING = {"a_deg_s": 10, "b_deg_s": 10, "g_deg_s": 10}
 

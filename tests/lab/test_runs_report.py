@@ -12,8 +12,8 @@ import pytest
 
 import strapgen
 from strapgen.lab.recordings.recording import History
-from strapgen.lab.simulate.runs import Run, simulate
-from strapgen.lab.simulate.runs_report import HistoryResult, RunMatrices, RunResult, history_table, run_table
+from strapgen.lab.runs import Run, simulate
+from strapgen.lab.runs_report import HistoryResult, RunMatrices, RunResult, history_table, run_table
 from strapgen.results.records import plain_record
 
 SETTINGS = {"algorithm": "dcm", "method": "rk1", "increments": 2, "backend": "numpy", "motion": "coning"}

@@ -13,7 +13,8 @@ import pytest
 
 import strapgen
 from strapgen.cli import main
-from strapgen.lab.sensor_error_study.sensor_error_study import (
+from strapgen.lab.runs import drift_between
+from strapgen.lab.sensor_error_study import (
     SensorStudy,
     deviation_interval,
     records_of,
@@ -28,7 +29,6 @@ from strapgen.lab.sensor_errors.instruments import (
 )
 from strapgen.lab.sensor_errors.sensor_covariance import Path, covariances, error_mean
 from strapgen.lab.sensor_errors.sensors import MeasurementUnit
-from strapgen.lab.simulate.runs import drift_between
 
 CONING = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
 TURN = strapgen.motion("constant", z_deg_s=10)

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 
 from strapgen.ir.exceptions import InputError
+from strapgen.lab import word_length
 from strapgen.lab.motions import users_motions
-from strapgen.lab.word_length import word_length
-from strapgen.lab.word_length.word_length import cases, run, run_case
-from strapgen.lab.word_length.word_length_plot import word_length_image
-from strapgen.lab.word_length.word_length_report import WordLengthResult
+from strapgen.lab.word_length import cases, run, run_case
+from strapgen.lab.word_length_report import WordLengthResult, word_length_image
 
 SMALL = {"duration": "5", "words": (12, 16, 24), "carries": ("none", "full")}
 

@@ -11,7 +11,7 @@ from small_systems import COUNTING
 
 from strapgen.cli import main
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.motions.velocity_increments import velocity_increments
+from strapgen.lab.motions.specific_forces import velocity_increments
 from strapgen.navigation.systems import system_comparison
 from strapgen.navigation.systems.system_comparison import compare_system
 from strapgen.navigation.systems.system_inputs import samples

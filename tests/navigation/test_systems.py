@@ -11,9 +11,9 @@ from small_systems import COUNTING
 
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.motions.velocity_increments import velocity_increments
+from strapgen.lab.motions.specific_forces import velocity_increments
 from strapgen.lab.recordings.recording import InertialRecording, Recording
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.runs import simulate
 from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.systems.system_inputs import cycles_of, samples
 from strapgen.navigation.systems.system_runs import (

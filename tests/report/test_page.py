@@ -15,16 +15,13 @@ from commands import run
 
 from strapgen.catalogue import choose, standard
 from strapgen.cli import main
-from strapgen.evidence import subjects
+from strapgen.evidence import collection
+from strapgen.evidence.collection import Subject, Verdict
 from strapgen.evidence.evidence_report import evidence_page, read_page
-from strapgen.evidence.subjects import Subject
-from strapgen.evidence.verdicts import Verdict
 from strapgen.ir.version import VERSION
 from strapgen.report.algorithm_view import view
-from strapgen.report.conditions import Conditions
-from strapgen.report.content import Content
-from strapgen.report.dossier import dossier
-from strapgen.report.page import report_page
+from strapgen.report.dossier import Conditions, dossier
+from strapgen.report.page import Content, report_page
 from strapgen.thesis import thesis_tables
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,7 +97,7 @@ def test_all_numbers_are_those_of_the_commands_that_stand_beside_them(page, data
 
 
 def test_the_program_of_the_documentation_reads_the_data(page, monkeypatch, capsys, data):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "report.md").read_text(), re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "evidence.md").read_text(), re.DOTALL)
     assert "out/report.html" in code
     monkeypatch.chdir(page.parent)
     (page.parent / "out").mkdir()
@@ -172,7 +169,7 @@ def test_a_new_version_that_generates_the_same_code_keeps_the_evidence(monkeypat
     newer = Subject(choose("euler-product"))
     newer.__dict__["sources"] = replace(subject.sources, files=files)
     assert newer.digest != digest
-    monkeypatch.setattr(subjects, "VERSION", "9.8.7")
+    monkeypatch.setattr(collection, "VERSION", "9.8.7")
     assert newer.digest == digest
 
 

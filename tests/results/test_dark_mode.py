@@ -8,8 +8,8 @@ from itertools import combinations
 
 import pytest
 
-from strapgen.results import dark_mode, figures
-from strapgen.results.dark_mode import DARK_PAPER, PAPER, contrast, linear, on_dark, to_oklab
+from strapgen.results import figures
+from strapgen.results.figures import DARK_PAPER, PAPER, contrast, linear, on_dark, to_oklab
 
 #: The Web Content Accessibility Guidelines 2.1, 1.4.11, ask for this contrast of graphical objects, and 1.4.3 for that
 #: of text.
@@ -104,7 +104,7 @@ def test_the_same_picture_is_the_same_text():
 
 
 def test_paper_and_ink_change_places():
-    assert contrast(dark_mode.INK, PAPER) > 7 and contrast(dark_mode.DARK_INK, DARK_PAPER) > 7
+    assert contrast(figures.INK, PAPER) > 7 and contrast(figures.DARK_INK, DARK_PAPER) > 7
     greys = [on_dark(f"#{level:02x}{level:02x}{level:02x}") for level in range(0, 250, 10)]
     lights = [to_oklab(linear(grey))[0] for grey in greys]
     assert lights == sorted(lights, reverse=True)

@@ -207,7 +207,9 @@ def broken_rules(folder: Path, files: dict[str, str], seen: set[str] | None = No
 
 def explained(*where: str) -> set[str]:
     """Return the rules that the page names for files of some kinds."""
-    rows = re.findall(r"^\| (\d+\.\d+) \| \w+ \| ([\w ]+) \|", (ROOT / "docs" / "misra.md").read_text(), re.M)
+    rows = re.findall(
+        r"^\| (\d+\.\d+) \| \w+ \| ([\w ]+) \|", (ROOT / "docs" / "evidence.md").read_text(), re.M
+    )
     assert 0 < len(rows) <= 8 and {kind for _, kind in rows} <= {"all", "fixed point"}
     return {rule for rule, kind in rows if kind in where}
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from strapgen.thesis.predicted_tables import predicted
-from strapgen.thesis.predicted_tables_report import predicted_text
+from strapgen.thesis.predicted_tables import predicted, predicted_text
 from strapgen.thesis.thesis_tables import TABLES
 
 

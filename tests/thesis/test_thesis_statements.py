@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from strapgen.thesis import thesis_statements
-from strapgen.thesis.statements_report import StatementsResult
-from strapgen.thesis.thesis_runs import bend
-from strapgen.thesis.thesis_statements import COUNT, Statement, statements
+from strapgen.thesis.thesis_statements import COUNT, Statement, StatementsResult, bend, statements
 
 
 @cache

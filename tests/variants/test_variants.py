@@ -14,7 +14,7 @@ from strapgen.catalogue.toml_schemas import schemas
 from strapgen.ir.exceptions import InputError
 from strapgen.storage.resources import PACKAGE
 from strapgen.variants import build
-from strapgen.variants.variant_file import VARIANTS, words_of
+from strapgen.variants.variant_file import read, words_of
 
 TEXT = """\
 [variant.attitude]
@@ -133,7 +133,7 @@ def test_options_of_fixed_point_do_not_reach_a_target_in_floating_point(folder):
 
 
 def test_step_follows_from_sampling_rate_and_increments(folder):
-    assert VARIANTS.read(folder / "strapgen.toml")["attitude"].step == "1/100"
+    assert read(folder / "strapgen.toml")["attitude"].step == "1/100"
 
 
 def test_pyproject_has_variants_below_tool_strapgen(tmp_path, monkeypatch, capsys):
@@ -162,7 +162,7 @@ def test_pyproject_has_variants_below_tool_strapgen(tmp_path, monkeypatch, capsy
             'moton = "coning"',
             "variant.attitude.simulate.moton: key 'moton' is not known",
         ),
-        ("[variant.attitude]", "[variants.attitude]", "variants is unknown; variant is the one key"),
+        ("[variant.attitude]", "[variants.attitude]", "key 'variants' is not known (did you mean variant?)"),
     ],
 )
 def test_wrong_file_is_refused_with_its_key(folder, capsys, old, new, said):
@@ -211,7 +211,7 @@ def test_init_takes_the_algorithm_that_meets_a_brief(tmp_path, monkeypatch, caps
     brief = Path(__file__).parents[2] / "examples/briefs/ahrs.toml"
     monkeypatch.chdir(tmp_path)
     run(["init", "ahrs", "--brief", str(brief), "--out", "fw"])
-    assert VARIANTS.read(tmp_path / "strapgen.toml")["ahrs"].options["method"] == "coning-compressed"
+    assert read(tmp_path / "strapgen.toml")["ahrs"].options["method"] == "coning-compressed"
     run(["build"])
     run(["build", "--check"])
 

@@ -15,10 +15,10 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.lab.compare.comparison import Array, Comparisons, compare
+from strapgen.lab.comparison import Array, Comparisons, compare
 from strapgen.lab.motions import motions
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.simulate.runs import Run, simulate
+from strapgen.lab.runs import Run, simulate
 from strapgen.run.backends import DEFAULT_BACKENDS, Backend
 from strapgen.run.backends import backend as attitude_backend
 

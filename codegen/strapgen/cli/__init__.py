@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from strapgen import registration
-from strapgen.cli import top_help
+from strapgen.cli import help_layout
 from strapgen.ir.exceptions import StrapgenError
 
 #: Most characters of a word that a message repeats, what is left of a longer one, and most characters of a message.
@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Exception as error:
         import typer
 
-        from strapgen.cli.help import explanation
+        from strapgen.cli.program import explanation
 
         if isinstance(error, typer.Abort):
             _interrupted()
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _run(words: list[str]) -> Any:
     """Run a command line, and return its exit status; the help of the program needs no library."""
     if words in (["--help"], ["-h"]) and not _is_completing():
-        sys.stdout.write(f"{top_help.text()}\n")
+        sys.stdout.write(f"{help_layout.program_help()}\n")
         return 0
     from strapgen.cli import program
     from strapgen.run.processes import prepare_for_derivations

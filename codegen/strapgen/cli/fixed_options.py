@@ -7,9 +7,8 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.option_groups import stated
+from strapgen.cli.option_groups import Needs, OneOf, Rule, stated
 from strapgen.cli.options import option
-from strapgen.cli.rules import Needs, OneOf, Rule
 from strapgen.cli.values import Positive, names
 from strapgen.ir.exceptions import InputError
 

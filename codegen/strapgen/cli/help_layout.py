@@ -1,4 +1,4 @@
-"""The layout of help: plain text as wide as the terminal. It is imported without the library of the command line."""
+"""The help of the program, and the layout of all help as plain text; Typer is not imported for it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,8 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-#: Narrowest and widest help in characters.
-_NARROWEST, _WIDEST = 40, 100
-#: A space at which no line ends, and the longest remark in brackets that is on one line.
-_SPACE, _MOST_REMARK = "\0", 30
-#: Widest column of options; the help of a longer one begins on the next line.
-_MOST_OPTION = 26
+from strapgen import registration
+from strapgen.ir.exceptions import InputError
 
 
 class CommandHelp(NamedTuple):
@@ -23,6 +19,53 @@ class CommandHelp(NamedTuple):
     paragraphs: tuple[str, ...]  # the text without its examples, each paragraph in one line
     examples: tuple[str, ...]  # whole commands, each in one line
     panels: Mapping[str, Sequence[tuple[str, str]]]  # arguments and options with their help, by group
+
+
+#: Headings of the commands in their order.
+HEADINGS = ("Derive", "Generate", "Run", "Analyse", "Reproduce")
+#: The program itself.
+PROGRAM = CommandHelp(
+    usage="strapgen [OPTIONS] COMMAND [ARGS]...",
+    paragraphs=(
+        "Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.",
+    ),
+    examples=(
+        "strapgen simulate euler --backend c --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 "
+        "--step 0.125 --duration 180",
+    ),
+    panels={
+        "Options": (
+            ("--version", "Show the versions of strapgen and of what its output depends on."),
+            ("--verbose", "Show on stderr how long each stage takes, and what comes from the cache."),
+            ("--install-completion", "Install completion for the current shell."),
+            (
+                "--show-completion",
+                "Show completion for the current shell, to copy it or customize the installation.",
+            ),
+            ("-h, --help", "Show this message and exit."),
+        )
+    },
+)
+
+
+def program_help() -> str:
+    """Return the help of the program."""
+    return lay_out(PROGRAM, commands())
+
+
+def commands() -> dict[str, dict[str, str]]:
+    """Return the commands that the help lists with their summaries, by heading."""
+    listed: dict[str, dict[str, str]] = {heading: {} for heading in HEADINGS}
+    for one in registration.built_in().values():
+        for name, command in one.commands.items():
+            if command.heading:
+                listed.setdefault(command.heading, {})[name] = command.summary
+    for name, command, function in registration.installed_commands():
+        if command.heading and not isinstance(function, InputError):
+            group = getattr(function, "registered_callback", None)
+            text = command.summary or summary((group.callback if group else function).__doc__ or "")
+            listed.setdefault(command.heading, {}).setdefault(name, text)
+    return listed
 
 
 def lay_out(parts: CommandHelp, commands: Mapping[str, Mapping[str, str]]) -> str:
@@ -42,6 +85,14 @@ def summary(text: str) -> str:
     """Return the first sentence of a help text, without its full stop."""
     first = " ".join(text.strip().split("\n\n")[0].split())
     return re.split(r"\.(?: |$)", first)[0]
+
+
+#: Narrowest and widest help in characters.
+_NARROWEST, _WIDEST = 40, 100
+#: A space at which no line ends, and the longest remark in brackets that is on one line.
+_SPACE, _MOST_REMARK = "\0", 30
+#: Widest column of options; the help of a longer one begins on the next line.
+_MOST_OPTION = 26
 
 
 def _definitions(rows: Sequence[tuple[str, str]], width: int) -> list[str]:

@@ -1,10 +1,14 @@
-"""Groups of options: a dataclass declares options once, and a command takes it as one parameter."""
+"""Groups of options, and rules of what options need and exclude.
+
+A dataclass declares the options of a group once, and a command takes it as one parameter. A command declares its rules
+in a table; they are checked before it runs.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from copy import copy
 from functools import wraps
 from inspect import Parameter, Signature
@@ -15,7 +19,9 @@ import typer
 from typer.models import OptionInfo, ParameterInfo
 
 from strapgen.cli import values
-from strapgen.cli.rules import CommandLine, Rule, check
+from strapgen.cli.values import written
+from strapgen.ir.checks import alternatives
+from strapgen.ir.exceptions import InputError
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -34,6 +40,28 @@ VARIANT = Parameter(
         ),
     ],
 )
+
+
+def grouped(command: Command) -> Command:
+    """Let Typer read the options of a command, and give the command typed values and objects of its groups.
+
+    A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. Its class variable
+    `panel` is the heading of its options, and `rules` says which of them go together.
+    """
+    options = CommandOptions(command)
+
+    @wraps(command)
+    def run(**words: Any) -> Any:
+        return command(**options.typed(words))
+
+    parameters = [option.parameter for option in options.options.values()]
+    if VARIANT.name not in options.options:
+        parameters.append(VARIANT)
+    del run.__dict__["__wrapped__"]  # else the command's own signature would be read
+    run.__dict__["__signature__"] = Signature(parameters)
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    run.__dict__["options"] = options
+    return run  # type: ignore[return-value]
 
 
 class Shown(NamedTuple):
@@ -134,28 +162,6 @@ class CommandOptions:
         return read | made
 
 
-def grouped(command: Command) -> Command:
-    """Let Typer read the options of a command, and give the command typed values and objects of its groups.
-
-    A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. Its class variable
-    `panel` is the heading of its options, and `rules` says which of them go together.
-    """
-    options = CommandOptions(command)
-
-    @wraps(command)
-    def run(**words: Any) -> Any:
-        return command(**options.typed(words))
-
-    parameters = [option.parameter for option in options.options.values()]
-    if VARIANT.name not in options.options:
-        parameters.append(VARIANT)
-    del run.__dict__["__wrapped__"]  # else the command's own signature would be read
-    run.__dict__["__signature__"] = Signature(parameters)
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    run.__dict__["options"] = options
-    return run  # type: ignore[return-value]
-
-
 def _fields(group: type[Any], only: tuple[str, ...]) -> list[Option]:
     hints = get_type_hints(group, include_extras=True)
     fields = {field.name: field for field in dataclasses.fields(group)}
@@ -224,3 +230,113 @@ def command_line(command: str, *parts: Any, files_by_name: bool = False) -> str:
                 by_name = files_by_name and isinstance(value, Path)
                 words += [name, values.written(value.name if by_name else value)]
     return shlex.join(words)
+
+
+def rules(*table: Rule) -> Callable[[Command], Command]:
+    """Declare what goes together of the options of a command."""
+
+    def declare(command: Command) -> Command:
+        command.__dict__["rules"] = table
+        return command
+
+    return declare
+
+
+class CommandLine(NamedTuple):
+    """The options of a command line by their names, arguments by their metavars."""
+
+    values: Mapping[str, Any]
+    defaults: Mapping[str, Any]
+    groups: Mapping[str, Sequence[str]]  # the options of a group, by the parameter of the command
+
+    def given(self, condition: str) -> str:
+        """Return the option of a condition if it has a value, "" if not: "--plot", or "--format=json|csv"."""
+        name, equals, allowed = condition.partition("=")
+        value = self.values.get(name)
+        if value is None or value is False or (isinstance(value, Sized) and not len(value)):
+            return ""
+        if not equals:
+            return name
+        return f"{name} {written(value)}" if written(value) in allowed.split("|") else ""
+
+    def of(self, options: Sequence[str]) -> CommandLine:
+        """Return the options of one group."""
+        return self._replace(values={name: self.values[name] for name in options})
+
+    def stated(self, conditions: str) -> list[str]:
+        """Return the options of conditions that are given and have not their defaults; "@group" is all of a group."""
+        several = [
+            name
+            for condition in conditions.split()
+            for name in (self.groups.get(condition[1:], ()) if condition[0] == "@" else (condition,))
+        ]
+        return [
+            option
+            for condition in several
+            if (option := self.given(condition))
+            and self.values[name := condition.partition("=")[0]] != self.defaults[name]
+        ]
+
+
+class Needs(NamedTuple):
+    """Each of some options needs one of others."""
+
+    options: str
+    one_of: str
+
+    def refusal(self, line: CommandLine) -> str:
+        """Return why a command line is refused; "" if it is not."""
+        conditions = self.one_of.split()
+        if any(line.given(condition) for condition in conditions):
+            return ""
+        if not any(condition.partition("=")[0] in line.values for condition in conditions):
+            return ""  # a command shows some options of a group
+        needed = [_in_words(condition) for condition in conditions]
+        return "".join(f"{option} needs {alternatives(needed)}" for option in line.stated(self.options)[:1])
+
+
+class Excludes(NamedTuple):
+    """None of some options goes with one of others; the reason says what they do."""
+
+    options: str
+    others: str
+    reason: str = ""
+
+    def refusal(self, line: CommandLine) -> str:
+        """Return why a command line is refused; "" if it is not."""
+        options, others = line.stated(self.options), line.stated(self.others)
+        if not options or not others:
+            return ""
+        if self.reason:
+            return f"{self.reason}; {others[0]} does not go with it"
+        return f"{options[0]} and {others[0]} do not go together"
+
+
+class OneOf(NamedTuple):
+    """One of some options is given, or at most one where none is needed."""
+
+    options: str
+    needed: str = ""  # that one is needed, in words
+    several: bool = False  # whether several may be given
+
+    def refusal(self, line: CommandLine) -> str:
+        """Return why a command line is refused; "" if it is not."""
+        given = [option for option in self.options.split() if line.given(option)]
+        if len(given) > 1 and not self.several:
+            return f"{given[0]} and {given[1]} are both given; one is needed"
+        return "" if given else self.needed
+
+
+Rule = Needs | Excludes | OneOf
+
+
+def check(table: Sequence[Rule], line: CommandLine) -> None:
+    """Refuse a command line that breaks a rule."""
+    for rule in table:
+        if refusal := rule.refusal(line):
+            raise InputError(refusal)
+
+
+def _in_words(condition: str) -> str:
+    name, equals, allowed = condition.partition("=")
+    return f"{name} {alternatives(allowed.split('|'))}" if equals else name

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import typer
 
+from strapgen.cli.option_groups import OneOf, Rule
 from strapgen.cli.progress import waiting
-from strapgen.cli.rules import OneOf, Rule
 from strapgen.cli.values import Positive, Reader, folder, names, single
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

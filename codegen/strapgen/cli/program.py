@@ -3,17 +3,198 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from strapgen import registration
-from strapgen.cli import top_help
-from strapgen.cli.help import PlainCommand, PlainGroup
+from strapgen.cli import help_layout
+from strapgen.cli.help_layout import CommandHelp, lay_out, summary
 from strapgen.cli.option_groups import CommandOptions
-from strapgen.ir.exceptions import InputError
+from strapgen.ir.checks import alternatives, suggestions
+from strapgen.ir.exceptions import InputError, StrapgenError
 from strapgen.registration import Command
+
+
+class PlainCommand(TyperCommand):
+    """A command whose help is plain text and whose messages name its options."""
+
+    def get_help(self, ctx: Any) -> str:
+        """Return usage, text, examples, arguments, and the options in their groups."""
+        return lay_out(help_parts(self, ctx), {})
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line; an option's name is not the value of the option before it."""
+        _refuse_missing_values(self, ctx, args)
+        if name := _value_of("--variant", args):
+            words = registration.extension("cli.variant", "--variant")
+            ctx.default_map = words(name, ctx.command_path.partition(" ")[2], args)
+        return list(super().parse_args(ctx, args))
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; in its messages the parameters of Python are options."""
+        try:
+            return super().invoke(ctx)
+        except StrapgenError as error:
+            if getattr(error, "in_file", False):
+                raise
+            told = type(error)(_in_options(self, str(error)))
+            vars(told).update(vars(error))
+            raise told from error
+
+
+class PlainGroup(TyperGroup):
+    """A group of commands, which its help lists."""
+
+    def listed(self) -> dict[str, dict[str, str]]:
+        """Return the commands with their summaries, by heading."""
+        return {"Commands": {name: summary(command.help or "") for name, command in self.commands.items()}}
+
+    def get_help(self, ctx: Any) -> str:
+        """Return usage, text, options and the commands under their headings."""
+        return lay_out(help_parts(self, ctx), self.listed())
+
+
+def _value_of(option: str, words: Sequence[str]) -> str:
+    """Return the value of an option of a command line; "" if it is not there."""
+    for word, following in pairwise([*words, ""]):
+        if word == "--":
+            break
+        if word.partition("=")[0] == option:
+            return word.partition("=")[2] or following
+    return ""
+
+
+def help_parts(command: Any, context: Any) -> CommandHelp:
+    """Return the help of a command or group of Typer, whose context has the path of names that begins the usage."""
+    pieces = [f"[{_label(p)}]" if not p.required else _label(p) for p in _arguments(command, context)]
+    if hasattr(command, "commands"):
+        pieces.append("COMMAND [ARGS]...")
+    parts = [" ".join(part.split()) for part in (command.help or "").strip().split("\n\n")]
+    examples = {part: part.removeprefix("Example: ") for part in parts}
+    commands = tuple(each for each in examples.values() if each.startswith("strapgen "))
+    return CommandHelp(
+        usage=f"{context.command_path} {' '.join(['[OPTIONS]', *pieces])}",
+        paragraphs=tuple(part for part in parts if examples[part] not in commands),
+        examples=commands,
+        panels=_panels(command, context),
+    )
+
+
+def explanation(error: Any) -> str:
+    """Return an error of Typer's parser in one sentence: the likely meaning, and the allowed words."""
+    said = error.format_message() or "a command is needed"
+    context = getattr(error, "ctx", None)
+    command: Any = context and context.command
+    name = getattr(error, "option_name", None)
+    if said.startswith(("No such command", "Missing command")):
+        known = [each for names in command.listed().values() for each in names]
+        word = re.search(r"'(.*?)'", said)
+        meant = suggestions("command", word[1], known) if word else []
+        return f"{said.split('.')[0]}{_question(meant)}. Allowed: {', '.join(known)}."
+    parameter = getattr(error, "param", None)
+    if parameter is not None and said.startswith("Missing "):
+        name = parameter.opts[0] if parameter.param_type_name == "option" else _label(parameter)
+        return f"Missing {parameter.param_type_name} '{name}': {_meaning(parameter, context)}"
+    if name is not None and command is not None and said.startswith("No such option"):
+        known = [option.opts[0] for option in _options_of(command, context)]
+        return f"No such option: {name}{_question(suggestions('option', name, known))}; --help shows all"
+    return said
+
+
+def _question(meant: list[str]) -> str:
+    return f" (did you mean {alternatives(meant)}?)" if meant else ""
+
+
+def _needs(command: Any, name: str, context: Any) -> str:
+    """Return the message that an option lacks its value, with its help."""
+    option = next(option for option in _options_of(command, context) if name in option.opts)
+    return f"{name} needs a value, {option.metavar}: {_meaning(option, context)}"
+
+
+def _meaning(parameter: Any, context: Any) -> str:
+    """Return the help of a parameter, to stand behind a colon."""
+    text = re.sub(r"\s*\[.*\]$", "", _help_text(parameter, context)).rstrip(".")
+    return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
+
+
+def _options_of(command: Any, context: Any) -> list[Any]:
+    return [
+        p
+        for p in command.get_params(context)
+        if p.param_type_name == "option" and not getattr(p, "hidden", False)
+    ]
+
+
+def _refuse_missing_values(command: Any, context: Any, words: Sequence[str]) -> None:
+    """Refuse an option that takes a value, followed by another option."""
+    takes = {name: option for option in _options_of(command, context) for name in option.opts}
+    before = ""
+    for word in words:
+        if word == "--":
+            return
+        option = takes.get(before)
+        if option is not None and not option.is_flag:
+            if word in takes and word.startswith("--"):
+                context.fail(_needs(command, before, context))
+            before = ""
+        else:
+            before = word
+    if before in takes and not takes[before].is_flag:
+        context.fail(_needs(command, before, context))
+
+
+def _in_options(command: Any, message: str) -> str:
+    """Return a message with options of the command in place of the parameters of Python."""
+    names: dict[str, str] = {}
+    for parameter in command.params:
+        for option in reversed([o for o in parameter.opts if o.startswith("--")]):
+            names[option[2:].replace("-", "_")] = option
+            names[parameter.name] = option
+    plain = {name: option for name, option in names.items() if "_" in name}
+    if not plain:
+        return message
+    return re.sub(
+        rf"(?<![\w.'/-])({'|'.join(map(re.escape, plain))})(?![\w.'/=(-])", lambda m: plain[m[1]], message
+    )
+
+
+def _panels(command: Any, context: Any) -> dict[str, list[tuple[str, str]]]:
+    """Return the arguments and the options by the titles of their groups, general groups last."""
+    panels: dict[str, list[tuple[str, str]]] = {}
+    for parameter in (*_arguments(command, context), *_options_of(command, context)):
+        title = (
+            "Arguments"
+            if parameter.param_type_name == "argument"
+            else getattr(parameter, "rich_help_panel", None) or "Options"
+        )
+        panels.setdefault(title, []).append((_label(parameter), _help_text(parameter, context)))
+    for last in ("Output", "Options"):
+        if rows := panels.pop(last, []):
+            panels["Other options" if last == "Options" and {*panels} - {"Arguments"} else last] = rows
+    return panels
+
+
+def _arguments(command: Any, context: Any) -> list[Any]:
+    return [p for p in command.get_params(context) if p.param_type_name == "argument"]
+
+
+def _label(parameter: Any) -> str:
+    """Return an argument or an option with its value as the help shows it, without its aliases."""
+    if parameter.param_type_name == "argument":
+        return str(parameter.metavar or parameter.name.upper())
+    names = sorted((name for name in parameter.opts if not name.startswith("--")), key=len)
+    names.append(next(name for name in parameter.opts if name.startswith("--")))
+    return ", ".join(names) if parameter.is_flag else f"{', '.join(names)} {parameter.metavar}"
+
+
+def _help_text(parameter: Any, context: Any) -> str:
+    record = parameter.get_help_record(context)
+    return " ".join(record[1].split()) if record else ""
 
 
 class _Strapgen(PlainGroup):
@@ -21,11 +202,11 @@ class _Strapgen(PlainGroup):
 
     def listed(self) -> dict[str, dict[str, str]]:
         """Return all commands, of which those that a command line does not need are not imported."""
-        return top_help.commands()
+        return help_layout.commands()
 
     def get_help(self, ctx: Any) -> str:
         """Return the help of the program."""
-        return top_help.text()
+        return help_layout.program_help()
 
 
 _app = typer.Typer(
@@ -42,6 +223,31 @@ _groups: dict[str, typer.Typer] = {}
 _OWN = {name: command for one in registration.built_in().values() for name, command in one.commands.items()}
 
 
+def commands() -> list[str]:
+    """Return the names of the commands of strapgen; one of a group has the name of the group and its own."""
+    return [*_OWN]
+
+
+def options_of(command: str) -> CommandOptions:
+    """Return the options of a command."""
+    function = registration.load(_OWN[command].function)
+    if not isinstance(options := getattr(function, "options", None), CommandOptions):
+        raise InputError(f"strapgen {command} takes no options of a variant")
+    return options
+
+
+def app() -> typer.Typer:
+    """Return the program with all commands of strapgen."""
+    _add_own(*_OWN)
+    return _app
+
+
+def run(words: Sequence[str], completing: bool = False) -> Any:
+    """Run a command line, and return its exit status."""
+    _add_asked(words, completing)
+    return _app(words, prog_name="strapgen", standalone_mode=False)
+
+
 def _show_versions(chosen: bool) -> None:
     if not chosen:
         return
@@ -52,7 +258,7 @@ def _show_versions(chosen: bool) -> None:
 
 
 @_app.callback()
-def _options(
+def _program_options(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", callback=_show_versions, is_eager=True)] = False,
     verbose: Annotated[bool, typer.Option("--verbose")] = False,
@@ -109,28 +315,3 @@ def _add_asked(words: Sequence[str], completing: bool) -> None:
         for name, command, function in registration.installed_commands():
             if not isinstance(function, InputError):
                 _add(name, command, function)
-
-
-def commands() -> list[str]:
-    """Return the names of the commands of strapgen; one of a group has the name of the group and its own."""
-    return [*_OWN]
-
-
-def options_of(command: str) -> CommandOptions:
-    """Return the options of a command."""
-    function = registration.load(_OWN[command].function)
-    if not isinstance(options := getattr(function, "options", None), CommandOptions):
-        raise InputError(f"strapgen {command} takes no options of a variant")
-    return options
-
-
-def app() -> typer.Typer:
-    """Return the program with all commands of strapgen."""
-    _add_own(*_OWN)
-    return _app
-
-
-def run(words: Sequence[str], completing: bool = False) -> Any:
-    """Run a command line, and return its exit status."""
-    _add_asked(words, completing)
-    return _app(words, prog_name="strapgen", standalone_mode=False)

@@ -8,12 +8,12 @@ REGISTRATION = Registration(
     "the commands of the compiler",
     commands={
         "list": Command(
-            f"{__package__}.list_command:list_names",
+            f"{__package__}.derive_commands:list_names",
             "Derive",
             summary="List all names that the other commands take",
         ),
         "derive": Command(
-            f"{__package__}.derive_command:derive",
+            f"{__package__}.derive_commands:derive",
             "Derive",
             summary="Show the formulas, the program or the operations of a kernel",
         ),
@@ -23,13 +23,13 @@ REGISTRATION = Registration(
             summary="Generate source code for an algorithm, or for the whole catalogue",
         ),
         "schema": Command(
-            f"{__package__}.schema_command:schema",
+            f"{__package__}.derive_commands:schema",
             "Derive",
             summary="Print the JSON Schema of a result or of users' files",
         ),
     },
     results={
-        "names": f"{__package__}.names_result:NamesResult",
+        "names": f"{__package__}.derive_commands:NamesResult",
         "kernel": "strapgen.results.display.formulas:KernelResult",
         "generated": f"{__package__}.generated_result:GenerateResult",
         "in-step": f"{__package__}.generated_result:StepCheck",

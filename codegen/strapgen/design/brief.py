@@ -18,7 +18,7 @@ from strapgen.design.environment import (
     SpectralEnvironment,
 )
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.cost.processors import PROCESSORS
+from strapgen.lab.processors import PROCESSORS
 from strapgen.targets.registry import TARGETS
 
 #: Part of the budget that the software may use where the brief does not say. The share is this project's own:

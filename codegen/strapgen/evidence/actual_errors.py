@@ -7,24 +7,22 @@ from __future__ import annotations
 
 import importlib.metadata
 import random
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from strapgen import pipeline
 from strapgen.catalogue import choose
-from strapgen.evidence.balls import ball, column_of, multiplied, outcome, outcomes
-from strapgen.evidence.subjects import Subject
-from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
-from strapgen.firmware.vectors.vectors import MODEL, vectors_of_choice
+from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
+from strapgen.firmware.vectors import MODEL, vectors_of_choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.interfaces import AngleAccumulation
-from strapgen.ir.program import Program
+from strapgen.ir.program import OPERATIONS, Program
 from strapgen.run.fixed import ModelEvaluator
 
 #: Calls, and steps of a run; steps from one look at the state to the next.
@@ -39,7 +37,6 @@ _SMALL = Fraction(1, 128)
 _ITERATIONS = 10
 #: The orthonormalization of a run of matrices, which keeps the nearest rotation.
 _OF_MATRICES = "dcm-orthonormalize-first-order"
-
 TOOL = Tool(
     "FLINT", (), "python-flint from PyPI", lambda: importlib.metadata.version("python-flint"), ("flint",)
 )
@@ -58,28 +55,20 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
 # Calls
 
 
-@dataclass(frozen=True)
-class CertifiedCalls:
-    """The largest errors of calls, and the largest radius of a ball, as parts of the bounds and of the last place."""
-
-    #: Calls that were not refused
-    count: int
-    #: The largest error, as a part of its bound
-    share: float
-    #: The largest radius, in units of the last place
-    radius: float
-
-
 def _judged_calls(subject: Subject) -> tuple[Result, str]:
-    calls = errors_of_calls(subject, COUNT)
-    result: Result = "agrees" if calls.share <= 1 and calls.radius < LARGEST_RADIUS else "fails"
-    if calls.radius >= LARGEST_RADIUS:
-        return result, "balls become too wide"
-    return result, f"{calls.count} of {COUNT} calls accepted, errors up to {calls.share:.3f} of the bound"
+    accepted, share, radius = errors_of_calls(subject, COUNT)
+    if radius >= LARGEST_RADIUS:
+        return "fails", "balls become too wide"
+    detail = f"{accepted} of {COUNT} calls accepted, errors up to {share:.3f} of the bound"
+    return "agrees" if share <= 1 else "fails", detail
 
 
-def errors_of_calls(subject: Subject, count: int) -> CertifiedCalls:
-    """Return the largest errors of calls at corners of the ranges, near them and anywhere."""
+def errors_of_calls(subject: Subject, count: int) -> tuple[int, float, float]:
+    """Call at corners of the ranges, near them and anywhere.
+
+    Returns the number of calls that are accepted, the largest error as a part of its bound, and the largest radius of a
+    ball in units of the last place.
+    """
     from flint import ctx
 
     table = vectors_of_choice(subject.choice, "c-fixed", subject.settings, count)
@@ -98,25 +87,20 @@ def errors_of_calls(subject: Subject, count: int) -> CertifiedCalls:
             columns = map(column_of, zip(*(row.outputs[place] for row in rows), strict=True))
             for column, balls, bound in zip(columns, exact, argument.errors, strict=True):
                 apart = np.broadcast_to(column - balls / ball(argument.unit), len(rows))
-                radius = max(radius, *map(_radius, apart))
+                radius = max(radius, *(float(x.rad()) if x.is_finite() else np.inf for x in apart))
                 largest = max(abs(distance).upper() for distance in apart)
                 if largest > 0:
                     share = max(
                         share,
                         float((largest * ball(argument.unit) / ball(bound)).upper()) if bound else np.inf,
                     )
-    return CertifiedCalls(len(rows), share, radius)
-
-
-def _radius(number: Any) -> float:
-    return float(number.rad()) if number.is_finite() else np.inf
+    return len(rows), share, radius
 
 
 # Runs
 
 
-@dataclass(frozen=True)
-class CertifiedRun:
+class CertifiedRun(NamedTuple):
     """The largest angle from the exact attitude in a run, with its bound at the same step."""
 
     steps: int
@@ -157,7 +141,7 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
     identity = subject.program.attitude_step.identity if subject.program.attitude_step else ()
     words, count, worst, proper = [int(one / state.unit) for one in identity], 0, (0.0, 1.0), True
     feedback = [entry.fresh for entry in subject.fixed.interface.residuals]
-    exact = _exact_states(subject, increments, between, beside if between == every else None)
+    exact = exact_states(subject, increments, between, beside if between == every else None)
     for step, row in enumerate(increments, 1):
         results = model(words, row, *([feedback] if feedback else []))
         words, feedback = [*results[0]], [*results[1]] if feedback else []
@@ -171,8 +155,7 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
     return CertifiedRun(steps, count, *worst, proper)
 
 
-@dataclass(frozen=True)
-class _Normalization:
+class _Normalization(NamedTuple):
     """The kernel that normalizes a state: its integer model, its program, and the error of an element."""
 
     model: Any
@@ -193,10 +176,13 @@ def _models(subject: Subject) -> tuple[Any, _Normalization]:
     return step, _Normalization(normalize, beside.program, max(beside.fixed.interface.outputs[0].errors))
 
 
-def _exact_states(
-    subject: Subject, increments: Sequence[Sequence[int]], between: int, beside: _Normalization | None
+def exact_states(
+    subject: Subject,
+    increments: Iterable[Sequence[int]],
+    between: int,
+    beside: _Normalization | None = None,
 ) -> Iterator[list[Any]]:
-    """Yield the exact state after every block of steps; with a normalization, after that."""
+    """Yield balls of the exact state after every block of steps; with a normalization, after that."""
     from flint import ctx
 
     samples = subject.fixed.interface.inputs[1]
@@ -204,8 +190,8 @@ def _exact_states(
     assert kernels is not None
     product = pipeline.program(choose(str(kernels.product)))
     exact = [ball(one) for one in kernels.identity]
-    for begin in range(0, len(increments) - between + 1, between):
-        rows = increments[begin : begin + between]
+    steps = iter(increments)
+    while len(rows := list(islice(steps, between))) == between:
         with ctx.workprec(_MORE_BITS if beside else PRECISION):
             columns = [column_of(column) * ball(samples.unit) for column in zip(*rows, strict=True)]
             exact = outcome(product, [*exact, *multiplied(product, outcome(transition, columns))])
@@ -243,3 +229,79 @@ def _is_proper(values: Sequence[float], angles: AngleAccumulation) -> bool:
         return float(np.linalg.norm(values)) >= shortest
     singular = np.linalg.svd(np.reshape(values, (3, 3)), compute_uv=False)
     return bool(singular[-1] >= shortest and singular[0] <= np.sqrt(2 - shortest**2))
+
+
+def ball(number: Fraction) -> Any:
+    """Return a ball that holds a number."""
+    from flint import arb, fmpq
+
+    return arb(fmpq(number.numerator, number.denominator))
+
+
+def column_of(integers: Sequence[int]) -> Any:
+    """Return integers as an array of balls: numpy's loops over objects call their operators."""
+    from flint import arb
+
+    column = np.empty(len(integers), object)
+    column[:] = [arb(value) for value in integers]
+    return column
+
+
+def outcome(program: Program, values: Sequence[Any]) -> list[Any]:
+    """Return the elements of a program's only output."""
+    (elements,) = outcomes(program, values)
+    return elements
+
+
+def outcomes(program: Program, values: Sequence[Any]) -> list[list[Any]]:
+    """Return the elements of each output of a program, see `outcome`."""
+    names = [name for signal in program.inputs for name in signal.elements]
+    results = program.run(dict(zip(names, values, strict=True)), ball, _operations())
+    return [results[result.signal.name] for result in program.outputs]
+
+
+def multiplied(product: Program, turns: Sequence[Any]) -> list[Any]:
+    """Return the product of transitions."""
+    while len(turns[0]) > 1:
+        odd = len(turns[0]) % 2
+        pairs = [[column[k : len(column) - odd : 2] for column in turns] for k in (0, 1)]
+        last = [column[len(column) - odd :] for column in turns]
+        turns = [
+            np.concatenate(parts)
+            for parts in zip(outcome(product, [*pairs[0], *pairs[1]]), last, strict=True)
+        ]
+    return [column[0] for column in turns]
+
+
+def _operations() -> dict[str, Callable[..., Any]]:
+    """Return the operations of programs on balls, and on arrays of them."""
+    from flint import arb
+
+    def root(x: Any) -> Any:  # a radicand that exists is not negative, whatever its ball holds beside
+        return x.sqrt() if x < 0 else x.nonnegative_part().sqrt()
+
+    def at_least(x: Any, y: Any) -> bool | None:
+        difference = x - y
+        return True if difference >= 0 else False if difference < 0 else None
+
+    def select(condition: bool | None, yes: Any, no: Any) -> Any:
+        return yes.union(no) if condition is None else yes if condition else no
+
+    def wrap(x: Any) -> Any:
+        return select(
+            at_least(x, arb.pi()), x - 2 * arb.pi(), select(at_least(-x, arb.pi()), x + 2 * arb.pi(), x)
+        )
+
+    functions: dict[str, tuple[Callable[..., Any], int]] = {
+        "sqrt": (root, 1),
+        "sin": (lambda x: x.sin(), 1),
+        "cos": (lambda x: x.cos(), 1),
+        "sinc": (lambda x: x.sinc(), 1),
+        "atan2": (lambda y, x: arb.atan2(y, x), 2),
+        "direction": (lambda y, x: arb.atan2(y, x), 2),
+        "wrap": (wrap, 1),
+        "maximum": (lambda x, y: x.max(y), 2),
+        "at_least": (at_least, 2),
+        "select": (select, 3),
+    }
+    return {**OPERATIONS, **{kind: np.frompyfunc(f, count, 1) for kind, (f, count) in functions.items()}}

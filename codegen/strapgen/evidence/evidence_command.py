@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import grouped
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, grouped, rules
 from strapgen.cli.options import MethodOptions, option
 from strapgen.cli.output import format_option, show
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Excludes, Needs, OneOf, rules
 from strapgen.navigation.systems.built_in import is_system
 
 if TYPE_CHECKING:
-    from strapgen.evidence.subjects import Subject
-    from strapgen.evidence.verdicts import Verdict
+    from strapgen.evidence.collection import Subject
 
 _FORMATS = ("text", "json", "csv", "markdown", "latex")
 
@@ -97,7 +95,9 @@ def evidence(
             [verdict for part in track(tasks, "examining", total) for verdict in part], subjects
         )
     show(EvidenceResult(verdicts), format)
-    status = _status(verdicts, complete)
+    # A claim that fails counts unless another tool proves it.
+    missing = complete and any(verdict.result == "not installed" for verdict in verdicts)
+    status = int(missing or bool(collection.failures(verdicts)))
     if page is not None:
         text = evidence_page(verdicts, {subject.name: subject.digest for subject in subjects})
         status = max(status, _page(page, text, check))
@@ -105,26 +105,26 @@ def evidence(
 
 
 def _subjects(kernels: list[str], method: MethodOptions, fixed: FixedOptions) -> Iterator[Subject]:
-    from strapgen.evidence import subjects
+    from strapgen.evidence import collection
 
     if not kernels:
-        yield from subjects.standard()
+        yield from collection.standard()
     for kernel in kernels:
         if is_system(kernel):
             yield from _stages(kernel, method, fixed)
             continue
         choice = method.choose(kernel, step=False)
-        yield subjects.Subject(choice, fixed.settings(choice.increments_per_step))
+        yield collection.Subject(choice, fixed.settings(choice.increments_per_step))
 
 
 def _stages(name: str, method: MethodOptions, fixed: FixedOptions) -> Iterator[Subject]:
     """Yield the stages of a described system."""
-    from strapgen.evidence import subjects
+    from strapgen.evidence import collection
     from strapgen.navigation.systems.simulate_system import refuse_options
     from strapgen.navigation.systems.wiring import described
 
     refuse_options(method, fixed, ["--constant"] if method.constant else [])
-    yield from subjects.of_system(described(name), fixed.settings(1))
+    yield from collection.of_system(described(name), fixed.settings(1))
 
 
 @contextlib.contextmanager
@@ -136,14 +136,6 @@ def _folder(out: Path | None) -> Iterator[Path]:
             yield folder
         return
     yield out
-
-
-def _status(verdicts: list[Verdict], complete: bool) -> int:
-    """Return 1 if a claim fails that no other tool proves, or if a tool is missing that must be there."""
-    from strapgen.evidence.verdicts import failures
-
-    missing = complete and any(verdict.result == "not installed" for verdict in verdicts)
-    return int(missing or bool(failures(verdicts)))
 
 
 def _page(page: Path, text: str, check: bool) -> int:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from strapgen.evidence.verdicts import Verdict
+from strapgen.evidence.collection import Verdict
 from strapgen.results.records import reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
@@ -25,6 +25,8 @@ the version of strapgen, so that a changed file shows.
 
 
 _VERSIONS = "## Versions"
+#: From the strongest to the weakest.
+_RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
 
 
 @dataclass(frozen=True)
@@ -126,27 +128,18 @@ def summary(verdicts: Sequence[Verdict]) -> TextTable:
     )
 
 
-_RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
-
-
 def _promise(verdict: Verdict) -> tuple[str, str]:
     promise, _, case = verdict.claim.partition(": ")
     return promise, case
 
 
-@dataclass(frozen=True)
-class _Cell:
-    """The verdicts of one kernel on one claim."""
-
-    verdicts: tuple[Verdict, ...]
-
-    def text(self) -> str:
-        """Return the strongest result with its tools; a proof makes up for a failure."""
-        for result in _RESULTS:
-            tools = [verdict.tool for verdict in self.verdicts if verdict.result == result]
-            if tools:
-                return f"{result}, {' and '.join(dict.fromkeys(tools))}"
-        return "-"
+def _strongest(verdicts: Sequence[Verdict]) -> str:
+    """Return the strongest result with its tools; a proof makes up for a failure."""
+    for result in _RESULTS:
+        tools = [verdict.tool for verdict in verdicts if verdict.result == result]
+        if tools:
+            return f"{result}, {' and '.join(dict.fromkeys(tools))}"
+    return "-"
 
 
 def _matrix(verdicts: Sequence[Verdict]) -> TextTable:
@@ -156,7 +149,7 @@ def _matrix(verdicts: Sequence[Verdict]) -> TextTable:
         [
             kernel,
             *(
-                _Cell(tuple(v for v in verdicts if (v.kernel, _promise(v)[1]) == (kernel, case))).text()
+                _strongest([v for v in verdicts if (v.kernel, _promise(v)[1]) == (kernel, case)])
                 for case in cases
             ),
         ]

@@ -6,16 +6,12 @@ import re
 import resource
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from strapgen.evidence.gappa_fixed import fixed_script
-from strapgen.evidence.gappa_floating import DEGREES, floating_script
-from strapgen.evidence.gappa_scripts import CannotFollowError, Script
-from strapgen.evidence.subjects import Subject
-from strapgen.evidence.verdicts import Result, Tool, Verdict, verdict
+from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
+from strapgen.evidence.gappa_scripts import DEGREES, CannotFollowError, Script, fixed_script, floating_script
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
 from strapgen.fixedpoint.floating.number_formats import NUMBERS
 
@@ -29,7 +25,7 @@ def _version() -> str:
     return _run(["--version"]).stdout.split()[-1]
 
 
-TOOL = Tool("Gappa", ("gappa",), "gappa", _version)
+GAPPA = Tool("Gappa", ("gappa",), "gappa", _version)
 
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
@@ -58,55 +54,47 @@ def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Sc
         try:
             for script in write():
                 file.write_text(f"# Run: gappa -Eprecision={PRECISION} {file.name}\n{script.question()}")
-                outcome = judged(script, answered(file))
+                outcome = judged(script, *answered(file))
                 if outcome[0] == "proved":
                     break
         except CannotFollowError as reason:
             return "not examined", str(reason)
         return outcome
 
-    return verdict(kernel, f"error bound: {case}", TOOL, judge)
+    return verdict(kernel, f"error bound: {case}", GAPPA, judge)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """What Gappa says of a script that asks for bounds."""
+def answered(file: Path) -> tuple[list[Fraction], str]:
+    """Return the bound that Gappa proves of each expression of a script, and its complaint.
 
-    #: A bound of the magnitude of each expression, in order; fewer where it has none
-    bounds: tuple[Fraction, ...]
-    #: A rule that is no identity, or why it gave up; "" where all is well
-    complaint: str = ""
-
-
-def answered(file: Path) -> Answer:
-    """Return the bounds that Gappa proves."""
+    There are fewer bounds where it has none. It complains of a rule that is no identity, or says why it gave up.
+    """
     outcome = _run([f"-Eprecision={PRECISION}", str(file)])
     if outcome.returncode < 0:
-        return Answer((), f"no answer in {SECONDS} s")
+        return [], f"no answer in {SECONDS} s"
     lines = (outcome.stdout + outcome.stderr).splitlines()
     for line in lines:  # Gappa takes a rule on trust, and says so
         if "not trivially equal" in line or "assumed to be nonzero" in line or line.startswith("Error"):
-            return Answer((), line.removeprefix("Warning: "))
+            return [], line.removeprefix("Warning: ")
     bounds = []
     for line in lines:
         ends = re.search(r" in \[([^, ]+), ([^] ]+)\]$", re.sub(r" \{[^}]*\}", "", line))
         if ends:
             bounds.append(max(abs(_exactly(end)) for end in ends.groups()))
-    return Answer(tuple(bounds))
+    return bounds, ""
 
 
-def judged(script: Script, answer: Answer) -> tuple[Result, str]:
+def judged(script: Script, bounds: Sequence[Fraction], complaint: str) -> tuple[Result, str]:
     """Compare the bounds that Gappa proves with those that the header states.
 
-    Returns: "proved" if none is larger, otherwise "fails"; and the bounds that are the closest to the header's,
-    or farthest above.
+    With the result come the bounds that are the closest to the header's, or farthest above.
     """
-    if answer.complaint:
-        return "fails", answer.complaint
+    if complaint:
+        return "fails", complaint
     stated = [*script.goals.values()]
-    if len(answer.bounds) != len(stated):
+    if len(bounds) != len(stated):
         return "fails", "Gappa finds no bound of every output"
-    pairs = list(zip(answer.bounds, stated, strict=True))
+    pairs = list(zip(bounds, stated, strict=True))
     if any(bound > limit for bound, limit in pairs):
         return "fails", _compared([pair for pair in pairs if pair[0] > pair[1]])
     return "proved", _compared([pair for pair in pairs if pair[1]])
@@ -138,3 +126,81 @@ def _run(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
         check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1)),
     )
+
+
+#: Proves that two expressions are equal, whatever the rounded values in them are.
+_IDENTITY = """Require Import Reals Field.
+Require Import Gappa.Gappa_library.
+Ltac identity :=
+  intros;
+  repeat match goal with |- context [rounding_fixed ?a ?b ?x] =>
+    let rounded := fresh in generalize (rounding_fixed a b x); intro rounded end;
+  unfold float2R, Float1, Defs.F2R; simpl; unfold Z.pow_pos; simpl; field.
+"""
+_LIBRARY = "Require Import Gappa.Gappa_library.\n"
+#: The axioms of Coq's real numbers and of classical logic.
+AXIOMS = {
+    "ClassicalDedekindReals.sig_not_dec",
+    "ClassicalDedekindReals.sig_forall_dec",
+    "FunctionalExtensionality.functional_extensionality_dep",
+    "Classical_Prop.classic",
+}
+
+
+def _coq_version() -> str:
+    said = subprocess.run(["coqc", "--version"], capture_output=True, text=True, check=True).stdout
+    return said.split("version ")[1].split()[0]
+
+
+COQ = Tool("Coq", ("coqc", "gappa"), "coq, libcoq-gappa and gappa", _coq_version)
+
+
+def check_by_coq(subject: Subject, folder: Path) -> list[Verdict]:
+    """Have Coq check the proof of the error bound of a call; it takes half a minute, and more for a matrix."""
+    if not subject.is_reference_step:
+        return []
+
+    def judge() -> tuple[Result, str]:
+        return checked(fixed_script(subject.fixed), folder / "one_step.v")
+
+    return [verdict(subject.name, "error bound: one step", COQ, judge)]
+
+
+def checked(script: Script, file: Path) -> tuple[Result, str]:
+    """Have Coq check the proof that Gappa finds of the claim of a script."""
+    claim = file.with_suffix(".claim.g")
+    claim.write_text(script.claim())
+    said = subprocess.run(
+        ["gappa", "-Bcoq", claim.name], cwd=file.parent, capture_output=True, text=True, check=False
+    )
+    if said.returncode:
+        return "fails", "Gappa finds no proof"
+    text, count = without_hypotheses(said.stdout)
+    file.write_text(f"(* Run: coqc {file.name} *)\n{text}")
+    proof = subprocess.run(["coqc", file.name], cwd=file.parent, capture_output=True, text=True, check=False)
+    if proof.returncode:
+        return "fails", " ".join(proof.stderr.split())[-200:]
+    if strange := strange_axioms(proof.stdout):
+        return "fails", f"the proof needs {', '.join(strange)}"
+    return "proved", f"Gappa's proof and the {count} identities in it; axioms of the real numbers alone"
+
+
+def strange_axioms(said: str) -> list[str]:
+    r"""Return what a theorem needs beside the axioms of the real numbers, from what Coq says of its assumptions.
+
+    >>> strange_axioms("Axioms:\nClassical_Prop.classic : forall P : Prop, P\na1 : (x = y)%R\n")
+    ['a1']
+    """
+    _, told, axioms = said.partition("Axioms:\n")
+    if not told:
+        return ["what Coq does not tell"]
+    return sorted({*re.findall(r"^([\w.]+)(?= :|$)", axioms, flags=re.MULTILINE)} - AXIOMS)
+
+
+def without_hypotheses(proof: str) -> tuple[str, int]:
+    """Return a proof of Gappa with lemmas in place of hypotheses, and their number; it ends with its assumptions."""
+    text = proof.replace(_LIBRARY, _IDENTITY, 1)
+    text, count = re.subn(
+        r"^Hypothesis (\w+) : (.*)\.$", r"Lemma \1 : \2.\nProof. identity. Qed.", text, flags=re.MULTILINE
+    )
+    return f"{text}\nPrint Assumptions l1.\n", count

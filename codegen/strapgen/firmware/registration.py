@@ -8,12 +8,12 @@ REGISTRATION = Registration(
     "test vectors, projects, verification of files, checks of code by others",
     commands={
         "vectors": Command(
-            f"{__package__}.vectors.vectors_command:vectors",
+            f"{__package__}.vectors_command:vectors",
             "Generate",
             summary="Write test vectors of generated C, for a test on the processor",
         ),
         "verify": Command(
-            f"{__package__}.verify.verify_command:verify",
+            f"{__package__}.verify_command:verify",
             "Generate",
             summary="Verify that a generated C file is what its header says",
         ),
@@ -24,17 +24,17 @@ REGISTRATION = Registration(
         ),
     },
     results={
-        "vectors": f"{__package__}.vectors.vectors:VectorsResult",
-        "findings": f"{__package__}.check_code.conformance_report:FindingsResult",
-        "foreign-check": f"{__package__}.check_code.conformance_report:ForeignResult",
-        "verification": f"{__package__}.verify.verification:Verification",
-        "whole-verification": f"{__package__}.verify.whole_verification:WholeVerification",
+        "vectors": f"{__package__}.vectors:VectorsResult",
+        "findings": f"{__package__}.check_code.conformance:FindingsResult",
+        "foreign-check": f"{__package__}.check_code.check_foreign:ForeignResult",
+        "verification": f"{__package__}.verification:Verification",
+        "whole-verification": f"{__package__}.verification:WholeVerification",
     },
     extensions={
-        "generate.project": f"{__package__}.project:project",
-        "lab.source-files": f"{__package__}.verify:source_files",
-        "navigation.source-files": f"{__package__}.verify.system_files:runner_of_file",
-        "two-speed.project": f"{__package__}.project:two_speed_project",
+        "generate.project": f"{__package__}:project",
+        "lab.source-files": f"{__package__}:header_command",
+        "navigation.source-files": f"{__package__}.header_command:runner_of_file",
+        "two-speed.project": f"{__package__}:two_speed_project",
     },
     requires=("lab", "navigation", "design"),
 )

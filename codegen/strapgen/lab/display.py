@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from strapgen.ir.exceptions import MissingExtraError
-from strapgen.lab.compare import comparison_report
-from strapgen.lab.compare.comparison import Comparisons
-from strapgen.lab.converge import convergence_report
-from strapgen.lab.converge.convergence import Convergence
+from strapgen.lab import comparison_report, convergence_report, runs_report
+from strapgen.lab.comparison import Comparisons
+from strapgen.lab.convergence import Convergence
 from strapgen.lab.recordings.recording import History
-from strapgen.lab.simulate import runs_plot, runs_report
-from strapgen.lab.simulate.runs import Run
-from strapgen.lab.simulate.runs_report import AXES, SKEW_PLANES
+from strapgen.lab.runs import Run
+from strapgen.lab.runs_report import AXES, SKEW_PLANES
 from strapgen.results import figures
 from strapgen.results.display.frames import MATRIX, VECTOR, Variables, table, variables
 from strapgen.results.display.objects import figure, html
@@ -28,7 +26,7 @@ from strapgen.results.table import TextTable
 def _(run: Run) -> str | None:
     table = runs_report.largest_table(run).as_html(f"mean drift {math.degrees(run.mean_drift):.3g} deg")
     try:
-        content = figures.image(runs_plot.run_figure(run, ""), "run.png")
+        content = figures.image(runs_report.run_figure(run, ""), "run.png")
     except MissingExtraError:
         return table
     picture = base64.b64encode(content).decode()
@@ -89,9 +87,9 @@ def _(history: History) -> tuple[Variables, dict[str, Any]]:
 
 @figure.register
 def _(run: Run, title: str) -> Any:
-    return runs_plot.run_figure(run, title)
+    return runs_report.run_figure(run, title)
 
 
 @figure.register
 def _(history: History, title: str) -> Any:
-    return runs_plot.history_figure(history, title)
+    return runs_report.history_figure(history, title)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.lab.simulate.runs_report import ANGLES, AXES
+from strapgen.lab.runs_report import ANGLES, AXES
 from strapgen.navigation.courses import course_plot, course_report
 from strapgen.navigation.courses.courses import Course
 from strapgen.results.display.frames import VECTOR, Variables, table, variables

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import pipeline
-from strapgen.catalogue import Choice
+from strapgen.catalogue import ALGORITHMS, Choice
+from strapgen.design.frontier import frontier
+from strapgen.design.frontier.frontier import Candidate, Standing
 from strapgen.fixedpoint import can_lower
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel
-from strapgen.lab.compare.comparison import Comparisons, compare
-from strapgen.lab.converge.convergence import Convergence, LadderCase, measured
+from strapgen.lab.comparison import Comparisons, compare
+from strapgen.lab.convergence import Convergence, LadderCase, measured
 from strapgen.lab.motions.motions import GENERAL, Motion
-from strapgen.lab.simulate.runs import Run, simulate
-from strapgen.report.conditions import Conditions, Schedule
+from strapgen.lab.motions.users_motions import any_motion
+from strapgen.lab.parallel_cases import side_by_side
+from strapgen.lab.runs import Run, simulate
 from strapgen.run.backends import DEFAULT_BACKENDS, Backend, backend
 from strapgen.targets.registry import TARGETS
+from strapgen.thesis import thesis_tables
+from strapgen.thesis.thesis_tables import TableEntry
 
 Array = NDArray[np.float64]
 
@@ -33,6 +41,9 @@ REFERENCE = "exact"
 LADDER, LADDER_DURATION = ("1/2", "1/4", "1/8", "1/16", "1/32", "1/64", "1/128"), "2"
 #: The targets whose code is shown.
 SHOWN = ("numpy", "c", "c-float", "c-fixed")
+
+#: Most records of a history: a plot shows no more, and a page stays small.
+MOST_RECORDS = 250
 
 
 @dataclass(frozen=True)
@@ -163,3 +174,173 @@ def _compared(
             except InputError as error:
                 refused[name] = str(error)
         return held, refused
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """A motion, the sampling rate of the gyro, and the duration of the runs."""
+
+    #: Name of a motion, or the file of a user's
+    motion: str = "coning"
+    #: Its parameters, as the command line states them
+    settings: Mapping[str, str] = field(default_factory=lambda: dict(GENERAL))
+    #: Samples a second in Hz, and the length of the runs in s; an algorithm runs as many whole steps as that
+    #: holds
+    sample_hz: str = "100"
+    duration: str = "20"
+
+    def profile(self) -> Motion:
+        """Return the motion, checked with its numbers."""
+        checks.number("sample_hz", self.sample_hz, positive=True)
+        checks.number("duration", self.duration, positive=True)
+        return any_motion(self.motion, self.duration, self.settings)
+
+    def words(self) -> str:
+        """Return the run in words."""
+        parameters = "".join(f", {key}={value}" for key, value in self.settings.items())
+        return f"{self.motion}{parameters}; {self.duration} s at {self.sample_hz} Hz"
+
+    @property
+    def options(self) -> str:
+        """The options of the command line that state the motion."""
+        parameters = [f"{key}={value}" for key, value in self.settings.items()]
+        return shlex.join(["--motion", self.motion, *(["--set", *parameters] if parameters else [])])
+
+    def schedule(self, choice: Choice) -> Schedule:
+        """Return the step of an algorithm, and how many of them it runs.
+
+        >>> from strapgen.catalogue import choose
+        >>> Conditions(duration="10").schedule(choose("euler", "rk4", 2)).options
+        '--step 1/50 --duration 10'
+        """
+        hertz = checks.number("sample_hz", self.sample_hz, positive=True)
+        duration = checks.number("duration", self.duration, positive=True)
+        step = choice.increments_per_step / hertz
+        every = -(-int(duration / step) // MOST_RECORDS)
+        if not every:
+            raise InputError(
+                f"duration {float(duration):g} s is shorter than a step of {choice.kernel} at {float(hertz):g} Hz"
+            )
+        return Schedule(step, int(duration / step) // every * every, every)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The steps of a run."""
+
+    #: In s
+    step: Fraction
+    #: How many there are, a multiple of `every`
+    steps: int
+    #: Steps from one record to the next
+    every: int
+
+    @property
+    def duration(self) -> Fraction:
+        """The length of the run in s."""
+        return self.steps * self.step
+
+    @property
+    def record(self) -> Fraction:
+        """The time from one record to the next in s."""
+        return self.every * self.step
+
+    @property
+    def options(self) -> str:
+        """The options of the command line that state step and duration."""
+        return f"--step {self.step} --duration {self.duration}"
+
+
+def compared(choices: Sequence[Choice], names: Sequence[str] = (frontier.EVERY,)) -> list[Candidate]:
+    """Return algorithms to compare with some choices, and after them those of the choices that have a name.
+
+    >>> from strapgen.catalogue import choose
+    >>> [one.name for one in compared([choose("dcm", "rk4", 3)], ["magnus4:2"])]
+    ['magnus4:2', 'rk4:3']
+    """
+    if all(choice.increments is None for choice in choices):
+        return []
+    chosen = [one for choice in choices if (one := candidate(choice)) is not None]
+    return list(dict.fromkeys([*frontier.candidates(names), *chosen]))
+
+
+def named(several: Sequence[Candidate], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names by which `frontier.candidates` returns algorithms: those stated, and what these leave out.
+
+    >>> named(frontier.candidates(["magnus4:2", "rk4:3"]), ["magnus4:2"])
+    ('magnus4:2', 'rk4:3')
+    """
+    stated = frontier.candidates(names) if several else []
+    return (*names, *(one.name for one in several if one not in stated))
+
+
+def candidate(choice: Choice) -> Candidate | None:
+    """Return the method of an attitude step with its samples, or the Python file of a user's step."""
+    if choice.increments is None:
+        return None
+    method = choice.method
+    if choice.user_kernel is not None:
+        method = pipeline.program(choice).arguments
+        if not method.endswith(".py") or any(space in method for space in " \t"):
+            return None  # built in Python, or with options of its own
+    elif choice.name not in ALGORITHMS:
+        return None
+    if not isinstance(method, str):
+        return None
+    return Candidate(method, choice.increments, choice.previous, choice.ahead)
+
+
+def in_tables(choice: Choice) -> bool:
+    """Return whether the tables of the thesis have an algorithm.
+
+    >>> from strapgen.catalogue import choose
+    >>> in_tables(choose("dcm", "rk4", 2)), in_tables(choose("dcm", "rk3", 2))
+    (True, False)
+    """
+    return choice in [
+        Choice(name, f"rk{order}", 2) for name in thesis_tables.ALGORITHMS for order in thesis_tables.ORDERS
+    ]
+
+
+def tables(choices: Iterable[Choice], backends: tuple[str, ...]) -> list[TableEntry]:
+    """Return the tables of the thesis where one of some choices stands in them; else nothing."""
+    if not any(map(in_tables, choices)):
+        return []
+    for _ in thesis_tables.build_all(backends):
+        pass
+    return [*thesis_tables.run_tables(backends)]
+
+
+@dataclass(frozen=True)
+class DossierCase:
+    """What a process needs for the dossier of an algorithm: the parameters of `dossier`."""
+
+    choice: Choice
+    conditions: Conditions
+    settings: Settings | None
+    backends: tuple[str, ...]
+
+
+def dossiers(cases: Sequence[DossierCase], jobs: int | None = None) -> Iterator[AlgorithmDossier]:
+    """Yield the dossiers of algorithms, in the order in which they come."""
+    numbered = {str(place): case for place, case in enumerate(cases)}
+    for _, known in side_by_side(_gathered, numbered, jobs):
+        yield known
+
+
+def _gathered(case: DossierCase) -> AlgorithmDossier:
+    return dossier(case.choice, case.conditions, case.settings, case.backends)
+
+
+def standings(
+    several: Sequence[Candidate], conditions: Conditions, jobs: int | None = None
+) -> Iterator[Standing]:
+    """Run algorithms on the motion of some conditions, and yield what each costs and how it drifts."""
+    yield from frontier.frontier(
+        several, conditions.sample_hz, conditions.duration, jobs=jobs, motions=motions(conditions)
+    )
+
+
+def motions(conditions: Conditions) -> frontier.Motions:
+    """Return the motion of some conditions under its name."""
+    return {conditions.motion: (conditions.motion, conditions.settings)}

@@ -10,23 +10,22 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.option_groups import Needs, Rule, Shown, command_line, grouped, rules
 from strapgen.cli.options import Duration, FastBackends, GyroRate, SeveralMethods, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Needs, Rule, rules
 from strapgen.cli.values import Positive
-from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.simulate.sample_source import (
+from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.run_options import (
     MotionSettings,
     motion_option,
 )
-from strapgen.thesis.tables_command import runnable
+from strapgen.thesis.thesis_commands import runnable
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
     from strapgen.evidence.evidence_report import EvidencePage
-    from strapgen.report.conditions import Conditions
+    from strapgen.report.dossier import Conditions
 
 #: The options of fixed point, for which the sampling rate is that of the runs.
 _FIXED = (
@@ -62,7 +61,7 @@ class ReportRuns:
 
     def conditions(self) -> Conditions:
         """Return the motion, the sampling rate and the duration of the runs, checked."""
-        from strapgen.report.conditions import Conditions
+        from strapgen.report.dossier import Conditions
 
         conditions = Conditions(sample_hz=str(self.sample_hz), duration=str(self.duration))
         if self.motion is not None:
@@ -148,9 +147,8 @@ def _page(
     """Run all that a page shows, and return it."""
     from strapgen import catalogue
     from strapgen.design.frontier import frontier
-    from strapgen.report import gathering
-    from strapgen.report.content import Content
-    from strapgen.report.page import report_page
+    from strapgen.report import dossier
+    from strapgen.report.page import Content, report_page
     from strapgen.run.versions import versions
     from strapgen.storage import cache
 
@@ -158,14 +156,14 @@ def _page(
     if fixed.max_rate_deg_s is not None or fixed.lsb is not None:
         fixed = replace(fixed, sample_hz=Positive(conditions.sample_hz))
     cases = [
-        gathering.DossierCase(choice, conditions, fixed.settings(choice.increments_per_step), places)
+        dossier.DossierCase(choice, conditions, fixed.settings(choice.increments_per_step), places)
         for choice in shown
     ]
-    several = gathering.compared(shown, beside)
+    several = dossier.compared(shown, beside)
     frontier.require_steps(several, conditions.sample_hz, conditions.duration)  # before what takes long
-    known = [*track(gathering.dossiers(cases), "gathering", len(cases))]
-    standings = [*track(gathering.standings(several, conditions), "comparing", len(several))]
-    tables = gathering.tables(shown, places)
+    known = [*track(dossier.dossiers(cases), "gathering", len(cases))]
+    standings = [*track(dossier.standings(several, conditions), "comparing", len(several))]
+    tables = dossier.tables(shown, places)
     content = Content(
         _title(choices),
         command,
@@ -174,7 +172,7 @@ def _page(
         tuple(sorted(known, key=lambda one: shown.index(one.choice))),
         tuple(tables),
         tuple(frontier.in_order(standings, several)),
-        gathering.named(several, beside),
+        dossier.named(several, beside),
         _recorded_evidence(),
     )
     return report_page(content, versions(), cache.generator_digest())

@@ -7,13 +7,40 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from strapgen import catalogue
+from strapgen.analysis.ratios.ratios import Claim
+from strapgen.analysis.ratios.ratios_report import claims_text
 from strapgen.analysis.series.prediction import Prediction, predict
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.simulate.runs import simulate
+from strapgen.lab.runs import simulate
 from strapgen.results.records import Record, entry, properties
+from strapgen.results.result import Result
+from strapgen.results.table import Column, TextTable
 from strapgen.run.backends import backend
-from strapgen.thesis.printed_tables import ALGORITHMS, ORDERS, TABLES, Table, agrees
-from strapgen.thesis.thesis_tables import DURATION, INTERVAL, STEP, drift_deg, printed_number
+from strapgen.thesis.tables_report import repair_notes
+from strapgen.thesis.thesis_tables import (
+    ALGORITHMS,
+    DURATION,
+    INTERVAL,
+    ORDERS,
+    STEP,
+    TABLES,
+    Table,
+    agrees,
+    drift_deg,
+    printed_number,
+)
+
+_COLUMNS = (
+    Column("", "<", least=20),
+    Column("predicted", spec=".4g", least=9),
+    Column("simulated", spec=".4g", least=9),
+    Column("ratio", spec=".4g", least=10),
+    Column("simulated", spec=".4g", least=9),
+    Column("off by", spec="+.2%", least=7),
+    Column("thesis", least=8),
+    Column("", "<", gap=1),
+    Column("scan", least=7, missing=""),
+)
 
 
 @dataclass(frozen=True)
@@ -91,3 +118,52 @@ def predicted(tables: Sequence[Table] = TABLES) -> Iterator[PredictedEntry]:
 def _drift_deg(table: Table, expected: Prediction) -> float:
     """Return the drift of a prediction as the table reports it."""
     return math.degrees(expected.mean_drift if table.mean else max(expected.drift_by_axis))
+
+
+def predicted_text(entries: Sequence[PredictedEntry]) -> str:
+    """Return predicted tables as text."""
+    lines = []
+    for table in TABLES:
+        rows = [_cells(entry) for entry in entries if entry.table == table.number]
+        if not rows:
+            continue
+        ratio = "of the same order" if table.by_order else "of first order"
+        lines += [
+            f"Table {table.number}: {table.title}",
+            f"  drift in deg, and its ratio to that of direction cosines {ratio}",
+            *TextTable(_COLUMNS, rows).lines("  "),
+            *repair_notes(table),
+            "",
+        ]
+    if not all(entry.agrees for entry in entries):
+        lines.append("* not the thesis's figure in its printed digits\n")
+    return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class PredictedTablesResult(Result):
+    """The tables of the thesis as the series predict them, and the ratios that the thesis reads from them."""
+
+    rows_in = "entries"
+    drawn_by = "strapgen.thesis.tables_report:predicted_tables_image"
+
+    entries: Sequence[PredictedEntry]
+    ratios: Sequence[Claim]
+
+    def text(self) -> str:
+        """Return the tables and the ratios."""
+        return f"{predicted_text(self.entries)}\n{claims_text(self.ratios)}"
+
+
+def _cells(entry: PredictedEntry) -> tuple[str | float | None, ...]:
+    return (
+        f"{entry.algorithm}, order {entry.order}",
+        entry.drift_deg,
+        entry.simulated_deg,
+        entry.normalised,
+        entry.simulated,
+        entry.deviation,
+        entry.thesis,
+        "" if entry.agrees else "*",
+        entry.scan,
+    )

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapgen.ir.exceptions import CompilerError
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.simulate.runs import simulate
-from strapgen.results.records import entry
+from strapgen.lab.runs import Run, simulate
+from strapgen.results.records import entry, reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import TextTable
 from strapgen.run.backends import backend
-from strapgen.thesis.printed_tables import ALGORITHMS, ORDERS, TABLES
-from strapgen.thesis.thesis_runs import bend, last_drift, last_scale, thesis_run
-from strapgen.thesis.thesis_tables import DURATION, INTERVAL, STEP, drift_deg
+from strapgen.thesis.thesis_tables import ALGORITHMS, DURATION, INTERVAL, ORDERS, STEP, TABLES, drift_deg
 
 Numbers = dict[str, float]
 
@@ -25,6 +27,12 @@ Numbers = dict[str, float]
 _ALL = (1, 2, 3, 4)
 #: Drift of the size of a gyro pulse, in deg.
 _QUANTUM = 0.007
+
+#: Parameters that a rate is set for: all of a motion, or the axes of a constant rate.
+_KEYS = {"sinusoidal": "ab", "coning": "abg"}
+
+#: Width of the text in characters.
+_WIDTH = 100
 
 
 @dataclass(frozen=True)
@@ -356,5 +364,74 @@ _STATEMENTS: tuple[tuple[str, str, str, Callable[[], tuple[Numbers, bool]]], ...
     ),
 )
 
+
 #: Number of statements.
 COUNT = len(_STATEMENTS)
+
+
+@lru_cache(maxsize=256)
+def thesis_run(
+    algorithm: str,
+    order: int,
+    name: str = "y",
+    rate: float = 10,
+    every: float | None = float(INTERVAL),
+    step: str = str(STEP),
+) -> Run:
+    """Run one of the thesis's motions for 180 s.
+
+    `name`: "sinusoidal" or "coning", or the axes of a constant rate, for instance "xyz". `rate`: every
+    parameter of the motion in deg/s. `every`: time from one orthonormalization to the next in s; None for
+    never. Records are as far apart, or 5 s. `step`: in s.
+    """
+    keys = _KEYS.get(name, name)
+    profile = motion(name if name in _KEYS else "constant", **{f"{key}_deg_s": rate for key in keys})
+    stepper = backend(algorithm, f"rk{order}", 2)
+    return simulate(stepper, profile, step, DURATION, every, max(every or 0, float(INTERVAL)))
+
+
+def last_drift(run: Run) -> float:
+    """Return the drift about y at the end of a run, in rad."""
+    return float(run.drift[-1, 1])
+
+
+def last_scale(run: Run) -> float:
+    """Return the largest scale error at the end of a run, with its sign."""
+    scales = run.scale[-1]
+    return float(scales[np.abs(scales).argmax()])
+
+
+def bend(time: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+    """Return how far values depart from the best straight line, as a share of the last one."""
+    line = np.stack([time, np.ones_like(time)], axis=1)
+    rest = values - line @ np.linalg.lstsq(line, values, rcond=None)[0]
+    return float(np.abs(rest).max() / abs(values[-1]))
+
+
+@dataclass(frozen=True)
+class StatementsResult(Result):
+    """What the text of the thesis says, and what runs say of it: a row for each statement."""
+
+    rows_in = "statements"
+    row = Statement
+
+    statements: Sequence[Statement]
+
+    def reader(self) -> TextTable:
+        """Return the statements in words."""
+        return reader_table(self.statements, Statement)
+
+    def text(self) -> str:
+        """Return what is said, what runs measure, and the verdict."""
+        lines: list[str] = []
+        for each in self.statements:
+            verdict = each.verdict if each.confirmed else f"{each.verdict} (the runs do not bear this out)"
+            lines += textwrap.wrap(
+                f"{each.number}. {each.said}", _WIDTH, subsequent_indent=" " * len(f"{each.number}. ")
+            )
+            for what, text in (("run", each.run), ("verdict", verdict)):
+                lines += textwrap.wrap(
+                    f"{what}: {text}", _WIDTH, initial_indent="    ", subsequent_indent="      "
+                )
+            lines.append("")
+        return "\n".join(lines).rstrip()

@@ -14,7 +14,7 @@ from strapgen.ir import checks
 
 @grouped
 def build(
-    names: Annotated[
+    variants: Annotated[
         list[str] | None,
         typer.Argument(metavar="NAME...", help="Variants.  [default: all]", show_default=False),
     ] = None,
@@ -38,10 +38,10 @@ def build(
     """
     check_format(format)
     from strapgen.variants import build as steps_of
-    from strapgen.variants.variant_file import variants
+    from strapgen.variants import variant_file
 
-    known = variants()
-    chosen = [known[checks.choice("variant", name, known)] for name in names or known]
+    known = variant_file.variants()
+    chosen = [known[checks.choice("variant", name, known)] for name in variants or known]
     done = []
     for step in steps_of.build(chosen, check):
         done.append(step)

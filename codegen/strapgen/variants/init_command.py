@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import shlex
 import sys
+import tomllib
+from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from strapgen.cli.option_groups import grouped
+from strapgen.cli.option_groups import Excludes, grouped, rules
 from strapgen.cli.options import option
-from strapgen.cli.rules import Excludes, rules
 from strapgen.cli.values import Positive, names
 from strapgen.ir.exceptions import InputError
 
@@ -59,8 +60,8 @@ def init(
         option("--word", metavar="BITS", help="Word of fixed point in bits.  [default: asked, or 32]"),
     ] = None,
     out: Annotated[
-        str | None,
-        option("--out", metavar="PATH", help="Folder for the code.  [default: asked, or firmware]"),
+        Path | None,
+        option("--out", metavar="FOLDER", help="Folder for the files.  [default: asked, or firmware]"),
     ] = None,
     brief: Annotated[
         Path | None,
@@ -92,7 +93,7 @@ def init(
         keys, files = _of_brief(brief)
         keys["out"] = _answer("Folder for the code", out, "firmware")
     text = _text(name, keys)
-    variant_file.VARIANTS.parse(place, text)
+    variant_file.parse(place, tomllib.loads(text, parse_float=Decimal))
     for path in write_files(Path(), {str(place): text, WORKFLOW: _workflow(), **files}):
         typer.echo(f"wrote {path}", err=True)
     typer.echo("strapgen build generates the code, strapgen build --check holds it")
@@ -108,7 +109,7 @@ def _answer(question: str, stated: Any, default: Any) -> str:
     return str(default)
 
 
-def _answered(stated: dict[str, Any], out: str | None) -> dict[str, Any]:
+def _answered(stated: dict[str, Any], out: Path | None) -> dict[str, Any]:
     from strapgen.targets import TARGETS
 
     keys: dict[str, Any] = {"algorithm": "euler", "method": "rk4", "increments": "2"}

@@ -21,5 +21,5 @@ REGISTRATION = Registration(
     files={"variants": f"{__package__}.variant_file:VARIANTS"},
     results={"build": f"{__package__}.build:BuildResult"},
     extensions={"cli.variant": f"{__package__}.variant_file:words_of"},
-    requires=("lab", "firmware", "evidence", "design"),
+    requires=("design",),
 )

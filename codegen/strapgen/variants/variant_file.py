@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
-from strapgen.catalogue import toml_files, toml_models
+from strapgen.catalogue import toml_models
+from strapgen.catalogue.toml_files import UserFile
 from strapgen.catalogue.toml_models import Key
 from strapgen.cli import generate_command, program
 from strapgen.cli.fixed_options import FixedOptions
@@ -19,11 +20,15 @@ from strapgen.cli.option_groups import CommandOptions, Option
 from strapgen.cli.options import MethodOptions
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.results.records import UNITS
 
 #: The file of a folder, and the one whose table tool.strapgen is the same.
 NAME, PYPROJECT = "strapgen.toml", "pyproject.toml"
 #: Parameters of ``strapgen generate`` that say what it does with files that are there.
 _NOT_OF_A_VARIANT = ("all_", "check", "force", "format", "variant")
+#: Keys that may have a list, of which each has its code; the names that a variant may have.
+_SEVERAL = ("target", "word")
+_VARIANT_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 _GENERATE: CommandOptions = generate_command.generate.__dict__["options"]
 
 
@@ -82,86 +87,64 @@ class Variant:
         return str(samples / checks.number("sample_hz", str(self.options["sample_hz"])))
 
 
-class VariantFile:
-    """The kind of file, with its JSON Schema."""
+class Variants:
+    """Named variants of generated code, which strapgen build generates and holds."""
 
-    what = "a file of variants"
-    most_bytes = 1 << 20
+    WORDS = "a table with variant"
 
-    def find(self, start: Path) -> Path:
-        """Return the file of a folder or of the nearest one above it."""
-        for folder in (start, *start.parents):
-            if (folder / NAME).is_file():
-                return folder / NAME
-            place = folder / PYPROJECT
-            if place.is_file() and "strapgen" in self._content(place).get("tool", {}):
-                return place
-        raise InputError(
-            f"no {NAME} is here or above, nor tool.strapgen in a {PYPROJECT}; strapgen init writes one"
-        )
+    @classmethod
+    def from_toml(cls, where: str, value: Any) -> dict[str, Variant]:
+        """Return the variants of the content of a file by name."""
+        for key in value.keys() - {"variant"}:
+            raise InputError(f"{checks.unknown('key', key, ['variant'])}, as in [variant.attitude]")
+        tables = value.get("variant")
+        if not isinstance(tables, dict) or not tables:
+            raise InputError("no variant is there; one has a table such as [variant.attitude]")
+        return {name: _variant(name, table) for name, table in tables.items()}
 
-    def read(self, path: Path) -> dict[str, Variant]:
-        """Return the variants of a file by name; every refusal begins with the path."""
-        data = self._content(path)
-        if path.name == PYPROJECT:
-            data = data.get("tool", {}).get("strapgen", {})
-        return self._variants(path, data)
-
-    def parse(self, path: Path, text: str) -> dict[str, Variant]:
-        """Return the variants of a text that a file will have."""
-        return self._variants(path, tomllib.loads(text, parse_float=Decimal))
-
-    def _variants(self, path: Path, data: dict[str, Any]) -> dict[str, Variant]:
-        try:
-            for key in data.keys() - {"variant"}:
-                raise InputError(f"{key} is unknown; variant is the one key, as in [variant.attitude]")
-            tables = data.get("variant")
-            if not isinstance(tables, dict) or not tables:
-                raise InputError("no variant is there; one has a table such as [variant.attitude]")
-            return {name: _variant(name, path.parent, table) for name, table in tables.items()}
-        except InputError as error:
-            located = InputError(f"{path.name}: {error}")
-            located.in_file = True
-            raise located from None
-
-    def _content(self, path: Path) -> dict[str, Any]:
-        return toml_files.content(path, self.what, self.most_bytes)
-
-    def schema(self) -> dict[str, Any]:
-        """Return the JSON Schema of such a file."""
-        options = {key: _key_schema(option) for key, option in _keys().items()}
-        variant = {
-            "type": "object",
-            "properties": options | {"checks": toml_models.schema(Checks)},
-            "required": ["algorithm"],
-            # a table of another command's options
-            "additionalProperties": {"type": "object"},
-        }
-        return {
-            "$schema": "https://json-schema.org/draft/2020-12/schema",
-            "title": "Variants for strapgen",
-            "description": "Named variants of generated code, which strapgen build generates and holds.",
-            "type": "object",
-            "properties": {
-                "variant": {
-                    "type": "object",
-                    "description": "Variants by name; a variant states options of strapgen generate by their names, "
-                    "with _ in place of -, and those of another command in a table with its name",
-                    "patternProperties": {"^[A-Za-z][A-Za-z0-9_-]*$": variant},
-                    "additionalProperties": False,
-                }
-            },
-            "required": ["variant"],
-            "additionalProperties": False,
-        }
+    #: Set below, where the options are known
+    SCHEMA: ClassVar[dict[str, Any]] = {}
 
 
-VARIANTS = VariantFile()
+#: The kind of file.
+VARIANTS = UserFile("a file of variants", Variants, 1 << 20)
+
+
+def find(start: Path) -> Path:
+    """Return the file of a folder or of the nearest one above it."""
+    for folder in (start, *start.parents):
+        if (folder / NAME).is_file():
+            return folder / NAME
+        place = folder / PYPROJECT
+        if place.is_file() and "strapgen" in VARIANTS.content(place).get("tool", {}):
+            return place
+    raise InputError(
+        f"no {NAME} is here or above, nor tool.strapgen in a {PYPROJECT}; strapgen init writes one"
+    )
+
+
+def read(path: Path) -> dict[str, Variant]:
+    """Return the variants of a file by name; every refusal begins with the name of the file."""
+    data = VARIANTS.content(path)
+    if path.name == PYPROJECT:
+        data = data.get("tool", {}).get("strapgen", {})
+    return {name: replace(one, folder=path.parent) for name, one in parse(path, data).items()}
+
+
+def parse(path: Path, data: Mapping[str, Any]) -> dict[str, Variant]:
+    """Return the variants of the content that a file has or will have."""
+    try:
+        known: dict[str, Variant] = toml_models.parse(Variants, data)
+    except InputError as error:
+        located = InputError(f"{path.name}: {error}")
+        located.in_file = True
+        raise located from None
+    return known
 
 
 def variants(start: Path | None = None) -> dict[str, Variant]:
     """Return the variants of the nearest file."""
-    return VARIANTS.read(VARIANTS.find(start or Path.cwd()))
+    return read(find(start or Path.cwd()))
 
 
 def chosen(name: str, start: Path | None = None) -> Variant:
@@ -230,8 +213,8 @@ def _is_fixed(variant: Variant, options: CommandOptions, arguments: Sequence[str
         named = _given(arguments, "--backend", "--backends") or _backend(variant)
         return all(name in BACKENDS and BACKENDS[name].fixed for name in named.split(","))
     # Several targets of which one alone is fixed are refused by the command.
-    named = (_given(arguments, "--target") or ",".join(variant.targets)).split(",")
-    return any(name not in TARGETS or TARGETS[name].fixed for name in named)
+    targets = (_given(arguments, "--target") or ",".join(variant.targets)).split(",")
+    return any(name not in TARGETS or TARGETS[name].fixed for name in targets)
 
 
 def _is_compiled(target: str) -> bool:
@@ -283,45 +266,67 @@ def _listed(value: Any) -> Sequence[Any]:
     )
 
 
-def _variant(name: str, folder: Path, table: Any) -> Variant:
+def _variant(name: str, table: Any) -> Variant:
     where = f"variant.{name}"
+    if not re.fullmatch(_VARIANT_NAME, name):
+        raise InputError(f"{where}: letters, digits, - and _ are needed in a name, a letter first")
     if not isinstance(table, dict):
         raise toml_models.refused(where, table, "a table")
-    known, options, of_command = _keys(), {}, {}
+    known = _keys()
+    options: dict[str, Any] = {}
+    of_command: dict[str, dict[str, Any]] = {}
     for key, value in table.items():
         path = f"{where}.{key}"
         if key == "checks":
             continue
         if key in known:
             options[key] = value
-            for one in _listed(value) if key in ("word", "target") else [value]:
-                _read(known[key], path, one, folder)
+            for one in value if isinstance(value, list) and key in _SEVERAL else [value]:
+                _read(known[key], path, one)
         elif isinstance(value, dict) and (command := key.replace("-", " ")) in program.commands():
-            of_command[key] = _of_command(program.options_of(command), path, value, folder)
+            of_command[key] = _of_command(program.options_of(command), path, value)
         else:
             raise InputError(f"{path}: {checks.unknown('key', key, [*known, 'checks'])}")
     if "algorithm" not in options:
         raise InputError(f"{where}.algorithm is missing; strapgen list kernels shows the names")
+    for key in _SEVERAL:
+        if options.get(key) == []:
+            raise toml_models.refused(f"{where}.{key}", [], "at least one value")
     stated = toml_models.parse(Checks, table.get("checks", {}), where=f"{where}.checks")
-    return Variant(name, folder, options, of_command, stated)
+    return Variant(name, Path(), options, of_command, stated)
 
 
-def _of_command(options: CommandOptions, where: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _of_command(options: CommandOptions, where: str, table: dict[str, Any]) -> dict[str, Any]:
     known = {_key(option): option for option in options.options.values()}
     for key, value in table.items():
         if key not in known:
             raise InputError(f"{where}.{key}: {checks.unknown('key', key, known)}")
-        _read(known[key], f"{where}.{key}", value, folder)
+        _read(known[key], f"{where}.{key}", value)
     return table
 
 
-def _read(option: Option, where: str, value: Any, folder: Path) -> None:
+#: What may stand under a key by the kind of its option, with the words for it; a number may be a text.
+_NUMBER = (int, float, Decimal)
+_TAKES: dict[Any, tuple[tuple[type, ...], str]] = {
+    bool: ((bool,), "true or false"),
+    int: ((int,), "a whole number"),
+    str: ((str,), "a text"),
+    Path: ((str,), "a text"),
+    list: ((str, list), "a text or a list"),
+    tuple: ((str, list, *_NUMBER), "a value or a list"),
+    dict: ((dict,), "a table"),
+}
+
+
+def _read(option: Option, where: str, value: Any) -> None:
     """Refuse a value that the option would refuse."""
-    if (option.kind is bool) != isinstance(value, bool):
-        words = "true or false" if option.kind is bool else "a number, a text or a list"
+    kinds, words = _TAKES.get(option.kind, ((str, *_NUMBER), "a number or a text"))
+    is_right = isinstance(value, kinds) and (isinstance(value, bool) == (option.kind is bool))
+    inner = value if isinstance(value, list) else [*value.values()] if isinstance(value, dict) else []
+    if not is_right or any(isinstance(one, bool) or not isinstance(one, (str, *_NUMBER)) for one in inner):
         raise toml_models.refused(where, value, words)
     try:
-        option.value(_word(option, value, folder))
+        option.value(_word(option, value, Path.cwd()))
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
@@ -340,18 +345,50 @@ def _word(option: Option, value: Any, folder: Path) -> Any:
     return ",".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _key_schema(option: Option) -> dict[str, Any]:
-    about = {"description": option.help}
-    if option.kind is bool:
-        return about | {"type": "boolean"}
-    if option.kind is int:
-        kinds: Any = [{"type": "integer"}]
-    elif option.kind in (dict, Mapping):
-        return about | {"type": "object"}
-    elif option.kind in (str, Path, list, tuple):
-        kinds = [{"type": "string"}]
-    else:
-        kinds = [{"type": "number"}, {"type": "string"}]
-    if option.kind in (tuple, list) or _key(option) == "word":
-        kinds.append({"type": "array", "items": kinds[0], "minItems": 1})
-    return about | (kinds[0] if len(kinds) == 1 else {"anyOf": kinds})
+def _schema() -> dict[str, Any]:
+    """Return the JSON Schema of a file."""
+    checked = {
+        "title": "checks",
+        "description": "What strapgen build --check holds",
+        **toml_models.schema(Checks),
+    }
+    variant = {
+        "type": "object",
+        "properties": {key: _key_schema(key, option) for key, option in _keys().items()}
+        | {"checks": checked},
+        "required": ["algorithm"],
+        "additionalProperties": {"type": "object"},  # the options of another command
+    }
+    named = {
+        "title": "variant",
+        "description": "Variants by name; each states options of strapgen generate by their names, with _ in place of "
+        "-, and those of another command in a table with its name",
+        "type": "object",
+        "minProperties": 1,
+        "propertyNames": {"type": "string", "pattern": f"^(?:{_VARIANT_NAME})$"},
+        "additionalProperties": variant,
+    }
+    table = {"type": "object", "properties": {"variant": named}, "required": ["variant"]}
+    return table | {"additionalProperties": False}
+
+
+def _key_schema(key: str, option: Option) -> dict[str, Any]:
+    unit = next((unit for ending, unit in UNITS.items() if key.endswith(f"_{ending}")), "")
+    unit = unit or {"step": "s"}.get(key, "")
+    text = option.help.partition("  [")[0].rstrip(".")
+    about = {"title": key, "description": f"{text} [{unit}]" if unit else text} | (
+        {"unit": unit} if unit else {}
+    )
+    kinds: dict[Any, list[dict[str, Any]]] = {
+        bool: [{"type": "boolean"}],
+        int: [{"type": "integer"}],
+        dict: [{"type": "object"}],
+        **{kind: [{"type": "string"}] for kind in (str, Path, tuple, list)},
+    }
+    one, *more = kinds.get(option.kind, [{"type": "number"}, {"type": "string"}])
+    if key in _SEVERAL:
+        more = [{"type": "array", "minItems": 1, "items": one}]
+    return about | (one if not more else {"anyOf": [one, *more]})
+
+
+Variants.SCHEMA = _schema()

@@ -12,7 +12,7 @@ import strapgen
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods.coning_drift import ConingShape, terms
 from strapgen.catalogue.methods.frequency_shaping import BAND, weights
-from strapgen.lab.simulate.drift import drift
+from strapgen.lab.runs import drift
 
 SAMPLES = pytest.mark.parametrize(("increments", "previous"), [(1, 1), (1, 4), (1, 8), (3, 3), (4, 0)])
 

@@ -18,7 +18,7 @@ from strapgen.catalogue.methods import polynomial_rotation
 from strapgen.kernel import algebra
 from strapgen.kernel.algebra import evaluate
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.lab.motions.reference_attitudes import KNOT, ReferenceAttitude
+from strapgen.lab.motions.rate_profiles import KNOT, ReferenceAttitude
 
 #: Legendre coefficients of a rate times the step in rad, the largest of about 1 rad.
 COEFFICIENTS = np.array(

@@ -18,8 +18,7 @@ from strapgen.fixedpoint.floating.bounds import rounding_bounds
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Truncation
-from strapgen.lab.simulate.drift import angles, drift, steady_drift
-from strapgen.lab.simulate.runs import largest_increment
+from strapgen.lab.runs import angles, drift, largest_increment, steady_drift
 
 Vector = list[Fraction]
 

@@ -15,7 +15,7 @@ from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.fixedpoint import sums
 from strapgen.fixedpoint.words.filters import nearest_word, rounded_together
 from strapgen.ir.integer_program import FixedProgram, IntegerSum
-from strapgen.lab.simulate.drift import angles
+from strapgen.lab.runs import angles
 
 ONE = Fraction(1)
 

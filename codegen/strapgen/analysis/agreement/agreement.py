@@ -19,8 +19,8 @@ from strapgen.analysis.series.prediction import Prediction, follow, parts_of, tr
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.motions.exact_attitudes import exact_attitudes, step_of_increments
 from strapgen.lab.motions.motions import GENERAL, Motion
+from strapgen.lab.runs import exact_attitudes, step_of_increments
 from strapgen.run import exact
 
 

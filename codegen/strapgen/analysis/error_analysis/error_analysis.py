@@ -14,7 +14,7 @@ from strapgen.analysis.series.series import PARTS, ErrorSeries, series
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
-from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.motions.motion_names import is_file
 from strapgen.results.records import INTERNAL, Record, entry
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, Rule, Shown, grouped, rules
 from strapgen.cli.options import (
     ANY_STEP_OPTIONS,
     Duration,
@@ -18,11 +18,10 @@ from strapgen.cli.options import (
 )
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.progress import track
-from strapgen.cli.rules import Excludes, Needs, OneOf, Rule, rules
 from strapgen.cli.values import Positive
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import MOTION_NAMES, MotionSettings, in_words
+from strapgen.lab.run_options import MOTION_NAMES, MotionSettings, in_words
 
 if TYPE_CHECKING:
     from strapgen.analysis.agreement.agreement import Agreement

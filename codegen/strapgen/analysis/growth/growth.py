@@ -22,9 +22,9 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel.algebra import cross_elements, dot
 from strapgen.kernel.polynomials import Polynomial
-from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.step_series import one_step
-from strapgen.lab.step_series.one_step import Step
+from strapgen.lab import one_step
+from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.one_step import Step
 from strapgen.results.records import INTERNAL, Record, entry
 
 if TYPE_CHECKING:

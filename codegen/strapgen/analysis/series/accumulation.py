@@ -24,7 +24,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.kernel import algebra
 from strapgen.kernel.power_series import Powers
-from strapgen.lab.step_series import one_step
+from strapgen.lab import one_step
 from strapgen.results.records import INTERNAL, Record, entry
 
 

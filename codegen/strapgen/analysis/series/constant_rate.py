@@ -21,7 +21,7 @@ from strapgen.catalogue import Choice
 from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, evaluate_stages
 from strapgen.kernel.power_series import Powers, constant, field, function
-from strapgen.lab.step_series import one_step
+from strapgen.lab import one_step
 
 if TYPE_CHECKING:
     from strapgen.analysis.series.prediction import Matrix, Prediction, Transfer

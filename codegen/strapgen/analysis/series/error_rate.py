@@ -24,8 +24,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.kernel import algebra
 from strapgen.kernel.covariants import NotCovariantError
 from strapgen.kernel.power_series import Powers
-from strapgen.lab.step_series import one_step
-from strapgen.lab.step_series.one_step import Step
+from strapgen.lab import one_step
+from strapgen.lab.one_step import Step
 
 _Matrix = list[list[Powers]]
 

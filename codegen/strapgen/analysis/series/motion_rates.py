@@ -11,7 +11,7 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.catalogue.kernels.motion_models import MOTIONS, MotionModel
 from strapgen.ir import checks
-from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.rate_expressions import time_symbol
 
 #: Time at the beginning of a step.

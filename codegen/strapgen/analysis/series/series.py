@@ -23,9 +23,9 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel import reading
 from strapgen.kernel.power_series import Powers
-from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.step_series import one_step
-from strapgen.lab.step_series.one_step import Step, errors
+from strapgen.lab import one_step
+from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.one_step import Step, errors
 from strapgen.results.records import Record, entry, properties
 
 #: Motions for which a series can be derived.

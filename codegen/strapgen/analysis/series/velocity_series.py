@@ -25,7 +25,7 @@ from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
-from strapgen.lab.step_series import one_step, sampled_motion
+from strapgen.lab import one_step, sampled_motion
 from strapgen.results.records import entry, plain_record
 
 #: The parts of a series, which are the outputs of a kernel by what changes.

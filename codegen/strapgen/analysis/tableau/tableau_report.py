@@ -8,7 +8,7 @@ from typing import Any
 
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.results.display.methods import method_latex
+from strapgen.results.display.objects import method_latex
 from strapgen.results.records import INTERNAL
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable

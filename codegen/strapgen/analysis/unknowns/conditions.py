@@ -22,8 +22,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Frame
 from strapgen.kernel.power_series import Powers
-from strapgen.lab.step_series import one_step, sampled_motion
-from strapgen.lab.step_series.one_step import Step
+from strapgen.lab import one_step, sampled_motion
+from strapgen.lab.one_step import Step
 
 #: Order in the rate of the terms that conditions on coning and on polynomials have.
 _PRODUCTS = 2

@@ -18,7 +18,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel.kernel import Kernel
-from strapgen.lab.step_series import one_step
+from strapgen.lab import one_step
 
 #: States the conditions of a demand, and of some orders beyond it.
 State: TypeAlias = Callable[[Demand, int], list[Equation]]

@@ -11,7 +11,7 @@ from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
-from strapgen.results.display.methods import array_latex
+from strapgen.results.display.objects import array_latex
 
 #: Most conditions and most families that are shown.
 _MOST_CONDITIONS, _MOST_FAMILIES = 12, 4

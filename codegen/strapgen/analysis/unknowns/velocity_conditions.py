@@ -24,7 +24,7 @@ from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
-from strapgen.lab.step_series import sampled_motion
+from strapgen.lab import sampled_motion
 
 #: Products of a rate and a force, and no longer ones.
 _PRODUCTS = 2

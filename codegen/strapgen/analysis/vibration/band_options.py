@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from strapgen.cli.option_groups import Needs, OneOf, Rule
 from strapgen.cli.options import option
-from strapgen.cli.rules import Needs, OneOf, Rule
 from strapgen.cli.values import Positive
 from strapgen.ir.exceptions import InputError
 

@@ -24,7 +24,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.kernel.power_series import Powers
-from strapgen.lab.step_series import one_step
+from strapgen.lab import one_step
 
 #: Returns the nine elements of a step's direction cosine matrix, row by row, from its samples and their ring.
 Transition = Callable[[list[list[Powers]], Oscillations], list[Powers]]

@@ -22,7 +22,7 @@ from strapgen.ir import checks
 from strapgen.ir.checks import counted, needed
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import short_repr
-from strapgen.lab.recordings import delimited
+from strapgen.lab.recordings.recorded_rows import csv_rows, line_blocks
 
 Array = NDArray[Any]
 
@@ -320,7 +320,7 @@ def _columns(path: Path) -> dict[str, Array]:
     allowed = ["frequency_hz", "density"]
     for name, unit in TRANSFERS.items():
         allowed += [f"{name}_{unit}", f"{name}_phase_rad"]
-    read = delimited.rows(path, chain.from_iterable(delimited.blocks(path)))
+    read = csv_rows(path, chain.from_iterable(line_blocks(path)))
     rows = [*islice(((line, row) for line, row in read if any(map(str.strip, row))), _MOST_ROWS + 1)]
     if len(rows) > _MOST_ROWS:
         raise InputError(f"{path} has over {_MOST_ROWS} rows; that is too many for a spectrum")

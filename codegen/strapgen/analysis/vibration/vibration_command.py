@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import typer
 
 from strapgen.analysis.vibration.band_options import GYRO_DAMPING, GYRO_RULES
-from strapgen.cli.option_groups import Shown, grouped, stated
+from strapgen.cli.option_groups import Excludes, Needs, Rule, Shown, grouped, rules, stated
 from strapgen.cli.options import ANY_STEP_OPTIONS, MethodOptions, Samples, SeveralMethods, option, samples
 from strapgen.cli.output import Output, plot_option
-from strapgen.cli.rules import Excludes, Needs, Rule, rules
 from strapgen.cli.values import Number, Positive, written
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.help import PlainCommand
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.generate_command import SourceOptions
+from strapgen.cli.option_groups import Needs, Shown, grouped, rules
 from strapgen.cli.options import CTarget, option
 from strapgen.cli.output import Format, check_format, show
+from strapgen.cli.program import PlainCommand
 from strapgen.cli.progress import waiting
-from strapgen.cli.rules import Needs, rules
-from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.values import Positive
 from strapgen.design.windows.window_argument import WindowArgument, window_of
 from strapgen.design.windows.window_command import app

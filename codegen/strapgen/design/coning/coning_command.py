@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from strapgen.analysis.vibration.band_options import BandOptions
-from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.option_groups import Excludes, Needs, Rule, Shown, command_line, grouped, rules
 from strapgen.cli.options import option
 from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
 from strapgen.cli.progress import waiting
-from strapgen.cli.rules import Excludes, Needs, Rule, rules
 from strapgen.cli.values import NotNegative, names, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -81,7 +81,7 @@ class ConingResult(Result):
 
     def latex(self) -> str:
         """Return the correction as a formula."""
-        from strapgen.results.display.methods import coning_latex  # loads SymPy
+        from strapgen.results.display.objects import coning_latex  # loads SymPy
 
         return coning_latex(self.design)
 

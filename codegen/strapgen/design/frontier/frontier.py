@@ -20,12 +20,11 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.version import VERSION
-from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.motions.users_motions import any_motion
-from strapgen.lab.simulate.drift import measured_drift
-from strapgen.lab.study.clusters import Bundle, Cluster, moved
-from strapgen.lab.study.resumable import resume, side_by_side
+from strapgen.lab.parallel_cases import Bundle, Cluster, moved, resume, side_by_side
+from strapgen.lab.runs import measured_drift
 from strapgen.storage import cache as disk_cache
 
 #: Motions by their labels: a name, or a user's file, and its settings.

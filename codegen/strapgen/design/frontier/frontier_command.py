@@ -6,18 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from strapgen.cli.option_groups import grouped
+from strapgen.cli.option_groups import Needs, grouped, rules
 from strapgen.cli.options import Duration, GyroRate, option
 from strapgen.cli.output import Output
-from strapgen.cli.rules import Needs, rules
 from strapgen.cli.values import Positive
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.motions.motion_files import is_file
-from strapgen.lab.simulate.sample_source import (
+from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.run_options import (
     MotionSettings,
+    WorkerOptions,
     motion_option,
 )
-from strapgen.lab.study.worker_options import WorkerOptions
 
 if TYPE_CHECKING:
     pass

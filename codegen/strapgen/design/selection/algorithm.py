@@ -15,9 +15,9 @@ from strapgen.design.brief import DesignBrief
 from strapgen.design.selection import causes
 from strapgen.design.selection.causes import Rounding
 from strapgen.ir.sources import Sources
-from strapgen.lab.cost import cost as costs
+from strapgen.lab import cost as costs
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.simulate.runs import Run, drift_between, simulate
+from strapgen.lab.runs import Run, drift_between, simulate
 from strapgen.run.backends import backend
 
 #: Operations that cost next to nothing.

@@ -13,8 +13,7 @@ from strapgen.design.selection import causes
 from strapgen.design.selection.candidates import Contender
 from strapgen.design.selection.judgement import Judgement, Question, judged
 from strapgen.ir.version import VERSION
-from strapgen.lab.study.clusters import Bundle, Cluster
-from strapgen.lab.study.resumable import resume, side_by_side
+from strapgen.lab.parallel_cases import Bundle, Cluster, resume, side_by_side
 from strapgen.storage import cache as disk_cache
 
 

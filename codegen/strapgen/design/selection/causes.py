@@ -25,7 +25,7 @@ from strapgen.design.brief import DesignBrief, GyroBrief
 from strapgen.design.environment import LineEnvironment
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.step_series.quantization_noise import QuantizationNoise, quantization_noise
+from strapgen.lab.quantization_noise import QuantizationNoise, quantization_noise
 from strapgen.run import exact
 from strapgen.run.backends import backend as attitude_backend
 

@@ -14,7 +14,7 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track, waiting
 from strapgen.cli.values import whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.study.worker_options import WorkerOptions
+from strapgen.lab.run_options import WorkerOptions
 
 if TYPE_CHECKING:
     from strapgen.design.brief import DesignBrief
@@ -115,7 +115,7 @@ def _simulated(
 
 def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Path, report: str) -> None:
     """Write the firmware of the cheapest algorithm that meets the brief."""
-    from strapgen.cli.source_options import SourceOptions
+    from strapgen.cli.generate_command import SourceOptions
     from strapgen.design.selection.firmware import firmware_files
     from strapgen.design.selection.simulated import algorithm_named
 

@@ -19,8 +19,8 @@ from strapgen.design.selection.candidates import STATES, Contender
 from strapgen.design.selection.causes import Rounding
 from strapgen.design.selection.choosing import algorithm_of
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.cost.processors import PROCESSORS
-from strapgen.lab.study.clusters import moved
+from strapgen.lab.parallel_cases import moved
+from strapgen.lab.processors import PROCESSORS
 
 #: The causes of a drift, in the order of a report; the first three are the software's.
 CAUSES = ("truncation", "coning", "rounding", "quantization", "noise")

@@ -21,11 +21,10 @@ from strapgen.design.selection.answer import in_order
 from strapgen.design.selection.candidates import Contender
 from strapgen.design.selection.choosing import algorithm_of
 from strapgen.design.selection.judgement import Judgement, after_run
-from strapgen.lab.monte_carlo.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
 from strapgen.lab.motions.motions import Motion, motion
-from strapgen.lab.motions.rate_profiles import CosineSum
-from strapgen.lab.motions.reference_attitudes import KNOT, ReferenceAttitude
-from strapgen.lab.simulate.runs import Run
+from strapgen.lab.motions.rate_profiles import KNOT, CosineSum, ReferenceAttitude
+from strapgen.lab.random_runs import Errors, MeanSquare, SteadyRuns, random_runs
+from strapgen.lab.runs import Run
 
 #: Fewest steps of a run, and its longest time in s.
 _FEWEST, _LONGEST = 200, 10

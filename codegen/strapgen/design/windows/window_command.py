@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.analysis.vibration.band_options import BandOptions
-from strapgen.cli.help import PlainCommand, PlainGroup
-from strapgen.cli.option_groups import Shown, command_line, grouped
+from strapgen.cli.option_groups import Needs, OneOf, Rule, Shown, command_line, grouped
 from strapgen.cli.options import option
 from strapgen.cli.output import Output
+from strapgen.cli.program import PlainCommand, PlainGroup
 from strapgen.cli.progress import waiting
-from strapgen.cli.rules import Needs, OneOf, Rule
 from strapgen.cli.values import NotNegative, names
 from strapgen.design.windows.window_argument import WindowArgument, window_of
 from strapgen.ir import checks

@@ -2,16 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Annotated
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
 from strapgen.cli.option_groups import Shown, grouped, stated
-from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions
+from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
-from strapgen.firmware.check_code.foreign_options import ForeignOptions
+from strapgen.cli.values import Positive
 from strapgen.ir.exceptions import InputError
+
+if TYPE_CHECKING:
+    from strapgen.firmware.check_code.conformance import Finding
+    from strapgen.firmware.check_code.foreign import ForeignStep
+
+_Text = str | None
+
+
+@dataclass(frozen=True)
+class ForeignOptions:
+    """Options of a function in a file in C or C++; None where the command line does not say."""
+
+    panel: ClassVar[str] = "A function in C or C++"
+
+    function: Annotated[
+        _Text, option("--function", metavar="NAME", help="Name of the function in the file.")
+    ] = None
+    arguments: Annotated[
+        _Text,
+        option(
+            "--arguments",
+            metavar="TEXT",
+            help="What it takes, in the order of C, and the attitude behind an arrow, for instance "
+            '"state[4], increments[2][3] -> next[4]" or "state[9], rates[3], dt -> state[9]".',
+        ),
+    ] = None
+    scalar: Annotated[
+        _Text,
+        option(
+            "--scalar",
+            metavar="NAME",
+            help="Where the scalar part of four elements stands: first or last.  [default: last]",
+        ),
+    ] = None
+    sense: Annotated[
+        _Text,
+        option(
+            "--sense",
+            metavar="NAME",
+            help="body-to-reference or reference-to-body.  [default: body-to-reference]",
+        ),
+    ] = None
+    input: Annotated[
+        _Text,
+        option(
+            "--input",
+            metavar="NAME",
+            help="What the samples are: increments in rad; rates in rad/s, means over the sampling interval; or "
+            "rates-at-ends in rad/s, those at the end of each interval.  [default: the name of the argument]",
+        ),
+    ] = None
+    sample_hz: Annotated[
+        Positive | None,
+        option(
+            "--sample-hz",
+            metavar="HZ",
+            help="Samples in a second: dt and step follow from it, and rates from the increments.  "
+            "[default: 100]",
+        ),
+    ] = None
+    init: Annotated[
+        _Text,
+        option("--init", metavar="NAME", help="Name of the function that begins a run, if there is one."),
+    ] = None
+    precision: Annotated[
+        _Text, option("--precision", metavar="NAME", help="Its numbers: float or double.  [default: double]")
+    ] = None
+
+    def step(self, file: str) -> ForeignStep:
+        """Return the function of a file, compiled."""
+        from strapgen.firmware.check_code.foreign import Convention, ForeignStep
+        from strapgen.firmware.check_code.foreign_arguments import RATES, ForeignSource, read_arguments
+
+        if self.function is None or self.arguments is None:
+            missing = "--function" if self.function is None else "--arguments"
+            raise InputError(
+                f'{file} needs {missing}; --function NAME --arguments "state[4], increments[2][3] -> next[4]" '
+                "is an example"
+            )
+        arguments = read_arguments(self.arguments)
+        if self.scalar is not None and arguments.elements != 4:
+            raise InputError(
+                f"--scalar {self.scalar} goes with a result of four elements; this one has {arguments.elements}"
+            )
+        convention = Convention(self.scalar or "last", self.sense or "body-to-reference")
+        takes = self.input or ("rates" if arguments.named(RATES) else "increments")
+        source = ForeignSource(
+            Path(file), self.function, arguments, self.init or "", self.precision or "double"
+        )
+        if self.sample_hz is None:
+            return ForeignStep(source, convention, takes)
+        return ForeignStep(source, convention, takes, 1 / self.sample_hz)
 
 
 @grouped
@@ -51,8 +145,8 @@ def check(
 
 def _refuse(options: Iterable[str], reason: str) -> None:
     """Refuse options that do not go with what is checked."""
-    for option in options:
-        raise InputError(f"{option} {reason}")
+    for name in options:
+        raise InputError(f"{name} {reason}")
 
 
 def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
@@ -60,38 +154,34 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
     choice = method.choose(algorithm)
     from strapgen import pipeline
     from strapgen.firmware.check_code import conformance
-    from strapgen.firmware.check_code.conformance_report import FindingsResult, finding_text
 
     kernel = pipeline.derive(choice)
-    live = (
-        output.format == "text" and output.file is None
-    )  # a person sees each finding as soon as it is there
+    # A person sees each finding as soon as it is there.
+    live = output.format == "text" and output.file is None
     if live:
         typer.echo(f"{kernel.name}: {kernel.title}\n")
     findings = []
     for finding in conformance.check(choice):
         findings.append(finding)
         if live:
-            typer.echo(finding_text(finding))
+            typer.echo(conformance.finding_text(finding))
     if not live:
-        output.show(FindingsResult(kernel.name, kernel.title, findings))
-    _fail(kernel.name, [finding.name for finding in findings if finding.holds is False])
+        output.show(conformance.FindingsResult(kernel.name, kernel.title, findings))
+    _fail(kernel.name, findings)
 
 
 def _check_foreign(file: str, foreign: ForeignOptions, output: Output) -> None:
     """Check a function of a file in C or C++."""
     step = foreign.step(file)
     from strapgen.firmware.check_code.check_foreign import check_foreign
-    from strapgen.firmware.check_code.conformance_report import ForeignResult
 
-    outcome = check_foreign(step)
-    output.show(ForeignResult(outcome, step.source.function))
-    cause = f"; likely cause: {outcome.cause}" if outcome.cause else ""
-    _fail(file, [finding.name for finding in outcome.findings if finding.holds is False], cause)
+    result = check_foreign(step)
+    output.show(result)
+    _fail(file, result.findings, f"; likely cause: {result.cause}" if result.cause else "")
 
 
-def _fail(name: str, failed: list[str], cause: str = "") -> None:
+def _fail(name: str, findings: Sequence[Finding], cause: str = "") -> None:
     """End with status 1 if anything fails."""
-    if failed:
+    if failed := [finding.name for finding in findings if finding.holds is False]:
         typer.echo(f"strapgen: {name} fails: {', '.join(failed)}{cause}", err=True)
         raise typer.Exit(1)

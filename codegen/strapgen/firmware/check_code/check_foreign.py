@@ -9,40 +9,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.firmware.check_code import coning_causes, ladder
-from strapgen.firmware.check_code.axes import (
-    DIRECTION_WITHIN,
-    SIZE_WITHIN,
-    convention_of,
-    fits,
-    in_words,
-    off,
-    sizes_in_words,
-)
-from strapgen.firmware.check_code.conformance import Finding
-from strapgen.firmware.check_code.foreign_arguments import RATES
-from strapgen.firmware.check_code.probes import (
-    Directions,
-    Products,
-    direction_segments,
-    directions,
-    product_segments,
-    products,
-)
-from strapgen.firmware.check_code.rest import Rest, rest, rest_segments
-from strapgen.firmware.check_code.rotation import rotation, rotation_segments
-from strapgen.firmware.check_code.runs import (
+from strapgen.firmware.check_code.conformance import Finding, finding_text
+from strapgen.firmware.check_code.foreign import (
     ENDS,
     RATE_INPUTS,
     Convention,
-    ForeignSegments,
+    ForeignRun,
     ForeignStep,
     Segment,
     SegmentRun,
     departure,
     lengths,
 )
+from strapgen.firmware.check_code.foreign_arguments import RATES
+from strapgen.firmware.check_code.probes import (
+    DIRECTION_WITHIN,
+    SIZE_WITHIN,
+    Directions,
+    Products,
+    Rest,
+    convention_of,
+    direction_segments,
+    directions,
+    fits,
+    in_words,
+    off,
+    product_segments,
+    products,
+    rest,
+    rest_segments,
+    sizes_in_words,
+)
+from strapgen.firmware.check_code.rotation import rotation, rotation_segments
 from strapgen.lab.motions.motions import motion
-from strapgen.results.records import entry, properties
+from strapgen.results.records import INTERNAL, entry, properties
+from strapgen.results.result import Result
 
 Array = NDArray[np.float64]
 
@@ -78,20 +79,21 @@ class MeasuredCheck:
     value: float | None
 
 
-def measured(findings: Sequence[Finding]) -> list[MeasuredCheck]:
-    """Return findings without their words."""
+def without_words(findings: Sequence[Finding]) -> list[MeasuredCheck]:
+    """Return what findings measured."""
     return [MeasuredCheck(finding.name, finding.holds, finding.measured) for finding in findings]
 
 
 @dataclass(frozen=True)
-class ForeignOutcome:
-    """What the check of a user's function has shown."""
+class ForeignResult(Result):
+    """What was found of a user's function."""
 
     computed = properties(holds=entry())
 
     file: str
+    function: str = field(metadata=INTERNAL)
     findings: tuple[Finding, ...] = field(
-        metadata=entry(key="checks", write=measured, kind=list[MeasuredCheck])
+        metadata=entry(key="checks", write=without_words, kind=list[MeasuredCheck])
     )
     #: Observed order
     order: float | None
@@ -113,8 +115,17 @@ class ForeignOutcome:
         """Whether the function does all that is required."""
         return all(finding.holds is not False for finding in self.findings)
 
+    def rows(self) -> Sequence[MeasuredCheck]:
+        """Return the checks."""
+        return without_words(self.findings)
 
-def check_foreign(step: ForeignStep) -> ForeignOutcome:
+    def text(self) -> str:
+        """Return the findings, a line each, and the likely cause of what fails."""
+        lines = [f"{self.file}: {self.function}", "", *map(finding_text, self.findings)]
+        return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
+
+
+def check_foreign(step: ForeignStep) -> ForeignResult:
     """Check a user's function."""
     return _Check(step).outcome()
 
@@ -132,13 +143,14 @@ class _Check:
         self.coefficients: tuple[SeenCoefficient, ...] = ()
         self.ratio: float | None = None
 
-    def outcome(self) -> ForeignOutcome:
+    def outcome(self) -> ForeignResult:
         """Run all checks."""
         findings = tuple(self.findings())
         failed = any(finding.holds is False for finding in findings)
         cause = "; ".join(dict.fromkeys(self.causes)) if failed and self.causes else None
-        return ForeignOutcome(
+        return ForeignResult(
             str(self.step.source.file),
+            self.step.source.function,
             findings,
             self.order,
             None if self.drift is None else float(np.linalg.norm(self.drift)),
@@ -156,7 +168,7 @@ class _Check:
         if calls.holds is False:
             yield calls
             return
-        convention, response = convention_of(self.step, directions(self.step, first.runs))
+        convention, response = convention_of(self.step, directions(self.step, first.segments))
         if convention is None:
             yield calls
             yield self.failed("axes", in_words(self.step, response.steady), off(response))
@@ -173,7 +185,7 @@ class _Check:
             return
         runs, place = {}, 0
         for name, part in everything:
-            runs[name] = done.runs[place : place + len(part)]
+            runs[name] = done.segments[place : place + len(part)]
             place += len(part)
         yield from self.measured(convention, runs)
 
@@ -182,7 +194,7 @@ class _Check:
         self.causes.append(text)
         return Finding(name, False, text, measured)
 
-    def calls(self, done: ForeignSegments) -> Finding:
+    def calls(self, done: ForeignRun) -> Finding:
         """Return the finding on how calls end, and on what they do to memory."""
         if done.stopped:
             return self.failed("calls", done.stopped)

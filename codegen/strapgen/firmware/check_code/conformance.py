@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mpmath
@@ -20,12 +20,13 @@ from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
-from strapgen.lab.compare.comparison import certified_angle
-from strapgen.lab.converge.convergence import converge
-from strapgen.lab.motions.exact_attitudes import step_of_increments
+from strapgen.lab.comparison import certified_angle
+from strapgen.lab.convergence import converge
 from strapgen.lab.motions.motions import GENERAL, motion
-from strapgen.lab.simulate.runs import attitude, drift_between, simulate
-from strapgen.results.records import Record
+from strapgen.lab.runs import attitude, drift_between, simulate, step_of_increments
+from strapgen.results.records import INTERNAL, Record, entry, properties
+from strapgen.results.result import Result
+from strapgen.results.table import Column, TextTable
 from strapgen.run import exact
 from strapgen.run.backends import Backend, sources_to_build
 from strapgen.run.backends import backend as attitude_backend
@@ -70,6 +71,36 @@ class Finding(Record):
     def within(cls, name: str, text: str, measured: float, allowed: float) -> Finding:
         """Return the finding on a figure that may be as large as another."""
         return cls(name, measured <= allowed, text, measured, allowed)
+
+
+_FINDING_COLUMNS = (Column(align="<", least=5), Column(align="<", least=18, gap=1), Column(align="<"))
+
+
+def finding_text(finding: Finding) -> str:
+    """Return a finding as a line of a report."""
+    words = {True: "holds", False: "FAILS", None: "-"}
+    return TextTable(_FINDING_COLUMNS, [(words[finding.holds], finding.name, finding.text)]).as_text("  ")
+
+
+@dataclass(frozen=True)
+class FindingsResult(Result):
+    """What was found of an attitude step."""
+
+    rows_in = "findings"
+    computed = properties(holds=entry())
+
+    kernel: str
+    title: str = field(metadata=INTERNAL)
+    findings: Sequence[Finding]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the step does all that is required."""
+        return all(finding.holds is not False for finding in self.findings)
+
+    def text(self) -> str:
+        """Return the findings, a line each."""
+        return "\n".join([f"{self.kernel}: {self.title}", "", *map(finding_text, self.findings)])
 
 
 def check(choice: Choice) -> Iterator[Finding]:

@@ -5,34 +5,135 @@ What the function does wrong stays in the process that runs it: a crash or an en
 
 from __future__ import annotations
 
+import math
 import re
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass
-from itertools import dropwhile
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import accumulate, dropwhile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.firmware.check_code.foreign_bridge import ForeignSource, bridge_text, definitions
+from strapgen.firmware.check_code.foreign_arguments import RATES, ForeignSource, bridge_text, definitions
+from strapgen.ir import checks
 from strapgen.ir.checks import suggestions
-from strapgen.ir.exceptions import CompilerError
+from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.timing import timed
+from strapgen.lab.runs import drift_between
 from strapgen.run import compiler
+from strapgen.run.backends import evaluator
+from strapgen.run.increments import windows
 from strapgen.storage import cache, drafts
 
+Array = NDArray[np.float64]
+SCALARS = ("last", "first")
+SENSES = ("body-to-reference", "reference-to-body")
+#: Rates are means over the sampling interval, or those at its end.
+ENDS = "rates-at-ends"
+RATE_INPUTS = (RATES, ENDS)
+INPUTS = ("increments", *RATE_INPUTS)
+#: Time between samples in s, unless another one is stated.
+INTERVAL = Fraction(1, 100)
+#: Samples that a function may remember; calls without rotation push so many out of its memory.
+REMEMBERED = 8
 #: Longest time in s that a run may take.
 PATIENCE = 20
-
+#: Largest rate in rad/s that is fed while the interval is short: a gyro measures it (2000 deg/s are 34.9 rad/s).
+_MOST_RATE = 30
+#: Elements of an attitude that are larger are none; their products stay finite.
+_LARGEST = 1e30
+#: Smallest ratio of the least to the largest stretch of a state that has a direction.
+_FLAT = 1e-3
 #: Without contraction to fused multiply-add every machine computes the same bits.
 _FLAGS = ("-O1", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden")
 _MODULE = "strapgen_foreign"
 _DECLARATION = (
     "int strapgen_foreign_run(long calls, const double *identity, const double *input, double *output);"
 )
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How the elements of a user's attitude are read."""
+
+    #: Where the scalar part of four elements stands, "last" or "first"
+    scalar: str = "last"
+    #: "body-to-reference" or "reference-to-body"
+    sense: str = "body-to-reference"
+
+    def __post_init__(self) -> None:
+        checks.choice("scalar", self.scalar, SCALARS)
+        checks.choice("sense", self.sense, SENSES)
+
+    def identity(self, elements: int) -> Array:
+        """Return the elements of no rotation."""
+        if elements != 4:
+            return np.eye(3).ravel() if elements == 9 else np.zeros(3)
+        identity: Array = np.eye(4)[3 if self.scalar == "last" else 0]
+        return identity
+
+    def matrices(self, states: Array) -> Array:
+        """Return direction cosine matrices, body to reference, of states (N, elements).
+
+        A state of another length than 1 is read as the rotation nearest to it. Rotation vectors, which have three
+        elements, turn the attitude one after the other.
+        """
+        if states.shape[-1] == 9:
+            matrices = _nearest(states.reshape(-1, 3, 3))
+        elif states.shape[-1] == 3:
+            turns = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(states), 3, 3)), states)
+            matrices = np.array(list(accumulate(turns, np.matmul)))
+        else:
+            matrices = evaluator("dcm-from-euler")(self.ours(states / _or_one(lengths(states))[:, None]))
+        return matrices if self.sense == SENSES[0] else np.swapaxes(matrices, -1, -2)
+
+    def ours(self, states: Array) -> Array:
+        """Return states of four elements with the scalar part last."""
+        return states if self.scalar == "last" else np.roll(states, -1, axis=-1)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Increments of one run."""
+
+    #: (N, K, 3): of N calls, in rad. A function that takes rates gets them divided by the time between samples
+    increments: Array
+    #: Whether calls without rotation come first, which empty a memory of samples
+    settled: bool = True
+
+
+@dataclass(frozen=True)
+class SegmentRun:
+    """What a function makes of a segment."""
+
+    #: (N, elements): the results of its calls
+    states: Array
+    #: (N, 3, 3): the same as direction cosine matrices, body to reference
+    matrices: Array
+    #: (1 + N, 3, 3): the attitudes relative to the one before the first call
+    relative: Array
+
+    @property
+    def start(self) -> Array:
+        """The attitude before the first call."""
+        start: Array = self.matrices[0] @ self.relative[1].T
+        return start
+
+    def unturned(self, frame: Array) -> SegmentRun:
+        """Return the run as it would be in reference axes that stand still.
+
+        `frame` (3,): rotation vector in rad by which a call turns the attitude without rotation of the body,
+        reference axes.
+        """
+        counts = np.arange(len(self.relative))[:, None]
+        back = evaluator("dcm-update")(np.broadcast_to(np.eye(3), (len(counts), 3, 3)), -counts * frame)
+        return replace(self, relative=self.start.T @ back @ self.start @ self.relative)
 
 
 @dataclass(frozen=True)
@@ -47,6 +148,93 @@ class ForeignRun:
     #: Whether the function wrote beside its arrays, or into arguments that are no result
     writes_beyond: bool = False
     changes_inputs: bool = False
+    #: The same read as attitudes, for each segment; empty if the run stopped
+    segments: tuple[SegmentRun, ...] = ()
+
+
+@dataclass(frozen=True)
+class ForeignStep:
+    """A user's function that is compiled, and how it is fed."""
+
+    source: ForeignSource
+    convention: Convention = Convention()
+    #: "increments" in rad, or "rates" in rad/s, which are the means over the time between samples, or "rates-
+    #: at-ends", which are those at the end of each
+    takes: str = "increments"
+    #: Time between samples in s
+    interval: Fraction = INTERVAL
+    module: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        checks.choice("input", self.takes, INPUTS)
+        if self.source.arguments.named(RATES) and self.takes == "increments":
+            raise InputError(
+                f"--input {self.takes} contradicts the argument rates; --input {RATES} or {ENDS} fits it"
+            )
+        object.__setattr__(self, "module", compile_foreign(self.source))
+
+    @property
+    def samples(self) -> int:
+        """Number of samples in a call."""
+        return self.source.arguments.count
+
+    @property
+    def unit(self) -> float:
+        """The step from 1 to the next number of the function's precision."""
+        return float(np.finfo(np.float32 if self.source.precision == "float" else np.float64).eps)
+
+    @property
+    def most(self) -> float:
+        """The largest angle of a sample in rad that a gyro measures."""
+        return float(_MOST_RATE * self.interval)
+
+    def calls_for(self, angle: float, fewest: int) -> int:
+        """Return the number of calls that a rotation by an angle in rad takes, at rates that a gyro measures."""
+        return max(fewest, math.ceil(angle / (self.samples * self.most)))
+
+    @property
+    def settling(self) -> int:
+        """Number of calls that push all samples out of a memory."""
+        return -(-REMEMBERED // self.samples)
+
+    def run(self, segments: Sequence[Segment], convention: Convention | None = None) -> ForeignRun:
+        """Run segments one after the other in one process."""
+        read = convention or self.convention
+        arguments = self.source.arguments
+        rows = np.concatenate([self._rows(segment) for segment in segments])
+        identity = read.identity(arguments.elements)
+        done = run_foreign(self.module, identity, rows)
+        if not done.stopped and not np.abs(done.outputs).max() < _LARGEST:  # not finite: no number compares
+            done = replace(
+                done, stopped="it leaves no finite numbers in its result, or does not write all of it"
+            )
+        if done.stopped:
+            return done
+        runs, place = [], 0
+        for segment in segments:
+            first = self.settling if segment.settled else 0
+            count = len(segment.increments)
+            outputs = done.outputs[place : place + first + count]
+            before = outputs[first - 1] if first else identity
+            place += first + count
+            matrices = read.matrices(np.vstack([before, outputs[first:]]))
+            runs.append(SegmentRun(outputs[first:], matrices[1:], matrices[0].T @ matrices))
+        return replace(done, segments=tuple(runs))
+
+    def _rows(self, segment: Segment) -> Array:
+        """Return the rows of the calls of a segment, see `run_foreign`."""
+        count, previous = self.samples, self.source.arguments.previous
+        quiet = np.zeros((self.settling if segment.settled else 0, count, 3))
+        samples = np.concatenate([quiet, segment.increments]).reshape(-1, 3)
+        numbers = windows(np.concatenate([np.zeros((previous, 3)), samples]), count, previous)
+        if self.takes != "increments":
+            numbers = numbers / float(self.interval)
+        rows = np.empty((len(numbers), 3 + numbers[0].size))
+        rows[:, 0] = np.arange(len(numbers)) == 0
+        rows[:, 1] = float(self.interval)
+        rows[:, 2] = float(self.interval * count)
+        rows[:, 3:] = numbers.reshape(len(numbers), -1)
+        return rows
 
 
 def compile_foreign(source: ForeignSource) -> Path:
@@ -160,3 +348,52 @@ def _said(source: ForeignSource, lines: list[str]) -> str:
             f"{source.function} does not take these --arguments in --precision {source.precision}: {reason}"
         )
     return f"{source.file} does not compile: {error}"
+
+
+def rotation_vectors(matrices: Array) -> Array:
+    """Return the rotation vectors of rotations.
+
+    `matrices` has shape (..., 3, 3). Returns (..., 3): in rad.
+
+    >>> rotation_vectors(evaluator("dcm-update")(np.eye(3), np.array([0.0, 0.0, 2.0]))).round(12) + 0.0
+    array([0., 0., 2.])
+    """
+    sines = drift_between(np.broadcast_to(np.eye(3), matrices.shape), matrices)
+    size = np.linalg.norm(sines, axis=-1, keepdims=True)
+    cosine = (np.trace(matrices, axis1=-2, axis2=-1)[..., None] - 1) / 2
+    vectors: Array = sines * np.where(size > 0, np.arctan2(size, cosine) / _or_one(size), 1.0)
+    return vectors
+
+
+def lengths(states: Array) -> Array:
+    """Return the lengths of states (N, elements), 1 for a rotation: of Euler parameters, or of the mean row.
+
+    `states` (N, 4): rotation vectors, which have three elements, are of no length. Returns (N,).
+    """
+    if states.shape[-1] == 3:
+        return np.ones(len(states))
+    rows = 3 if states.shape[-1] == 9 else 1
+    size: Array = np.linalg.norm(states, axis=-1) / np.sqrt(rows)
+    return size
+
+
+def departure(states: Array) -> float:
+    """Return the largest departure of C C' from the unit matrix, of the matrices C of states (N, elements).
+
+    `states` has shape (N, 4).
+    """
+    if states.shape[-1] != 9:
+        return float(np.abs(lengths(states) ** 4 - 1).max())
+    matrices = states.reshape(-1, 3, 3)
+    return float(np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)).max())
+
+
+def _or_one(size: Array) -> Array:
+    return np.where(size > 0, size, 1.0)
+
+
+def _nearest(matrices: Array) -> Array:
+    """Return the orthogonal matrices nearest to matrices (N, 3, 3); one without a direction stays as it is."""
+    left, stretch, right = np.linalg.svd(matrices)
+    turns: Array = left @ right
+    return np.where((stretch[:, 2] > _FLAT * stretch[:, 0])[:, None, None], turns, matrices)

@@ -9,6 +9,7 @@ call, is its coning correction.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -16,22 +17,34 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.firmware.check_code.runs import ENDS, ForeignStep, Segment, SegmentRun, rotation_vectors
+from strapgen.firmware.check_code.foreign import (
+    ENDS,
+    SCALARS,
+    SENSES,
+    Convention,
+    ForeignStep,
+    Segment,
+    SegmentRun,
+    rotation_vectors,
+)
 from strapgen.lab.motions.motions import motion
-from strapgen.lab.simulate.runs import drift_between
+from strapgen.lab.runs import drift_between
 from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]
 Table = dict[tuple[int, int], float]
-
+#: Largest difference of an answer to a rotation about an axis, in units of the rotation.
+DIRECTION_WITHIN = 0.1
+#: The same for one that is no fault in itself, and for a factor that is known.
+SIZE_WITHIN = _FACTOR_WITHIN = 0.01
+#: Most samples from before a call that a published correction takes.
+MOST_PREVIOUS = 3
 #: Rotation in rad of a call that shows directions: small enough to be read when it comes out 57.3 times as large.
 _TURN = 0.001
 #: Size of an increment of a product in rad, by precision: its square is seen, its fourth power is not.
 _SMALL = {"double": 0.002, "float": 0.02}
 #: Calls without rotation after a probe, in which what comes late arrives.
 _LATE = 2
-#: Most samples from before a call that a published correction takes.
-MOST_PREVIOUS = 3
 #: Samples from before a call whose products with those of the call are looked at: one more, for a late correction.
 _BEFORE = MOST_PREVIOUS + 1
 #: Fewest calls of each of two large rotations, and their angle in rad.
@@ -181,3 +194,172 @@ def _exact_turns(small: float) -> Array:
     first, second = vectors.reshape(2, -1, 3)
     turned = update(update(np.broadcast_to(np.eye(3), (len(first), 3, 3)), first), second)
     return rotation_vectors(turned).reshape(1, len(_AXES), len(_SIGNS), 3)
+
+
+#: Rotation below which a function does not turn at all, in units of the rotation.
+_NOTHING = 1e-5
+
+
+def convention_of(step: ForeignStep, declared: Directions) -> tuple[Convention | None, Directions]:
+    """Return the convention that fits a function, the declared one first; None if none does."""
+    if fits(declared.steady):
+        return step.convention, declared
+    scalars = SCALARS if step.source.arguments.elements == 4 else SCALARS[:1]
+    others = [Convention(scalar, sense) for scalar, sense in product(scalars, SENSES)]
+    ours = step.convention
+    others.sort(key=lambda other: (other.scalar != ours.scalar) + (other.sense != ours.sense))
+    for other in others:
+        done = step.run(direction_segments(step), other)
+        if not done.stopped:
+            response = directions(step, done.segments)
+            if fits(response.steady):
+                return other, response
+    return None, declared
+
+
+def fits(response: Array) -> bool:
+    """Return whether rotations about the axes come out as they are fed."""
+    return bool(np.abs(response - np.eye(3)).max() < DIRECTION_WITHIN)
+
+
+def off(response: Directions) -> float:
+    """Return the largest difference of an answer to a rotation about an axis, in units of the rotation."""
+    return float(np.abs(response.steady - np.eye(3)).max())
+
+
+def sizes_in_words(response: Array) -> str:
+    """Return in words by how much rotations come out too large that are about the right axes.
+
+    `response` (3, 3): a rotation vector for each axis, in units of the rotation about it.
+    """
+    sizes = np.diag(response)
+    if np.abs(response - np.diag(sizes)).max() > SIZE_WITHIN:
+        return "a small rotation about an axis turns about others too"
+    if np.ptp(sizes) < SIZE_WITHIN:
+        return f"rotations come out {sizes.mean():.4g} times as large as they are fed"
+    each = ", ".join(f"{size:.4g}" for size in sizes)
+    return f"rotations about x, y, z come out {each} times as large as they are fed"
+
+
+def in_words(step: ForeignStep, response: Array) -> str:
+    """Return in words how rotations about the axes come out.
+
+    `response` (3, 3): a rotation vector for each axis, in units of the rotation about it.
+    """
+    if not np.isfinite(response).all():
+        return "a small rotation gives no attitude near the one before it"
+    sizes = np.abs(response).max(axis=0)
+    if np.all(sizes < _NOTHING):
+        return "a small rotation about an axis does not turn the attitude"
+    signs = np.where(np.abs(response) > sizes / 2, np.sign(response), 0)
+    one_each = np.array_equal(np.abs(signs).sum(axis=0), np.ones(3)) and np.array_equal(
+        np.abs(signs).sum(axis=1), np.ones(3)
+    )
+    factor = float(np.median(sizes))
+    if not one_each or not np.allclose(response, factor * signs, atol=DIRECTION_WITHIN * factor):
+        return "a small rotation about an axis is wrong in size or axis"
+    parts = []
+    if abs(factor - 1) >= DIRECTION_WITHIN:
+        parts.append(_factor(step, factor))
+    if not np.array_equal(signs, np.eye(3)):
+        names = [
+            ("-" if signs[:, k].sum() < 0 else "") + "xyz"[int(np.abs(signs[:, k]).argmax())]
+            for k in range(3)
+        ]
+        parts.append(f"rotations about x, y, z turn about {', '.join(names)}")
+    return "; ".join(parts)
+
+
+def _factor(step: ForeignStep, factor: float) -> str:
+    """Return in words why rotations come out so many times as large as they are fed."""
+    interval = float(step.interval)
+    known = {
+        math.degrees(1): "degrees for radians, it turns radians into degrees",
+        math.radians(1): "degrees for radians, it takes radians for degrees",
+        interval: "it multiplies by the sampling interval what is an increment already",
+        1 / interval: "it does not multiply rates by the sampling interval",
+    }
+    size = f"rotations come out {factor:.4g} times as large as they are fed"
+    for value, said in known.items():
+        if abs(factor / value - 1) < _FACTOR_WITHIN:
+            return f"{said}: {size}"
+    return size
+
+
+#: Calls without rotation: many, so that a rate as slow as that of the earth is seen in single precision too.
+_FEW, _MANY = 10, 1000
+#: Rotation in rad that leads to another attitude, and fewest calls of it.
+_APPROACH, _APPROACH_CALLS = (0.5, -1.1, 0.6), 10
+#: Rotation of all these calls that is no rounding, in units in the last place.
+_UNITS = 64
+#: Largest difference of two rates that are the same, by their size.
+_ALIKE = 0.05
+#: Part of a rate about an axis that is none.
+_NO_RATE = 1e-4
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What a function does without rotation."""
+
+    #: Largest change of an element of the state
+    moved: float
+    #: (3,): rotation of a call, the same in reference axes at every attitude, in rad; 0 if there is none
+    frame: Array
+    #: (3,): the same in body axes
+    body: Array
+    #: Whether it turns otherwise than a frame that moves at a constant rate
+    strays: bool
+
+    def causes(self, seconds: float) -> list[str]:
+        """Return the likely causes, for calls of a duration in s."""
+        said = []
+        if self.frame.any():
+            said.append(f"the frame moves at a constant rate, {_rate(-self.frame / seconds)}")
+        if self.body.any():
+            said.append(f"a constant rate is added to that of the gyro, {_rate(self.body / seconds)}")
+        return said
+
+
+def rest_segments(step: ForeignStep) -> list[Segment]:
+    """Return the segments that `rest` needs of a function."""
+    nothing = np.zeros((_MANY, step.samples, 3))
+    count = step.calls_for(float(np.linalg.norm(_APPROACH)), _APPROACH_CALLS)
+    turns = np.tile(np.array(_APPROACH) / (count * step.samples), (count, step.samples, 1))
+    return [Segment(nothing), Segment(np.concatenate([turns, nothing[: step.settling], nothing]))]
+
+
+def rest(step: ForeignStep, runs: Sequence[SegmentRun]) -> Rest:
+    """Return what a function does without rotation."""
+    states, none = runs[0].states, np.zeros(3)
+    reference = states[0] if states.shape[1] != 3 else none  # of a rotation vector nothing is to be left
+    moved = float(np.abs(states - reference).max())
+    in_frame, in_body = zip(*map(_turns_of_a_call, runs), strict=True)
+    size = float(np.linalg.norm(in_frame[0]))
+    if size * _MANY < _UNITS * step.unit:
+        return Rest(moved, none, none, strays=False)
+    same = [
+        float(np.linalg.norm(here - there)) < _ALIKE * size + 2 * step.unit
+        for here, there in (in_frame, in_body)
+    ]
+    if same == [True, False]:
+        return Rest(moved, in_frame[0], none, strays=False)
+    return Rest(moved, none, in_body[0] if same == [False, True] else none, strays=True)
+
+
+def _turns_of_a_call(run: SegmentRun) -> tuple[Array, Array]:
+    """Return the rotation vector of a call without rotation in reference axes and in body axes; nan if it changes."""
+    calls = run.relative[-1 - _MANY :]
+    count = _MANY if np.linalg.norm(rotation_vectors(calls[0].T @ calls[_FEW])) * _MANY < _FEW else _FEW
+    first, half, last = calls[0], calls[count // 2], calls[count]
+    whole, part = (rotation_vectors(first.T @ after) / count for after in (last, half))
+    if np.linalg.norm(whole - 2 * part) > _ALIKE * np.linalg.norm(whole):
+        return np.full(3, np.nan), np.full(3, np.nan)
+    return run.start @ rotation_vectors(last @ first.T) / count, whole
+
+
+def _rate(rate: Array) -> str:
+    hourly = np.degrees(rate) * 3600
+    size = math.hypot(*hourly)
+    parts = ", ".join(f"{part:.4g}" if abs(part) > size * _NO_RATE else "0" for part in hourly)
+    return f"{size:.4g} deg/h ({parts} about x, y, z)"

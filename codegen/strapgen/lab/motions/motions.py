@@ -21,9 +21,8 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.lab.motions.motion_names import MOTIONS, MotionEntry
-from strapgen.lab.motions.parameters import parameters as settings_of
-from strapgen.lab.motions.rate_profiles import RateProfile
-from strapgen.lab.motions.reference_attitudes import ReferenceAttitude
+from strapgen.lab.motions.motion_names import parameters as settings_of
+from strapgen.lab.motions.rate_profiles import RateProfile, ReferenceAttitude
 from strapgen.registry import Titles
 from strapgen.run.backends import evaluator
 from strapgen.run.increments import windows

@@ -7,6 +7,7 @@ that is left. Gravity is in none of it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import STANDARD_GRAVITY
+from strapgen.lab.motions.motion_names import parameters as settings_of
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.motions.parameters import parameters as settings_of
 from strapgen.lab.motions.rate_profiles import CosineSum, random_sum
 
 Array = NDArray[np.float64]
@@ -53,6 +54,9 @@ _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
 _PLACES, _WEIGHTS = (1 + _PLACES) / 2, _WEIGHTS / 2
 #: Pieces that are summed up together: some megabytes of attitudes.
 _TOGETHER = 1 << 11
+
+#: Cycles whose velocity increments are computed together, and nodes of Gauss's rule in each.
+_CYCLES, _CYCLE_NODES = 1 << 14, 4
 
 
 @dataclass(frozen=True)
@@ -165,3 +169,24 @@ def force(name: str, /, **settings: Any) -> SpecificForce:
     if parameters.get("frequency", 1.0) <= 0:
         raise InputError(f"frequency_hz is {parameters['frequency']:g}; a number above 0 is needed")
     return SpecificForce(name, parameters)
+
+
+def velocity_increments(
+    attitude: Callable[[Array], Any], force: Iterable[float], interval: Fraction, count: int
+) -> Array:
+    """Return the velocity increments of a specific force that is constant in reference axes.
+
+    `attitude`: returns direction cosine matrices, body to reference, at some times in s. `force`: in m/s^2,
+    reference axes. `interval`: length of a cycle in s. Returns (count, 3): in m/s, body axes; Gauss's rule
+    integrates each cycle.
+    """
+    vector, step = np.array([*force], float), float(interval)
+    if not vector.any():
+        return np.zeros((count, 3))
+    nodes, weights = np.polynomial.legendre.leggauss(_CYCLE_NODES)
+    parts = []
+    for first in range(0, count, _CYCLES):
+        begin = np.arange(first, min(first + _CYCLES, count)) * step
+        matrices = np.asarray(attitude(begin[:, None] + step * (1 + nodes) / 2))
+        parts.append(np.einsum("cnji,j,n->ci", matrices, vector, weights * step / 2))
+    return np.concatenate(parts)

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks, packages
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.motions.motion_files import is_file
+from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.rate_expressions import rate_of
 from strapgen.lab.motions.rate_motion import RateMotion

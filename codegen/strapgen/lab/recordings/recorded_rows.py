@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import mmap
 import re
+import tempfile
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +14,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, islice
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +23,6 @@ from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import TIMES
-from strapgen.lab.recordings import delimited
-from strapgen.lab.recordings.recorded_columns import Columns
 from strapgen.lab.recordings.recorded_header import ColumnLayout
 
 Array = NDArray[np.float64]
@@ -34,6 +35,18 @@ _COMMENTS = ("#", "%", "//")
 _LONG_INTERVAL = 0.5
 #: Rows that are put together.
 _BATCH = 1 << 13
+
+#: Returns where the columns stand, from the cells of the header and the number of cells of a row.
+Find = Callable[[Sequence[str] | None, int], ColumnLayout]
+
+#: Numbers that a column store holds in memory, and rows that are worked on together.
+_IN_MEMORY = 1 << 22
+PART = 1 << 18
+
+#: Most rows of a file, characters of a line and cells of a row. An hour at 10 kHz has 36 million rows.
+MOST_ROWS, MOST_CHARACTERS, MOST_CELLS = 50_000_000, 20_000, 1_000
+#: Lines that are handed out together.
+_BLOCK = 1 << 13
 
 
 class LineNumbers:
@@ -62,14 +75,10 @@ class RecordedRows:
 
     #: (N,): the first column
     time: Array
-    #: (N, columns): the others; a long recording is on the disk, see `recorded_columns`
+    #: (N, columns): the others; a long recording is on the disk, see `Columns`
     values: Array
     #: The number of the line of each row
     lines: LineNumbers
-
-
-#: Returns where the columns stand, from the cells of the header and the number of cells of a row.
-Find = Callable[[Sequence[str] | None, int], ColumnLayout]
 
 
 def read_rows(
@@ -128,7 +137,7 @@ class _Reading:
 
     def batches(self) -> Iterator[tuple[Array, Sequence[int]]]:
         """Yield rows of numbers, and the numbers of their lines."""
-        blocks = delimited.blocks(self.path)
+        blocks = line_blocks(self.path)
         first = 1
         for block in blocks:
             lines, number = self._begin(block, first) if not self._is_begun else (block, first)
@@ -193,7 +202,7 @@ class _Reading:
     def _row_by_row(self, lines: Iterator[str], first: int) -> Iterator[tuple[Array, Sequence[int]]]:
         if self.separator is None:
             lines = (",".join(line.split()) + "\n" for line in lines)
-        rows = delimited.rows(self.path, lines, first, self.separator or ",")
+        rows = csv_rows(self.path, lines, first, self.separator or ",")
         while batch := list(islice(rows, _BATCH)):
             numbers = [self._numbers(line, row) for line, row in batch]
             yield np.array(numbers), [line for line, _ in batch]
@@ -224,3 +233,166 @@ def _resembles_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+class Columns:
+    """A table of numbers that grows by rows."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self.rows = 0
+        self._parts: list[Array] = []
+        self._file: IO[bytes] | None = None
+
+    def append(self, part: Any) -> None:
+        """Add rows, (N, width)."""
+        part = np.ascontiguousarray(part, np.float64)
+        self.rows += len(part)
+        self._parts.append(part)
+        if self._file is None and self.rows * self.width <= _IN_MEMORY:
+            return
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(prefix="strapgen-")  # noqa: SIM115
+            for waiting in self._parts:
+                self._file.write(waiting.tobytes())
+        except OSError as error:
+            raise InputError(
+                f"the temporary folder {tempfile.gettempdir()} does not hold so long a recording ({error.strerror})"
+            ) from None
+        self._parts.clear()
+
+    def array(self) -> Array:
+        """Return all rows, (rows, width)."""
+        if self._file is None:
+            return np.concatenate([np.empty((0, self.width)), *self._parts])
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise InputError(
+                f"the temporary folder {tempfile.gettempdir()} does not hold so long a recording ({error.strerror})"
+            ) from None
+        return np.memmap(self._file, np.float64, "r", shape=(self.rows, self.width))
+
+
+def release(array: Any) -> None:
+    """Let the system forget what it has read of an array on the disk; others stay as they are."""
+    while array is not None and not isinstance(array, mmap.mmap):
+        array = getattr(array, "base", None)
+    if array is not None and hasattr(array, "madvise"):
+        array.madvise(mmap.MADV_DONTNEED)
+
+
+def parts(array: Array, overlap: int = 0) -> Iterator[tuple[int, Array]]:
+    """Yield the rows of an array in parts, each with the number of its first row.
+
+    `array` has shape (N, ...).
+    """
+    for first in range(0, max(1, len(array) - overlap), PART):
+        yield first, np.asarray(array[first : first + PART + overlap])
+        release(array)
+
+
+def largest_magnitude(array: Array) -> float:
+    """Return the largest magnitude of an element; 0 if there is none, and no number if one is none."""
+    return float(np.max([np.abs(part).max(initial=0.0) for _, part in parts(array)]))
+
+
+class SampleIntervals:
+    """The differences of rising times.
+
+    `time` (N,): at least two finite times in s. `shortest, longest`: the interval in s, and the number of the
+    time before it.
+    """
+
+    def __init__(self, time: Array) -> None:
+        self._time = time
+        self.count = len(time) - 1
+        self.shortest, self.longest = (np.inf, 0), (-np.inf, 0)
+        for first, part in self.parts():
+            low, high = int(part.argmin()), int(part.argmax())
+            self.shortest = min(self.shortest, (float(part[low]), first + low))
+            if part[high] > self.longest[0]:
+                self.longest = (float(part[high]), first + high)
+
+    def parts(self) -> Iterator[tuple[int, Array]]:
+        """Yield the intervals in parts, each with the number of its first one."""
+        for first, part in parts(self._time, 1):
+            yield first, np.diff(part)
+
+    def at(self, place: int) -> float:
+        """Return one interval."""
+        return float(self._time[place + 1] - self._time[place])
+
+    def median(self) -> float:
+        """Return the median of intervals above 0."""
+        if self.count <= PART:
+            return float(np.median(np.diff(self._time)))
+        middle = (self.count - 1) // 2
+        low = self._of_rank(middle)
+        return low if self.count % 2 else float(np.mean([low, self._of_rank(middle + 1)]))
+
+    def _of_rank(self, rank: int) -> float:
+        """Return the interval above which as many are shorter: bits of numbers above 0 are in their order."""
+        low, high = (int(np.float64(value).view(np.int64)) for value in (self.shortest[0], self.longest[0]))
+        while low < high:
+            middle = (low + high) // 2
+            if sum(int(np.count_nonzero(part.view(np.int64) <= middle)) for _, part in self.parts()) > rank:
+                high = middle
+            else:
+                low = middle + 1
+        return float(np.int64(low).view(np.float64))
+
+    def farthest(self, value: float) -> tuple[float, int]:
+        """Return the largest departure from a value, and the number of the first interval that has it."""
+        worst = (-np.inf, 0)
+        for first, part in self.parts():
+            departures = np.abs(part - value)
+            place = int(departures.argmax())
+            if departures[place] > worst[0]:
+                worst = (float(departures[place]), first + place)
+        return worst
+
+
+def line_blocks(path: Path) -> Iterator[list[str]]:
+    """Yield the lines of a file, some thousands at a time."""
+    count = 0
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            while block := list(islice(iter(lambda: file.readline(MOST_CHARACTERS + 1), ""), _BLOCK)):
+                if max(map(len, block)) > MOST_CHARACTERS:
+                    number = (
+                        count + 1 + next(k for k, line in enumerate(block) if len(line) > MOST_CHARACTERS)
+                    )
+                    raise InputError(
+                        f"{path}, line {number}: over {MOST_CHARACTERS} characters, which no line may have"
+                    )
+                count += len(block)
+                if count > MOST_ROWS:
+                    raise InputError(f"{path} has over {MOST_ROWS} lines; that is too many")
+                yield block
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError as error:
+        raise _no_table(path, error) from None
+
+
+def csv_rows(
+    path: Path, lines: Iterator[str], first: int = 1, separator: str = ","
+) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of each row with the number of the line at which it ends."""
+    reader = csv.reader(lines, delimiter=separator)
+    try:
+        for row in reader:
+            if len(row) > MOST_CELLS:
+                number = first - 1 + reader.line_num
+                raise InputError(f"{path}, line {number}: {len(row)} cells; at most {MOST_CELLS} are allowed")
+            # A blank line is skipped, but a row of empty cells lacks its data and is refused later.
+            if len(row) > 1 or any(cell.strip() for cell in row):
+                yield first - 1 + reader.line_num, row
+    except csv.Error as error:
+        raise _no_table(path, error) from None
+
+
+def _no_table(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path} is no text file of comma-separated values ({error})")

@@ -7,16 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir import checks, units
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import short_repr
-from strapgen.lab.attitude_limits import require_finite, require_proper
-from strapgen.lab.recordings.history import History as History
-from strapgen.lab.recordings.recorded_columns import SampleIntervals, largest_magnitude, release
+from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.lab.recordings.recorded_header import (
     ColumnLayout,
     Stated,
@@ -24,15 +23,18 @@ from strapgen.lab.recordings.recorded_header import (
     named_layout,
     rates_layout,
 )
-from strapgen.lab.recordings.recorded_rates import (
-    GAP,
-    gap_remarks,
-    grid_points,
-    integrals,
-    resampled,
-    without_repeated,
+from strapgen.lab.recordings.recorded_rows import (
+    PART,
+    Columns,
+    LineNumbers,
+    RecordedRows,
+    SampleIntervals,
+    largest_magnitude,
+    parts,
+    read_rows,
+    release,
 )
-from strapgen.lab.recordings.recorded_rows import LineNumbers, RecordedRows, read_rows
+from strapgen.lab.runs import require_finite, require_proper
 from strapgen.run.backends import Backend
 from strapgen.run.increments import StepWindows
 
@@ -46,6 +48,9 @@ _INCREMENT_COLUMNS = {"t": "s", "dx": "rad", "dy": "rad", "dz": "rad"}
 _INERTIAL_COLUMNS = {**_INCREMENT_COLUMNS, "dvx": "m/s", "dvy": "m/s", "dvz": "m/s"}
 #: Largest relative departure of an interval from the median in an even recording.
 _EVEN = 1e-3
+
+#: From this multiple of the median on, an interval is a gap in which the motion is not known.
+GAP = 10
 
 
 @dataclass(frozen=True)
@@ -96,42 +101,35 @@ class InertialRecording(Recording):
     __repr__ = short_repr
 
 
-def _checked_intervals(
-    path: Path, rows: RecordedRows, bridged: bool = False
-) -> tuple[SampleIntervals, float]:
-    """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
-    time, lines = rows.time, rows.lines
-    if not math.isfinite(float(time[-1]) - float(time[0])):
-        raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
-    intervals = SampleIntervals(time)
-    shortest, worst = intervals.shortest
-    if shortest <= 0:
-        raise InputError(
-            f"{path}, line {lines[worst + 1]}: "
-            f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
-            + ("; --drop-repeated leaves out rows with the same time" if shortest == 0 else "")
-        )
-    median = intervals.median()
-    longest, widest = intervals.longest
-    if longest > GAP * median and not bridged:
-        raise InputError(
-            f"{path}, line {lines[widest + 1]}: a gap of {longest:.6g} s; "
-            f"the median interval is {median:.6g} s, and up to {GAP} times that is allowed; --bridge-gaps with "
-            "--resample-hz takes the rate as linear across it"
-        )
-    return intervals, median
+@dataclass(frozen=True)
+class History(Records):
+    """The attitude along a recording.
 
+    Parameters
+    ----------
+    time : array, (N,)
+        Times in s, on the clock of the recording.
+    states : array, (N, state shape)
+        States of the back end.
+    step : float
+        Step length in s.
+    unused : int
+        Number of increments at the end that do not fill a step.
+    elements : tuple of str
+        Names of the elements of a state, row-major; empty where they are not known.
+    """
 
-def _require_even(
-    path: Path, intervals: SampleIntervals, median: float, lines: LineNumbers, remedy: str
-) -> None:
-    departure, worst = intervals.farthest(median)
-    interval = intervals.at(worst)
-    if departure > _EVEN * median:
-        raise InputError(
-            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {interval:.6g} s "
-            f"before it is the worst, the median is {median:.6g} s; {remedy}"
-        )
+    time: Array
+    states: NDArray[Any]
+    step: float
+    unused: int
+    elements: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        times = f"{self.time[0]:g} s to {self.time[-1]:g} s, steps of {self.step:g} s"
+        return f"of {len(self.time)} states, {times}; {self.unused} increments unused"
 
 
 def read_increments(path: str | Path) -> Recording:
@@ -195,19 +193,6 @@ def read_inertial(path: str | Path) -> InertialRecording:
     """
     start, interval, values = _even_increments(checks.path("path", path), _INERTIAL_COLUMNS)
     return InertialRecording(start, interval, *map(np.ascontiguousarray, np.hsplit(values, 2)))
-
-
-def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, float, Array]:
-    """Return the time at which the first increment begins, the interval, and the increments."""
-
-    def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
-        return named_layout(header, width, [*columns], [*columns.values()])
-
-    rows, _ = read_rows(path, find)
-    intervals, median = _checked_intervals(path, rows)
-    _require_even(path, intervals, median, rows.lines, "increments are needed at even times")
-    interval = float((rows.time[-1] - rows.time[0]) / intervals.count)
-    return float(rows.time[0]) - interval, interval, rows.values
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
@@ -375,9 +360,135 @@ def propagate(
     return History(time, states, step, unused, backend.elements)
 
 
+def _checked_intervals(
+    path: Path, rows: RecordedRows, bridged: bool = False
+) -> tuple[SampleIntervals, float]:
+    """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
+    time, lines = rows.time, rows.lines
+    if not math.isfinite(float(time[-1]) - float(time[0])):
+        raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
+    intervals = SampleIntervals(time)
+    shortest, worst = intervals.shortest
+    if shortest <= 0:
+        raise InputError(
+            f"{path}, line {lines[worst + 1]}: "
+            f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
+            + ("; --drop-repeated leaves out rows with the same time" if shortest == 0 else "")
+        )
+    median = intervals.median()
+    longest, widest = intervals.longest
+    if longest > GAP * median and not bridged:
+        raise InputError(
+            f"{path}, line {lines[widest + 1]}: a gap of {longest:.6g} s; "
+            f"the median interval is {median:.6g} s, and up to {GAP} times that is allowed; --bridge-gaps with "
+            "--resample-hz takes the rate as linear across it"
+        )
+    return intervals, median
+
+
+def _require_even(
+    path: Path, intervals: SampleIntervals, median: float, lines: LineNumbers, remedy: str
+) -> None:
+    departure, worst = intervals.farthest(median)
+    interval = intervals.at(worst)
+    if departure > _EVEN * median:
+        raise InputError(
+            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {interval:.6g} s "
+            f"before it is the worst, the median is {median:.6g} s; {remedy}"
+        )
+
+
+def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, float, Array]:
+    """Return the time at which the first increment begins, the interval, and the increments."""
+
+    def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
+        return named_layout(header, width, [*columns], [*columns.values()])
+
+    rows, _ = read_rows(path, find)
+    intervals, median = _checked_intervals(path, rows)
+    _require_even(path, intervals, median, rows.lines, "increments are needed at even times")
+    interval = float((rows.time[-1] - rows.time[0]) / intervals.count)
+    return float(rows.time[0]) - interval, interval, rows.values
+
+
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
     """Return how many steps an interval in s is, to a hundredth of a step."""
     ratio = float(checks.number(what, value, positive=True)) / step
     if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")
     return round(ratio)
+
+
+def without_repeated(path: Path, rows: RecordedRows, remarks: list[str]) -> RecordedRows:
+    """Return rows without those whose time is that of the row before."""
+    is_new = np.concatenate([[True], np.diff(rows.time) != 0])
+    dropped = int(len(is_new) - is_new.sum())
+    if not dropped:
+        return rows
+    first = rows.lines[int(np.argmin(is_new))]
+    remarks.append(
+        f"{counted(dropped, 'row')} with the time of the row before left out, the first in line {first}"
+    )
+    lines = LineNumbers()
+    for place, row in enumerate(np.flatnonzero(is_new)):
+        lines.add(place, [rows.lines[int(row)]])
+    return RecordedRows(rows.time[is_new], rows.values[is_new], lines)
+
+
+def gap_remarks(rows: RecordedRows, median: float) -> list[str]:
+    """Return a remark for each gap that is bridged."""
+    steps = np.diff(rows.time)
+    return [
+        f"a gap of {steps[place]:.6g} s before line {rows.lines[int(place) + 1]}, from {rows.time[place]:.6g} s on, is "
+        "bridged: the rate is taken as linear across it"
+        for place in np.flatnonzero(steps > GAP * median)
+    ]
+
+
+def grid_points(path: Path, time: Array, resample_hz: float | str | Fraction, interval: float) -> int:
+    """Return the number of intervals of an even grid over a recording."""
+    ratio = (float(time[-1]) - float(time[0])) / interval * (1 + 1e-12)
+    if ratio > checks.MOST:
+        raise InputError(f"resample_hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
+    count = math.floor(ratio)
+    if count < 1:
+        raise InputError(
+            f"resample_hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
+        )
+    return count
+
+
+def integrals(rows: RecordedRows, factor: float) -> Array:
+    """Return the integrals of rates from each row to the next."""
+    increments = Columns(3)
+    for first, part in parts(rows.values, 1):
+        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
+        increments.append((rates[1:] + rates[:-1]) / 2 * np.diff(time)[:, None])
+    release(rows.time)
+    return increments.array()
+
+
+def resampled(rows: RecordedRows, factor: float, interval: float, count: int) -> Array:
+    """Return the integrals of rates over an even grid of so many intervals."""
+    begin, end, last = float(rows.time[0]), float(rows.time[-1]), len(rows.time) - 1
+    increments, angle, before, done = Columns(3), np.zeros((1, 3)), np.zeros((0, 3)), 0
+    for first, part in parts(rows.values, 1):
+        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
+        gaps = np.diff(time)
+        pieces = (rates[1:] + rates[:-1]) / 2 * gaps[:, None]
+        slopes = np.diff(rates, axis=0) / gaps[:, None]
+        angles = np.cumsum(np.vstack([angle, pieces]), axis=0)
+        angle = angles[-1:]
+        while done <= count:
+            grid = np.minimum(begin + interval * np.arange(done, min(done + PART, count + 1)), end)
+            if first + len(gaps) < last:  # the rest lies in the parts to come
+                grid = grid[grid < time[-1]]
+            if not len(grid):
+                break
+            row = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(gaps) - 1)
+            inside = (grid - time[row])[:, None]
+            there = angles[row] + inside * (rates[row] + inside / 2 * slopes[row])
+            increments.append(np.diff(np.vstack([before, there]), axis=0))
+            before, done = there[-1:], done + len(grid)
+    release(rows.time)
+    return increments.array()

@@ -8,8 +8,6 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from strapgen.lab.sensor_errors.dither import dither_amplitude as dither_amplitude
-    from strapgen.lab.sensor_errors.dither import dithered_laser_noise as dithered_laser_noise
     from strapgen.lab.sensor_errors.error_file import CLASSES as CLASSES
     from strapgen.lab.sensor_errors.error_file import read as read
     from strapgen.lab.sensor_errors.instruments import CAUSES as CAUSES
@@ -19,6 +17,8 @@ if TYPE_CHECKING:
     from strapgen.lab.sensor_errors.instruments import Sampling as Sampling
     from strapgen.lab.sensor_errors.instruments import TriadErrors as TriadErrors
     from strapgen.lab.sensor_errors.instruments import WarmUp as WarmUp
+    from strapgen.lab.sensor_errors.instruments import dither_amplitude as dither_amplitude
+    from strapgen.lab.sensor_errors.instruments import dithered_laser_noise as dithered_laser_noise
     from strapgen.lab.sensor_errors.measured_motions import measured as measured
     from strapgen.lab.sensor_errors.measured_motions import measured_recording as measured_recording
     from strapgen.lab.sensor_errors.sensors import MeasurementUnit as MeasurementUnit
@@ -42,8 +42,8 @@ __all__ = [
 
 #: The modules of the names above, imported when one is first used.
 _MODULES = {
-    "dither_amplitude": "dither",
-    "dithered_laser_noise": "dither",
+    "dither_amplitude": "instruments",
+    "dithered_laser_noise": "instruments",
     "CLASSES": "error_file",
     "read": "error_file",
     "CAUSES": "instruments",

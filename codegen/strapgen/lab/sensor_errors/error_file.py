@@ -17,7 +17,6 @@ from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import STANDARD_GRAVITY
-from strapgen.lab.sensor_errors.dither import dithered_laser_noise
 from strapgen.lab.sensor_errors.instruments import (
     Heating,
     InstrumentErrors,
@@ -25,6 +24,7 @@ from strapgen.lab.sensor_errors.instruments import (
     Sampling,
     TriadErrors,
     WarmUp,
+    dithered_laser_noise,
 )
 
 Array = NDArray[np.float64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated
@@ -13,6 +14,24 @@ from strapgen.catalogue.toml_models import Key
 from strapgen.ir.notebook_display import short_repr
 
 Array = NDArray[np.float64]
+
+#: Causes of errors by name, in the order of the signal: what of `InstrumentErrors` each of them has.
+CAUSES: dict[str, tuple[str, ...]] = {
+    "bandwidth": ("bandwidth_hz", "damping"),
+    "delay": ("delay",),
+    "jitter": ("jitter",),
+    "bias": ("bias",),
+    "scale": ("scale_plus", "scale_minus"),
+    "misalignment": ("misalignment",),
+    "terms": ("terms",),
+    "warm-up": ("warm_up",),
+    "heating": ("heating",),
+    "noise": ("noise",),
+    "random walk": ("random_walk",),
+    "output noise": ("output_noise",),
+    "pulses": ("pulse",),
+    "lost samples": ("lost", "lost_as"),
+}
 
 
 def zeros() -> Array:
@@ -150,25 +169,6 @@ class OutputNoise:
     __repr__ = short_repr
 
 
-#: Causes of errors by name, in the order of the signal: what of `InstrumentErrors` each of them has.
-CAUSES: dict[str, tuple[str, ...]] = {
-    "bandwidth": ("bandwidth_hz", "damping"),
-    "delay": ("delay",),
-    "jitter": ("jitter",),
-    "bias": ("bias",),
-    "scale": ("scale_plus", "scale_minus"),
-    "misalignment": ("misalignment",),
-    "terms": ("terms",),
-    "warm-up": ("warm_up",),
-    "heating": ("heating",),
-    "noise": ("noise",),
-    "random walk": ("random_walk",),
-    "output noise": ("output_noise",),
-    "pulses": ("pulse",),
-    "lost samples": ("lost", "lost_as"),
-}
-
-
 @dataclass(frozen=True, eq=False)
 class InstrumentErrors:
     """All errors of an inertial measurement unit.
@@ -258,3 +258,55 @@ class InstrumentErrors:
 
 
 _PERFECT = InstrumentErrors()
+
+
+def dithered_laser_noise(lock_in_deg_s: float, dither_deg_s: float, fringes: float) -> float:
+    """Return the white noise that a gyro of dithered laser beams has from passing through lock-in, equation (2).
+
+    The equation is ``sigma = L / sqrt(D K)`` with the lock-in rate L in deg/h, D in rad/h and K fringes a revolution.
+
+    Parameters
+    ----------
+    lock_in_deg_s : float
+        Lock-in rate.
+    dither_deg_s : float
+        Largest rate of the dither.
+    fringes : float
+        Fringes of the interference pattern in a revolution.
+
+    Returns
+    -------
+    float
+        In rad/sqrt(s).
+
+    Examples
+    --------
+    >>> round(math.degrees(dithered_laser_noise(0.03, 72, 648_000)) * 60, 8)
+    0.00199471
+    """
+    lock_in, dither = lock_in_deg_s * 3600, math.radians(dither_deg_s) * 3600
+    return math.radians(lock_in / math.sqrt(dither * fringes)) / 60
+
+
+def dither_amplitude(dither_deg_s: float, frequency_hz: float, residue: float = 1.0) -> float:
+    """Return the amplitude of an oscillation by its largest rate.
+
+    Parameters
+    ----------
+    dither_deg_s : float
+        Largest rate.
+    frequency_hz : float
+    residue : float, optional
+        Share of the motion of the gyro's block that reaches the assembly of the sensors.
+
+    Returns
+    -------
+    float
+        In rad.
+
+    Examples
+    --------
+    >>> round(math.degrees(dither_amplitude(72, 400)) * 3600, 4)
+    103.1324
+    """
+    return residue * math.radians(dither_deg_s) / (2 * math.pi * frequency_hz)

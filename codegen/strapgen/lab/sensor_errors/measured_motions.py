@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.motions.velocity_increments import velocity_increments
+from strapgen.lab.motions.specific_forces import velocity_increments
 from strapgen.lab.recordings.recording import InertialRecording, Recording
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors
 from strapgen.lab.sensor_errors.sensors import MeasurementUnit, steady

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from strapgen.catalogue import Choice
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.motions.velocity_increments import velocity_increments
+from strapgen.lab.motions.specific_forces import velocity_increments
+from strapgen.lab.quantization_noise import QuantizationNoise, quantization_noise
 from strapgen.lab.sensor_errors.instruments import InstrumentErrors, TriadErrors
 from strapgen.lab.sensor_errors.sensors import MeasurementUnit
-from strapgen.lab.step_series.quantization_noise import QuantizationNoise, quantization_noise
 
 Array = NDArray[np.float64]
 

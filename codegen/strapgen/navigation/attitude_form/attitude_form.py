@@ -11,7 +11,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.cost.cost import cost
+from strapgen.lab.cost import cost
 from strapgen.navigation.two_speed import transformation_error
 
 #: What a navigator does with its attitude, in the words of a table.

@@ -69,7 +69,7 @@ def study_attitude_form(
     output.check()
     import math
 
-    from strapgen.lab.cost import cost
+    from strapgen.lab import cost
     from strapgen.navigation.attitude_form import attitude_form as forms
     from strapgen.navigation.attitude_form.attitude_form_report import FormResult
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.lab.simulate.runs_report import ANGLES, AXES
+from strapgen.lab.runs_report import ANGLES, AXES
 from strapgen.results import figures
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.lab.simulate.runs import Array
-from strapgen.lab.simulate.runs_report import (
+from strapgen.lab.runs import Array
+from strapgen.lab.runs_report import (
     ANGLES,
     AXES,
     TIME_COLUMN,

@@ -10,7 +10,7 @@ from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import OneBackend, StrapdownAlgorithm, option
 from strapgen.cli.progress import say_unused
-from strapgen.lab.sensor_errors.sensor_options import SensorFile, read_errors, with_errors
+from strapgen.lab.run_options import SensorFile, read_errors, with_errors
 from strapgen.navigation.courses.course_options import CourseOutput, CycleCounts, Start
 from strapgen.navigation.systems.built_in import is_system
 

@@ -16,7 +16,7 @@ from strapgen.catalogue.methods.windows import named_window
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab.simulate.runs import attitude, drift_between
+from strapgen.lab.runs import attitude, drift_between
 from strapgen.navigation.two_speed import two_speed_runner, two_speed_sources
 from strapgen.run.backends import BACKENDS, evaluator
 from strapgen.run.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.generate_command import SourceOptions
+from strapgen.cli.option_groups import Needs, Shown, grouped, rules
 from strapgen.cli.options import option
 from strapgen.cli.output import Format, NewFolder, check_format, show
 from strapgen.cli.progress import track, waiting
-from strapgen.cli.rules import Needs, rules
-from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.values import names
 
 if TYPE_CHECKING:

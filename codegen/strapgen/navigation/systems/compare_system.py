@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from strapgen.cli.fixed_options import FixedOptions
     from strapgen.cli.options import SeveralMethods
     from strapgen.cli.output import Output
-    from strapgen.lab.simulate.sample_source import SampleSource
+    from strapgen.lab.run_options import SampleSource
     from strapgen.navigation.systems.wiring import Description
 
 
@@ -40,7 +40,7 @@ def compared_system(
     output.check(name, *source.files)
     from strapgen import registration
     from strapgen.cli.progress import waiting
-    from strapgen.lab.compare.file_counts import counted
+    from strapgen.lab.compare_command import counted
     from strapgen.navigation.systems.system_comparison import compare_system
     from strapgen.navigation.systems.system_comparison_report import SystemComparisonResult
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from strapgen.lab.described import DescribedAlgorithms
+from strapgen.lab.run_options import DescribedAlgorithms
 from strapgen.navigation.systems.built_in import is_system
 
 

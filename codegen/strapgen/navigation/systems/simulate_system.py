@@ -12,8 +12,7 @@ if TYPE_CHECKING:
     from strapgen.cli.fixed_options import FixedOptions
     from strapgen.cli.options import MethodOptions
     from strapgen.lab.recordings.recording import Recording
-    from strapgen.lab.simulate.run_options import RunOptions, RunOutput
-    from strapgen.lab.simulate.sample_source import SampleSource
+    from strapgen.lab.run_options import RunOptions, RunOutput, SampleSource
     from strapgen.navigation.systems.system_backends import SystemRunner
     from strapgen.navigation.systems.wiring import Description
 
@@ -42,7 +41,7 @@ def simulated_system(
     if output.print_every is not None:
         raise InputError("--print does not go with a described system; --record and --format csv do")
     from strapgen.cli.progress import waiting
-    from strapgen.lab.simulate.runs_report import RunResult
+    from strapgen.lab.runs_report import RunResult
     from strapgen.navigation.systems.system_runs import simulate_system
 
     description = described_at(name, source)
@@ -66,7 +65,7 @@ def _on_recording(
     name: str, backend: str, source: SampleSource, fixed: FixedOptions, output: RunOutput
 ) -> None:
     """Run along recorded gyro data, and deliver the attitude."""
-    from strapgen.lab.simulate.runs_report import HistoryResult
+    from strapgen.lab.runs_report import HistoryResult
     from strapgen.navigation.systems.system_runs import attitude_output, system_history
 
     data = recorded(source)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.sensor_errors.sensor_options import read_errors, with_errors
+from strapgen.lab.run_options import read_errors, with_errors
 from strapgen.navigation.systems.simulate_system import described_along, facts_of, refuse_options, runner_of
 
 if TYPE_CHECKING:

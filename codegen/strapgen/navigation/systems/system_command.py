@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped
+from strapgen.cli.generate_command import SourceOptions
+from strapgen.cli.option_groups import Excludes, Needs, Shown, grouped, rules
 from strapgen.cli.options import option
 from strapgen.cli.output import Format, NewFolder, WithRuns, check_format, show
-from strapgen.cli.rules import Excludes, Needs, rules
-from strapgen.cli.source_options import SourceOptions
 from strapgen.cli.values import Positive
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -161,7 +160,7 @@ def fitted_stages(
 ) -> tuple[Fitted, Budget, str]:
     """Return the generated stages, what they need, and the command that makes the files again."""
     from strapgen.ir.fixed_settings import Settings
-    from strapgen.lab.cost.cost import processors
+    from strapgen.lab.cost import processors
     from strapgen.navigation.systems import system_cost
     from strapgen.navigation.systems.budget import budget
     from strapgen.navigation.systems.fitting import fitted

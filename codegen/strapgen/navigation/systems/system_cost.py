@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from strapgen.ir.exceptions import CompilerError
-from strapgen.lab.cost import cost as costs
+from strapgen.lab import cost as costs
 from strapgen.navigation.systems.budget import Budget, budget
 from strapgen.navigation.systems.fitting import Fitted
 

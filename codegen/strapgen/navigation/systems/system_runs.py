@@ -14,8 +14,8 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.recordings.recording import History, Recording
+from strapgen.lab.runs import Run
 from strapgen.lab.sensor_errors.measured_motions import both_increments
-from strapgen.lab.simulate.runs import Run
 from strapgen.navigation.systems.system import Cell, DescribedSystem
 from strapgen.navigation.systems.system_backends import SystemMemory, SystemRunner
 from strapgen.navigation.systems.system_inputs import cycles_of, samples

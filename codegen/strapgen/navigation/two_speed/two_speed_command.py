@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
+from strapgen.cli.generate_command import SourceOptions
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import CTarget, Sculling, TwoSpeedAlgorithm
 from strapgen.cli.output import Format, check_format, show
-from strapgen.cli.source_options import SourceOptions
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -64,13 +64,13 @@ def two_speed(
         return
     written = output.write(files)
     loops = two_speed_sources.loops(*task)
-    from strapgen.cli import generated_text
+    from strapgen.cli import generated_result
 
-    lines = generated_text.head(sources, target, written)
+    lines = generated_result.head(sources, target, written)
     for loop in loops:
         lines += [
-            *generated_text.head(loop, target),
-            *(f"  {line}" for line in generated_text.contract(loop)),
+            *generated_result.head(loop, target),
+            *(f"  {line}" for line in generated_result.contract(loop)),
         ]
     show(_result(sources, loops, written, "\n".join(lines)), format)
 

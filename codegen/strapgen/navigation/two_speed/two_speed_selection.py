@@ -35,8 +35,8 @@ from strapgen.ir.sources import Sources
 from strapgen.kernel import power_series
 from strapgen.kernel.power_series import Powers
 from strapgen.lab.motions.motions import Motion
-from strapgen.lab.simulate.runs import Run, drift_between
-from strapgen.lab.step_series.quantization_noise import polynomial_noise
+from strapgen.lab.quantization_noise import polynomial_noise
+from strapgen.lab.runs import Run, drift_between
 from strapgen.navigation.systems import system_file, system_generation
 from strapgen.navigation.systems.fitting import Fitted, fitted
 from strapgen.navigation.systems.system_backends import system_runner

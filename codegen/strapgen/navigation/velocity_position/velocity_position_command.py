@@ -11,7 +11,7 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import Positive, names
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.simulate.sample_source import in_words, motion_option
+from strapgen.lab.run_options import in_words, motion_option
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, Stage
 from strapgen.lowering.canonical.vector_form import vector_form
 from strapgen.results.display.expressions import named_equations
-from strapgen.results.display.stages import stages_latex
-from strapgen.results.display.vectors import vectors_latex
+from strapgen.results.display.stages import stages_latex, vectors_latex
 from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable

@@ -1,1 +1,0 @@
-"""Firmware projects with CMake and tests."""

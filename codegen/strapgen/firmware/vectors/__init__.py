@@ -1,1 +1,0 @@
-"""Test vectors for generated C."""

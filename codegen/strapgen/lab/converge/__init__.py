@@ -1,1 +1,0 @@
-"""Order of convergence from runs."""

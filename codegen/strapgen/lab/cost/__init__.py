@@ -1,1 +1,0 @@
-"""Cost of generated code on microcontrollers: cross compilers and simulators."""

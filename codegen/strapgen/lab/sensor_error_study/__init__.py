@@ -1,1 +1,0 @@
-"""Monte Carlo of sensor errors beside closed forms."""

@@ -1,1 +1,0 @@
-"""Runs of an algorithm along a motion, on any back end."""

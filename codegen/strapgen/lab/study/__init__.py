@@ -1,1 +1,0 @@
-"""What studies share: workers, clusters, results that a later run takes up."""

@@ -1,1 +1,0 @@
-"""Drift of fixed point over the length of a word."""
