@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 import strapgen
 from strapgen.catalogue.methods.window import GyroResponse, Window
 from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.design.family import FamilyBrief, design
 from strapgen.design.filters import responses
-from strapgen.design.windows.family import FamilyBrief, design
 from strapgen.lab.motions.motions import IntegratedMotion, Motion
 from strapgen.lab.runs import Run, angles, attitude, drift, drift_between, steady_drift
 from strapgen.run.backends import Backend

@@ -14,14 +14,11 @@ from typing import Any
 
 import pytest
 
-from strapgen.analysis.error_analysis import error_analysis, overview
-from strapgen.analysis.growth import growth
-from strapgen.analysis.ratios import ratios
-from strapgen.analysis.series import accumulation, constant_rate, series
+from strapgen.analysis import error_analysis, growth, overview, ratios
+from strapgen.analysis.series import constant_rate, error_rate, series
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
-from strapgen.design.coning import coning
-from strapgen.design.coning import coning_report as coning_reports
-from strapgen.design.windows import family, window_report
+from strapgen.design import coning_design, family, window_report
+from strapgen.design import coning_report as coning_reports
 from strapgen.ir.fixed_settings import Settings
 from strapgen.results import figures
 from strapgen.thesis import predicted_tables, thesis_statements, thesis_tables
@@ -29,7 +26,7 @@ from strapgen.thesis import predicted_tables, thesis_statements, thesis_tables
 #: Modules that analyse, and the pure functions of a choice, a motion and a number of terms that they call.
 ANALYSES = (error_analysis, overview, ratios)
 ONCE = {
-    "accumulate": cache(accumulation.accumulate),
+    "accumulate": cache(error_rate.accumulate),
     "constant_rate": cache(constant_rate.constant_rate),
     "growth": cache(growth.growth),
     "series": cache(series.series),
@@ -54,7 +51,7 @@ def _once(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 _coefficients, _filters, _window_result = (
-    _once(coning.design),
+    _once(coning_design.design),
     _once(family.design),
     cache(window_report.WindowResult.of),
 )
@@ -119,7 +116,7 @@ def shared_results(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(predicted_tables, "predicted", _predicted_once)
     monkeypatch.setattr(ratios, "claims", _claims_once)
     monkeypatch.setattr(thesis_statements, "statements", _statements_once)
-    monkeypatch.setattr(coning, "design", _coefficients)
+    monkeypatch.setattr(coning_design, "design", _coefficients)
     monkeypatch.setattr(family, "design", _filters)
     monkeypatch.setattr(coning_reports.ShapedDrift, "figures", lambda drift: dict(_figures(drift)))
     monkeypatch.setattr(window_report.WindowResult, "of", staticmethod(_window_result))

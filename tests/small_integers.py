@@ -15,9 +15,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from strapgen.fixedpoint.format_plan import FormatPlan
+from strapgen.fixedpoint.integer_sums import Quantization
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import InputElement, Quantities, Quantity
-from strapgen.fixedpoint.quantization_context import Quantization
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Scaled, Term, Value, cases_of
 

@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import NUMBERS
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import OPERATIONS, Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal

@@ -167,7 +167,7 @@ def test_only_the_front_door_composes_stages():
         offenders += [
             f"{module} uses {name}"
             for name in names
-            if re.fullmatch(r"strapgen\.targets\.\w+\.emit\.emit", name)
+            if re.fullmatch(r"strapgen\.targets\.\w+\.emit(_fixed)?", name)
         ]
         if len(doors := names & DOORS) > 1:
             offenders.append(f"{module} composes {', '.join(sorted(doors))}")

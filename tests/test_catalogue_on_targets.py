@@ -19,7 +19,7 @@ from fixed_inputs import corners_and_random, exactly
 
 import strapgen
 from strapgen.catalogue import Choice, choose
-from strapgen.fixedpoint import function_series
+from strapgen.fixedpoint import series
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Recursion
@@ -29,8 +29,7 @@ from strapgen.navigation.loops.loop_names import LOOPS
 from strapgen.navigation.outputs.output_names import MOUNTINGS, OUTPUTS, TWO_ROWS
 from strapgen.navigation.redundancy.redundancy_names import REDUNDANCY
 from strapgen.run.backends import Evaluator
-from strapgen.run.c import CEvaluator
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
 
 VECTORS = [
@@ -200,7 +199,7 @@ def test_every_value_keeps_its_range_and_its_error_bound(choice, word, rounding,
                 if any(
                     part in value.name + choice.name for part in ("angle", "heading")
                 ):  # but for whole turns
-                    apart = min(apart, abs(apart - 2 * function_series.pi()))
+                    apart = min(apart, abs(apart - 2 * series.pi()))
                 assert apart <= value.error, value.name
                 compared += 1
                 if value.name in outputs and value.error:

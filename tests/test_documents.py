@@ -603,7 +603,14 @@ def helpers() -> set[str]:
 
 
 #: Scripts that compile or derive many kernels.
-LONG_EXAMPLES = ("word_length_study", "coning_drift", "recorded_gyro", "compare_orders")
+LONG_EXAMPLES = (
+    "word_length_study",
+    "coning_drift",
+    "recorded_gyro",
+    "compare_orders",
+    "certified_bounds",
+    "great_circle",
+)
 
 
 @pytest.mark.parametrize(
@@ -631,6 +638,16 @@ def test_example(path, capsys, monkeypatch):
         return
     namespace["main"]()
     assert capsys.readouterr().out.count("\n") >= 3
+
+
+@pytest.mark.long
+def test_an_example_prints_what_a_page_shows(capsys):
+    pattern = r"^    python examples/(\w+\.py)\n\n```text\n(.*?)^```"
+    shown = [pair for text in DOCS.values() for pair in re.findall(pattern, text, re.MULTILINE | re.DOTALL)]
+    assert len(shown) >= 3
+    for name, text in shown:
+        runpy.run_path(str(ROOT / "examples" / name))["main"]()
+        assert capsys.readouterr().out == text
 
 
 def test_the_demonstration_prints_a_function():

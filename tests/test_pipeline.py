@@ -17,8 +17,8 @@ from strapgen import pipeline, targets
 from strapgen.catalogue import Choice, choose, derivation
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
-from strapgen.run.generation import Request
-from strapgen.storage import stage_cache
+from strapgen.run.kernel_sources import Request
+from strapgen.storage import cache
 
 PACKAGE = str(Path(strapgen.__file__).parent)
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "modified_rodrigues.py"
@@ -33,7 +33,7 @@ cli.options MethodOptions.choose
 catalogue.choosing choose
 catalogue.choosing _choose_method
 cli.fixed_options FixedOptions.check_increments
-storage.stage_cache cached.<locals>.decorate.<locals>.recall
+storage.cache cached.<locals>.decorate.<locals>.recall
 pipeline compile
 pipeline fixed_program
 pipeline program
@@ -183,7 +183,7 @@ def test_verbose_shows_stages_on_stderr_and_what_the_cache_holds(empty_cache, ca
         r"generate euler-rk4-2 for c: \d+\.\d{3} s\n",
         first.err,
     )
-    stage_cache._results.clear()  # as another process
+    cache._results.clear()  # as another process
     run("--verbose", *words)
     second = capsys.readouterr()
     assert second.err == "sources of euler-rk4-2 for c: from the cache\n"

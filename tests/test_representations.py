@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.analysis.growth import growth
+from strapgen.analysis import growth
 from strapgen.analysis.series import velocity_series
 from strapgen.analysis.unknowns.solving import SolvedStep
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau

@@ -19,8 +19,8 @@ MISSING = ("numpy", "scipy", "matplotlib", "cffi", "platformdirs", "typer", "cli
 HEAD = f"import json, sys\nfor name in {MISSING!r}:\n    sys.modules[name] = None\n"
 PROGRAM = """
 import strapgen
-from strapgen.analysis.error_analysis.error_analysis import analyse
-from strapgen.analysis.error_analysis.series_report import SeriesResult
+from strapgen.analysis.error_analysis import analyse
+from strapgen.analysis.error_analysis import SeriesResult
 from strapgen.results.display.formulas import as_latex
 from strapgen.fixedpoint.floating import proved
 

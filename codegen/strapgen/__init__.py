@@ -25,19 +25,19 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods import runge_kutta as runge_kutta
     from strapgen.catalogue.methods import tableaux as tableaux
     from strapgen.catalogue.methods import windows as windows
-    from strapgen.catalogue.methods.samples import Samples as Samples
-    from strapgen.catalogue.methods.samples import increments_signal as increments_signal
-    from strapgen.catalogue.methods.samples import turns_signal as turns_signal
-    from strapgen.catalogue.methods.samples import velocities_signal as velocities_signal
-    from strapgen.catalogue.methods.tableau import Tableau as Tableau
+    from strapgen.catalogue.methods.method import Samples as Samples
+    from strapgen.catalogue.methods.method import increments_signal as increments_signal
+    from strapgen.catalogue.methods.method import turns_signal as turns_signal
+    from strapgen.catalogue.methods.method import velocities_signal as velocities_signal
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
+    from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
+    from strapgen.design import family as _family
     from strapgen.design.commit_late.commit_late import CommitLate as CommitLate
     from strapgen.design.commit_late.late_recording import recording_attitudes as recording_attitudes
     from strapgen.design.commit_late.late_unit import GapError as GapError
     from strapgen.design.commit_late.late_unit import SampleKind as SampleKind
-    from strapgen.design.windows import family as _family
     from strapgen.firmware.check_code.conformance import Finding as Finding
     from strapgen.firmware.check_code.conformance import check as check
     from strapgen.fixedpoint.floating.bounds import rounding_bounds as rounding_bounds
@@ -96,13 +96,13 @@ if _typing.TYPE_CHECKING:
     from strapgen.results.display import formulas as formulas
     from strapgen.run import exact as exact
     from strapgen.run import increments as _increments
+    from strapgen.run.backend_names import BACKENDS as BACKENDS
     from strapgen.run.backends import Backend as Backend
     from strapgen.run.backends import Evaluator as Evaluator
     from strapgen.run.backends import backend as backend
     from strapgen.run.backends import build as build
     from strapgen.run.backends import evaluator as evaluator
     from strapgen.run.compiler import compile_together as compile_together
-    from strapgen.run.registry import BACKENDS as BACKENDS
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
 
@@ -126,7 +126,7 @@ _NAMES = {
         "GapError",
         "SampleKind",
     ),
-    "run.registry": ("BACKENDS",),
+    "run.backend_names": ("BACKENDS",),
     "navigation.systems.system_backends": (
         "SystemRunner",
         "system_runner",
@@ -143,14 +143,16 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
-    "catalogue.methods.samples": (
+    "catalogue.methods.method": (
         "Samples",
         "increments_signal",
         "turns_signal",
         "velocities_signal",
     ),
-    "catalogue.methods.tableau": ("Tableau",),
-    "catalogue.methods.tableaux": ("TABLEAUX",),
+    "catalogue.methods.tableaux": (
+        "Tableau",
+        "TABLEAUX",
+    ),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
     "analysis.algorithm": (
@@ -248,7 +250,7 @@ _NAMESPACES = {
     "tableaux": "catalogue.methods.tableaux",
     "unknowns": "analysis.unknowns.unknowns",
     "vibration": "analysis.vibration",
-    "window_design": "design.windows.family",
+    "window_design": "design.family",
     "windows": "catalogue.methods.windows",
 }
 #: Present names by those of the version before, which give a warning.

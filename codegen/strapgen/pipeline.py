@@ -25,7 +25,7 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.ir.timing import timed
-from strapgen.storage.stage_cache import cached
+from strapgen.storage.cache import cached
 from strapgen.targets.names import UNNAMED, Naming
 
 if TYPE_CHECKING:

@@ -90,7 +90,7 @@ class Registration:
     backends : tuple of str, optional
         Tables of back ends: mappings of names to `strapgen.run.backend_names.Entry`.
     files : mapping of str to str, optional
-        Kinds of users' TOML files by name: each a `strapgen.catalogue.toml_files.UserFile`.
+        Kinds of users' TOML files by name: each a `strapgen.catalogue.catalogue.toml_models.UserFile`.
     lists : mapping of str to str, optional
         Functions without arguments that return names with their meanings, by the kind under which ``strapgen list``
         shows them.
@@ -100,8 +100,8 @@ class Registration:
         What it adds to others, by the extension point that the compiler or another application defines, such as
         "lab.described".
     requires : tuple of str, optional
-        Folders of strapgen that it needs, as "lab" or "targets.c_fixed"; without one of them it is not there either,
-        and it comes after them.
+        Folders of strapgen that it needs, as "lab"; without one of them it is not there either, and it comes after
+        them.
     """
 
     title: str
@@ -145,7 +145,7 @@ def table(kind: str, place: str) -> Mapping[str, Any]:
 
 @cache
 def built_in() -> dict[str, Registration]:
-    """Return what strapgen's folders register, by their names as "lab" and "targets.c", each after what it requires."""
+    """Return what strapgen's folders register, by their names as "lab", each after what it requires."""
     top = Path(__file__).parent
     found: dict[str, Registration] = {}
     for path in [*sorted(top.glob("*/registration.py")), *sorted(top.glob("*/*/registration.py"))]:

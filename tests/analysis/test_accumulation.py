@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from strapgen.analysis.agreement.agreement import SETTINGS, agreement
-from strapgen.analysis.agreement.agreement_report import agreement_text
-from strapgen.analysis.series.accumulation import accumulate
-from strapgen.analysis.series.error_rate import error_rate
+from strapgen.analysis.agreement import SETTINGS, agreement, agreement_text
+from strapgen.analysis.series.error_rate import accumulate, error_rate
 from strapgen.analysis.series.motion_rates import TIME
 from strapgen.analysis.series.series import STEP
 from strapgen.catalogue import MOTIONS, choose, choose_step

@@ -7,7 +7,7 @@ import pytest
 
 from strapgen import catalogue
 from strapgen.analysis import vibration
-from strapgen.analysis.vibration import curves
+from strapgen.analysis.vibration import mean_rates
 from strapgen.ir.exceptions import InputError
 
 
@@ -15,9 +15,9 @@ from strapgen.ir.exceptions import InputError
 @pytest.mark.parametrize("quantity", ["drift", "sculling"])
 def test_curves_hold_rates(name, cycles, quantity):
     assessed = vibration.of(catalogue.choose(name), quantity)
-    hertz = curves.frequencies(0.01, 45, 5)
+    hertz = mean_rates.frequencies(0.01, 45, 5)
     given = {"theta_x": 0.01, "theta_y": 0.02, "phase": 0.4, "acceleration_y": 3, "cycles": cycles}
-    found = curves.curve(assessed, hertz, "0.02", **given)
+    found = mean_rates.curve(assessed, hertz, "0.02", **given)
     assert (found.label, found.unit) == (assessed.kernel, assessed.unit)
     for f, continuous, error in zip(hertz, found.continuous, found.error, strict=True):
         rates = assessed.rates(float(f), "0.02", **given)
@@ -25,15 +25,17 @@ def test_curves_hold_rates(name, cycles, quantity):
 
 
 def test_frequencies_rise():
-    assert np.allclose(curves.frequencies(1, 8, 4), [1, 2, 4, 8])
+    assert np.allclose(mean_rates.frequencies(1, 8, 4), [1, 2, 4, 8])
     with pytest.raises(InputError, match="frequencies 2 to 1 Hz do not rise"):
-        curves.frequencies(2, 1)
+        mean_rates.frequencies(2, 1)
     with pytest.raises(InputError, match="a number above 0 is needed"):
-        curves.frequencies(0, 1)
+        mean_rates.frequencies(0, 1)
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_curve_beyond_the_range_is_refused():
-    hertz = curves.frequencies(1, 50, 3)
+    hertz = mean_rates.frequencies(1, 50, 3)
     with pytest.raises(InputError, match="the rates of the curve are beyond the range of double"):
-        curves.curve(vibration.of(catalogue.choose("euler")), hertz, 1, theta_x=1e200, theta_y=1e200, phase=1)
+        mean_rates.curve(
+            vibration.of(catalogue.choose("euler")), hertz, 1, theta_x=1e200, theta_y=1e200, phase=1
+        )

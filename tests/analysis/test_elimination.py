@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strapgen.analysis.unknowns import elimination
-from strapgen.analysis.unknowns.elimination import solve
-from strapgen.analysis.unknowns.families import Equation
+from strapgen.analysis.unknowns.elimination import Equation, solve
 from strapgen.ir.exceptions import InputError
 
 X, Y, Z = sp.symbols("x y z", real=True)

@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from strapgen import derive
-from strapgen.analysis.vibration.expansion import Expander
+from strapgen.analysis.vibration.waves import Expander
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder

@@ -10,8 +10,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.analysis.growth.growth import contraction, growth, stability
-from strapgen.analysis.growth.growth_report import StabilityResult
+from strapgen.analysis.growth import StabilityResult, contraction, growth, stability
 from strapgen.analysis.series.constant_rate import constant_rate
 from strapgen.analysis.series.motion_rates import TIME, model, parameters
 from strapgen.catalogue import ALGORITHMS, choose, choose_step

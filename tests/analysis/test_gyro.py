@@ -18,7 +18,7 @@ from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import IntegratedMotion
-from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude, ThroughGyro
+from strapgen.lab.motions.rate_profiles import CosineSum, ReferenceAttitude
 from strapgen.lab.runs import steady_drift
 
 #: A gyro of 40 Hz; the closed form takes its damping as it is, the simulated filter has the root of 1/2.
@@ -33,14 +33,14 @@ class SeenCone(IntegratedMotion):
     hertz: float
 
     @cached_property
-    def profile(self) -> ThroughGyro:
+    def profile(self) -> CosineSum:
         omega = 2 * math.pi * self.hertz
         motion = CosineSum(
             ANGLE * omega * np.array([[1.0], [1.0], [0.0]]),
             np.full((3, 1), omega),
             np.array([[0.3], [0.3 - math.pi / 2], [0.0]]),
         )
-        return ThroughGyro(motion, motion.filtered(2 * math.pi * GYRO))
+        return motion.through_gyro(GYRO)
 
     @cached_property
     def _reference(self) -> ReferenceAttitude:

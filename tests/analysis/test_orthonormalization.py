@@ -6,7 +6,7 @@ import mpmath
 import pytest
 import sympy as sp
 
-from strapgen.analysis.series.orthonormalization import ERROR, effect
+from strapgen.analysis.series.series import ERROR, effect
 from strapgen.catalogue import orthonormalizations
 from strapgen.ir.exceptions import InputError
 from strapgen.run import exact

@@ -7,8 +7,7 @@ import json
 import pytest
 import sympy as sp
 
-from strapgen.analysis.error_analysis.overview import choices, methods, overview
-from strapgen.analysis.error_analysis.overview_report import OverviewResult
+from strapgen.analysis.overview import OverviewResult, choices, methods, overview
 from strapgen.catalogue import METHODS, choose
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES
 from strapgen.catalogue.methods.windows import WINDOW_TITLES

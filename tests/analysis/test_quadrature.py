@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapgen.analysis.vibration.quadrature import integrate
+from strapgen.analysis.vibration.spectrum import integrate
 from strapgen.ir.exceptions import InputError
 
 

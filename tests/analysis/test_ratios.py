@@ -7,8 +7,7 @@ import math
 import pytest
 import sympy as sp
 
-from strapgen.analysis.ratios.ratios import claims, quotient, versus
-from strapgen.analysis.ratios.ratios_report import claims_text, ratio_latex, ratio_text
+from strapgen.analysis.ratios import claims, claims_text, quotient, ratio_latex, ratio_text, versus
 from strapgen.analysis.series.constant_rate import ANGLE, constant_rate
 from strapgen.catalogue import choose
 

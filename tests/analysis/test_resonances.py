@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from strapgen.analysis.vibration.resonances import DEGREE, Oscillations, resonances
+from strapgen.analysis.vibration.rectification import DEGREE, Oscillations, resonances
 from strapgen.kernel.power_series import Powers
 
 

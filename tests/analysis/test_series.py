@@ -7,9 +7,8 @@ import json
 import pytest
 import sympy as sp
 
-from strapgen.analysis.error_analysis.error_analysis import analyse
-from strapgen.analysis.error_analysis.series_report import series_latex, series_text
-from strapgen.analysis.series.notation import LATEX, covariant_text
+from strapgen.analysis.error_analysis import analyse, series_latex, series_text
+from strapgen.analysis.series.invariants import LATEX, covariant_text
 from strapgen.analysis.series.series import MOTIONS, STEP, series
 from strapgen.catalogue import ALGORITHMS, METHODS, choose, choose_step, derive, enough, nodes
 from strapgen.ir.exceptions import InputError

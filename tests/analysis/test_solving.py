@@ -14,9 +14,8 @@ from commands import run
 import strapgen
 from strapgen.analysis.series import velocity_series
 from strapgen.analysis.series.series import series
-from strapgen.analysis.unknowns import velocity_conditions
-from strapgen.analysis.unknowns.conditions import conditions
-from strapgen.analysis.unknowns.demands import Demand
+from strapgen.analysis.unknowns import conditions
+from strapgen.analysis.unknowns.conditions import Demand, attitude_conditions
 from strapgen.analysis.unknowns.solving import SolvedStep, solve
 from strapgen.catalogue.choice import Choice
 from strapgen.catalogue.methods import coning_coefficients
@@ -123,18 +122,18 @@ def test_combined_coefficients_are_a_member_of_the_family_of_both():
 
 def test_conditions_of_a_known_method_say_whether_it_has_the_order():
     known = step(strapgen.choose("euler", "rk4", 2))
-    assert conditions(known, Demand("general", 4)) == []
-    (first, *_) = conditions(known, Demand("general", 4), more=1)
+    assert attitude_conditions(known, Demand("general", 4)) == []
+    (first, *_) = attitude_conditions(known, Demand("general", 4), more=1)
     assert (first.order, first.value.is_number) == (5, True)
     # The second-order part of two increments is exact on coning up to the 4th power.
-    assert conditions(known, Demand("coning", 4)) == []
-    assert [each.order for each in conditions(known, Demand("coning", 4), more=1)] == [5]
+    assert attitude_conditions(known, Demand("coning", 4)) == []
+    assert [each.order for each in attitude_conditions(known, Demand("coning", 4), more=1)] == [5]
 
 
 def test_the_second_order_part_on_general_motion_is_the_same_by_both_expansions():
     three = step(strapgen.choose(EXAMPLE))
-    whole = {each.label: each.value for each in conditions(three, Demand("general", 5))}
-    second = {each.label: each.value for each in conditions(three, Demand("polynomial", 5))}
+    whole = {each.label: each.value for each in attitude_conditions(three, Demand("general", 5))}
+    second = {each.label: each.value for each in attitude_conditions(three, Demand("polynomial", 5))}
     assert second.items() <= whole.items()
     assert len(second) == 3
 
@@ -260,10 +259,10 @@ def test_conditions_of_a_known_velocity_say_whether_it_has_the_order(increments,
     known = strapgen.derive(strapgen.choose("velocity-position", "magnus4", increments, previous=previous))
     order = known.order.step
     for motion in ("velocity", "sculling"):
-        assert velocity_conditions.conditions(known, Demand(motion, order)) == []
-    later = velocity_conditions.conditions(known, Demand("general", order), more=1)
+        assert conditions.velocity_conditions(known, Demand(motion, order)) == []
+    later = conditions.velocity_conditions(known, Demand("general", order), more=1)
     assert {each.order for each in later} <= {order, order + 1}
     whole = {each.label: each.value for each in later}
-    second = velocity_conditions.conditions(known, Demand("polynomial", order + 1))
+    second = conditions.velocity_conditions(known, Demand("polynomial", order + 1))
     assert {each.label: each.value for each in second}.items() <= whole.items()
     assert second

@@ -13,7 +13,7 @@ import sympy as sp
 from commands import run
 
 from strapgen.analysis.unknowns import unknown_tableau
-from strapgen.analysis.unknowns.families import Family
+from strapgen.analysis.unknowns.elimination import Family
 from strapgen.catalogue.methods import order_conditions, tableaux
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main

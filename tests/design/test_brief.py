@@ -6,8 +6,7 @@ from fractions import Fraction
 import pytest
 
 from strapgen.cli import main
-from strapgen.design.brief import read_brief
-from strapgen.design.environment import Line, LineEnvironment
+from strapgen.design.brief import Line, LineEnvironment, read_brief
 from strapgen.ir.exceptions import InputError
 
 GOOD = """

@@ -14,15 +14,11 @@ import pytest
 from strapgen import pipeline
 from strapgen.catalogue.kinematics import EULER
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.design.commit_late import commit_late_bounds, commit_late_fixed, commit_late_sources
-from strapgen.design.commit_late.commit_late_bounds import Advance
-from strapgen.design.commit_late.commit_late_fixed import interface_of, rounded
+from strapgen.design.commit_late import commit_late_fixed, commit_late_sources
+from strapgen.design.commit_late.commit_late_fixed import Advance, interface_of, rounded
 from strapgen.design.commit_late.commit_late_sources import LateSources
-from strapgen.design.commit_late.fixed_filters import FixedFilters
-from strapgen.design.commit_late.late_filters import LateFilters, polynomial
-from strapgen.design.commit_late.late_unit import LateUnitOnIntegers, state_argument
-from strapgen.design.commit_late.late_unit_in_c import LateUnitInC
-from strapgen.design.commit_late.lost_samples import REACH
+from strapgen.design.commit_late.late_filters import REACH, FixedFilters, LateFilters, polynomial
+from strapgen.design.commit_late.late_unit import LateUnitInC, LateUnitOnIntegers, state_argument
 from strapgen.fixedpoint import quantize
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import above
@@ -227,9 +223,9 @@ def test_longer_climbs_stay_below_the_bounds_of_now(settings, window, algorithm)
 
 
 def test_steps_add_up_with_their_stretch():
-    assert commit_late_bounds._total([Advance(Fraction(1), Fraction(2))] * 3) == 7
+    assert commit_late_fixed._total([Advance(Fraction(1), Fraction(2))] * 3) == 7
     assert (
-        commit_late_bounds._total([Advance(Fraction(1), Fraction(5)), Advance(Fraction(3), Fraction(2))]) == 5
+        commit_late_fixed._total([Advance(Fraction(1), Fraction(5)), Advance(Fraction(3), Fraction(2))]) == 5
     )
 
 
@@ -238,14 +234,14 @@ def test_every_interval_that_waits_is_counted(rotation, monkeypatch):
     """With 1 for filters on all samples, 1000 for those of the start and the step's own error."""
     filters = LateFilters(WINDOWS["window-3-3"], calm_start=True)
     late = parts("window-3-3")
-    monkeypatch.setattr(commit_late_bounds, "_moved", lambda exact, integers, *_: {"groups": len(exact)})
+    monkeypatch.setattr(commit_late_fixed, "_moved", lambda exact, integers, *_: {"groups": len(exact)})
     monkeypatch.setattr(
-        commit_late_bounds, "_rounding", lambda _p, _i, moved: Fraction({7: 1, 10: 1000}[moved["groups"]])
+        commit_late_fixed, "_rounding", lambda _p, _i, moved: Fraction({7: 1, 10: 1000}[moved["groups"]])
     )
-    monkeypatch.setattr(commit_late_bounds, "_stretch", lambda *_: Fraction(1))
-    monkeypatch.setattr(commit_late_bounds, "_row_length", lambda _: Fraction(rotation))
+    monkeypatch.setattr(commit_late_fixed, "_stretch", lambda *_: Fraction(1))
+    monkeypatch.setattr(commit_late_fixed, "_row_length", lambda _: Fraction(rotation))
     interfaces = interface_of(late.step), interface_of(late.rotation)
-    errors = commit_late_bounds.now_errors(filters, late.fixed, (None, None), interfaces, None)
+    errors = commit_late_fixed.now_errors(filters, late.fixed, (None, None), interfaces, None)
     start = 1000 * (P + L)
     assert errors == (L, start, max(start, P + L + rotation * REACH))
 
@@ -255,12 +251,12 @@ def test_rounding_of_taps_and_of_a_sum_move_a_coefficient():
     interface = toy()[1]
     fixed = FixedFilters(100, 4, range(1), (), (), (4,), ((), ()), 0)
     # An integer tap is one of 2^(4 - 4 - 2) = 1/4.
-    moved = commit_late_bounds._moved([((Fraction(3, 8), Fraction(-5, 8)),)], [((1, -3),)], fixed, interface)
+    moved = commit_late_fixed._moved([((Fraction(3, 8), Fraction(-5, 8)),)], [((1, -3),)], fixed, interface)
     off = (Fraction(1, 8) + Fraction(1, 8)) * Fraction(100, 16)
     assert moved == dict.fromkeys(("c_x", "c_y", "c_z"), off + Fraction(1, 8))
     # The worst group counts.
     groups = [((Fraction(1, 4), Fraction(-3, 4)),), ((Fraction(3, 8), Fraction(-5, 8)),)]
-    assert commit_late_bounds._moved(groups, [((1, -3),)] * 2, fixed, interface) == moved
+    assert commit_late_fixed._moved(groups, [((1, -3),)] * 2, fixed, interface) == moved
 
 
 def toy():
@@ -285,25 +281,25 @@ def test_moved_coefficients_reach_the_state_by_their_derivatives():
     errors = interface.outputs[0].errors
     moved = {"c_x": Fraction(1), "c_y": Fraction(2), "c_z": Fraction(8)}
     exact = sum((e + m) ** 2 for e, m in zip(errors, (2, 6, 2, 0), strict=True))
-    length = commit_late_bounds._rounding(program, interface, moved)
+    length = commit_late_fixed._rounding(program, interface, moved)
     assert exact <= length**2 < exact * (1 + Fraction(1, 2**60))
-    nothing = commit_late_bounds._rounding(program, interface, dict.fromkeys(moved, Fraction(0)))
+    nothing = commit_late_fixed._rounding(program, interface, dict.fromkeys(moved, Fraction(0)))
     assert sum(e**2 for e in errors) <= nothing**2 <= sum(e**2 for e in errors) * (1 + Fraction(1, 2**40))
 
 
 def test_length_of_a_row_is_rounded_up():
-    assert commit_late_bounds._row_length([Fraction(1)] * 9) ** 2 > 3
-    assert commit_late_bounds._row_length([Fraction(1)] * 9) ** 2 < Fraction(3) + Fraction(1, 2**60)
-    assert commit_late_bounds._row_length([Fraction(1)] * 4) >= 2
+    assert commit_late_fixed._row_length([Fraction(1)] * 9) ** 2 > 3
+    assert commit_late_fixed._row_length([Fraction(1)] * 9) ** 2 < Fraction(3) + Fraction(1, 2**60)
+    assert commit_late_fixed._row_length([Fraction(1)] * 4) >= 2
     rows = [Fraction(x) for x in (0, 0, 1, 0, 3, 4, 2, 0, 0)]
-    assert 5 <= commit_late_bounds._row_length(rows) < Fraction(5) + Fraction(1, 2**60)
+    assert 5 <= commit_late_fixed._row_length(rows) < Fraction(5) + Fraction(1, 2**60)
 
 
 def test_transition_stretches_by_what_its_series_leaves_out():
     """At 1/4 rad the rotation vector is at least sqrt(3)/4 long, and a series to second order leaves out its third."""
     late = parts("window-3-3")
     program = commit_late_sources.pipeline.program(commit_late_sources.kernels(late.filters, "euler")[1])
-    stretch = commit_late_bounds._stretch(
+    stretch = commit_late_fixed._stretch(
         late.filters,
         late.fixed,
         program,

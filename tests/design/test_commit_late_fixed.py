@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.design.commit_late import lost_samples
+from strapgen.design.commit_late import late_filters
 from strapgen.design.commit_late.commit_late_fixed import functions, interface_of, rounded
 from strapgen.design.commit_late.commit_late_sources import kernels
 from strapgen.design.commit_late.late_filters import LateFilters
@@ -59,8 +59,8 @@ def test_restoring_filters_leave_a_constant_rate_as_it_is():
     _, integers, _ = fixed(SMALL)
     assert all(sum(taps) == 1 << integers.restoring_shift for taps in integers.restoring)
     lost, merged = integers.restoring
-    assert lost[lost_samples.REACH] == 0
-    assert merged[lost_samples.REACH] != 0
+    assert lost[late_filters.REACH] == 0
+    assert merged[late_filters.REACH] != 0
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ from strapgen.evidence import clang_checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.pipeline import program
-from strapgen.run.generated_files import command_of
+from strapgen.run.standard_tree import command_of
 
 WINDOW = WINDOWS["window-3-3"]
 GYRO = replace(WINDOW, gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction(100)))

@@ -10,9 +10,8 @@ import pytest
 from strapgen.cli import main
 from strapgen.design.brief import read_brief
 from strapgen.design.selection import causes
-from strapgen.design.selection.answer import in_order, judgements, verdicts
 from strapgen.design.selection.candidates import contenders
-from strapgen.design.selection.judgement import after_run
+from strapgen.design.selection.judgement import after_run, in_order, judgements, verdicts
 from strapgen.design.selection.simulated import algorithm_named, confirmed, software_drifts, start_phases
 
 #: Three lines of at most 0.17 deg, of which each is twice the one below: what is of third order has a mean.

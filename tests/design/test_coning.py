@@ -20,10 +20,8 @@ from strapgen.catalogue.methods.coning_coefficients import Design
 from strapgen.catalogue.methods.coning_drift import ConingShape
 from strapgen.catalogue.methods.shaped_coning import SHAPES, ShapedConing
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design.coning import coning
-from strapgen.design.coning.coning import ConingBrief, annulling, design
-from strapgen.design.coning.coning_file import written
-from strapgen.design.coning.lines import Lines, of_spectrum
+from strapgen.design import coning_design
+from strapgen.design.coning_design import ConingBrief, Lines, annulling, design, of_spectrum, written
 from strapgen.design.filters.band_grid import REAL
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import IntegratedMotion
@@ -111,9 +109,9 @@ def test_no_coefficients_have_a_smaller_largest_drift(shape, powers, band):
     level = coning_drift.largest(shape, result.coefficients, band)
     for row, right in coning_drift.powers(shape, powers):
         assert sum(a * c for a, c in zip(row, result.coefficients, strict=True)) == right
-    problem = coning.ConingProblem(shape, powers)
+    problem = coning_design.ConingProblem(shape, powers)
     points = [REAL.mpf(b) for b in np.linspace(0, float(band), 701)[1:]]
-    basis, rest = coning.exchange.orthonormal(problem.answers(points))
+    basis, rest = coning_design.exchange.orthonormal(problem.answers(points))
     matrix, target = np.array(basis).T, np.array(rest)
     ones = np.ones((len(target), 1))
     best = linprog(
@@ -128,7 +126,7 @@ def test_no_coefficients_have_a_smaller_largest_drift(shape, powers, band):
     assert best.fun * unit <= level * (1 + 1e-6)
 
 
-def _unit(problem: coning.ConingProblem, points: list) -> float:
+def _unit(problem: coning_design.ConingProblem, points: list) -> float:
     """Return the largest error of the least squares, which `orthonormal` scales to 1."""
     answers = problem.answers(points)
     matrix = [[REAL.ldexp(REAL.mpf(x), -320) for x in column] for column in answers.columns]
@@ -147,7 +145,7 @@ def _unit(problem: coning.ConingProblem, points: list) -> float:
 def test_no_coefficients_nearby_are_better_for_a_spectrum(objective, powers):
     brief = ConingBrief(1, 4, objective, lines=FLAT, powers=powers)
     best = design(brief).coefficients
-    problem = coning.ConingProblem(brief.shape, powers)
+    problem = coning_design.ConingProblem(brief.shape, powers)
 
     def cost(coefficients) -> float:
         errors = coning_drift.errors(brief.shape, coefficients, FLAT.radians)
@@ -304,17 +302,17 @@ def test_products_of_powers_of_time_are_integrated_exactly():
     assert exact.level > plain.level
     shaped_coning.verify(exact)
     # Products of degree 1 say what the first power of the frequency says: both together are one condition.
-    assert coning.ConingProblem(ConingShape(1, 5), 1, 1).free == 4
-    assert coning.ConingProblem(ConingShape(1, 5), 1, 2).free == 3
+    assert coning_design.ConingProblem(ConingShape(1, 5), 1, 1).free == 4
+    assert coning_design.ConingProblem(ConingShape(1, 5), 1, 2).free == 3
 
 
 def test_conditions_that_contradict_each_other_are_refused():
     with pytest.raises(
         InputError, match="the conditions on 8 coefficients contradict each other; fewer powers or"
     ):
-        coning.ConingProblem(ConingShape(1, 8), 0, 3)
+        coning_design.ConingProblem(ConingShape(1, 8), 0, 3)
     with pytest.raises(InputError, match="products of powers of time go with an ideal gyro"):
-        coning.ConingProblem(ConingShape(1, 8, GYRO), 0, 1)
+        coning_design.ConingProblem(ConingShape(1, 8, GYRO), 0, 1)
 
 
 def test_one_sample_alone_has_no_coefficients():

@@ -12,10 +12,10 @@ import strapgen
 from strapgen.analysis.vibration.spectrum import Spectrum
 from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse
-from strapgen.design.filters import spectra
+from strapgen.design import family
+from strapgen.design.family import FamilyBrief, design
+from strapgen.design.filters import responses
 from strapgen.design.filters.band_grid import BITS, ONE
-from strapgen.design.windows import family_file
-from strapgen.design.windows.family import FamilyBrief, design
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.runs import drift
 
@@ -44,7 +44,7 @@ BRIEFS = {
 @pytest.mark.parametrize("brief", BRIEFS.values(), ids=BRIEFS)
 def test_what_is_written_is_read_again(brief, tmp_path):
     window = design(brief)
-    (tmp_path / "w.toml").write_text(family_file.written(window, "a command"))
+    (tmp_path / "w.toml").write_text(family.written(window, "a command"))
     again = windows.read(tmp_path / "w.toml")
     assert again == window
     assert (again.conditions, again.degree, again.gyro) == (3, 2, brief.gyro)
@@ -70,9 +70,9 @@ def test_noise_makes_the_filters_smaller():
 def test_a_spectrum_is_the_density_of_the_rate():
     # An angle of density f^-2 has a rate of flat density; the line at 10 to 11 Hz of 100 is all there is of the other.
     flat = Spectrum(lambda f: f**-2.0, {"angle_x": np.ones_like, "angle_y": np.ones_like}, (1e-4, 50.0))
-    assert {weight / ONE for weight in spectra.weights(flat, Fraction(1), Fraction(100))} == {1.0}
+    assert {weight / ONE for weight in responses.weights(flat, Fraction(1), Fraction(100))} == {1.0}
     line = Spectrum(np.ones_like, {"angle_y": np.ones_like}, (10.0, 11.0))
-    weights = spectra.weights(line, Fraction(1), Fraction(100))
+    weights = responses.weights(line, Fraction(1), Fraction(100))
     b = np.cos(np.pi * (np.arange(400) + 0.5) / 800)
     inside = (b > 0.2 * np.pi) & (b < 0.22 * np.pi)
     expected = b**2 * inside / np.mean(b**2 * inside)
@@ -93,12 +93,12 @@ def test_a_spectrum_is_the_density_of_the_rate():
 )
 def test_a_spectrum_without_rate_is_refused(spectrum, message):
     with pytest.raises(InputError, match=message):
-        spectra.weights(spectrum, Fraction(1), Fraction(100))
+        responses.weights(spectrum, Fraction(1), Fraction(100))
 
 
 def test_numbers_of_a_file_are_exact():
     for value in (Fraction(1, 3), Fraction(13, 10), Fraction(-1, 2**13), Fraction(10**14), Fraction(0)):
-        assert Fraction(family_file.number(value)) == value
+        assert Fraction(family.number(value)) == value
 
 
 @pytest.mark.long

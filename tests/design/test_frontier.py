@@ -10,10 +10,17 @@ import sympy as sp
 
 from strapgen.catalogue import METHODS
 from strapgen.catalogue.methods.coning_coefficients import design
-from strapgen.design.frontier import frontier
-from strapgen.design.frontier.frontier import CANDIDATES, MOTIONS, Candidate, candidates, in_order, pareto
-from strapgen.design.frontier.frontier_plot import frontier_image
-from strapgen.design.frontier.frontier_report import FrontierResult
+from strapgen.design import frontier
+from strapgen.design.design_plots import frontier_image
+from strapgen.design.frontier import (
+    CANDIDATES,
+    MOTIONS,
+    Candidate,
+    FrontierResult,
+    candidates,
+    in_order,
+    pareto,
+)
 from strapgen.ir.exceptions import InputError
 from strapgen.lab import runs
 

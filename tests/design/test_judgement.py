@@ -12,12 +12,10 @@ import pytest
 
 import strapgen
 from strapgen.cli import main
-from strapgen.design.brief import BudgetBrief, ProcessorBrief, read_brief
-from strapgen.design.environment import RecordedEnvironment
+from strapgen.design.brief import BudgetBrief, ProcessorBrief, RecordedEnvironment, read_brief
 from strapgen.design.selection import causes
-from strapgen.design.selection.answer import in_order, judgements, verdicts
 from strapgen.design.selection.candidates import STATES, contenders
-from strapgen.design.selection.judgement import CAUSES, Question, judged
+from strapgen.design.selection.judgement import CAUSES, Question, in_order, judged, judgements, verdicts
 from strapgen.design.selection.simulated import algorithm_named, run, vibration
 from strapgen.navigation.two_speed.two_speed_selection import TwoSpeedLoops
 

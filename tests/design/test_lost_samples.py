@@ -10,7 +10,7 @@ import pytest
 
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.design.commit_late.lost_samples import POINTS, REACH, WEIGHT, restoration
+from strapgen.design.commit_late.late_filters import POINTS, REACH, WEIGHT, restoration
 
 WINDOW = WINDOWS["window-7-7"]
 SAMPLES = np.arange(-REACH, REACH + 1)

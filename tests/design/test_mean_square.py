@@ -12,7 +12,7 @@ from strapgen.catalogue.methods import window_conditions
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.design.filters import mean_square
 from strapgen.design.filters.band_grid import ONE, REAL
-from strapgen.design.filters.unknowns import Shape
+from strapgen.design.filters.filter_taps import Shape
 from strapgen.ir.exceptions import InputError
 
 BAND = Fraction(13, 10)
@@ -37,7 +37,7 @@ def columns(shape: Shape, m: int, band: float) -> tuple[np.ndarray, np.ndarray, 
 @pytest.mark.parametrize("sides", [(6, 0), (4, 2), (0, 3)], ids=str)
 def test_filters_are_those_of_equations_in_double_precision(sides, gyro):
     shape, noise = Shape(*sides, 3, gyro), Fraction(1, 100)
-    taps = mean_square.design(shape, [0, 1, 2], BAND, noise)
+    taps = mean_square.mean_square_filters(shape, [0, 1, 2], BAND, noise)
     E = np.array(shape.rows, dtype=float)
     for m, row in enumerate(taps):
         A, C, _ = columns(shape, m, 1.3)
@@ -51,7 +51,7 @@ def test_filters_are_those_of_equations_in_double_precision(sides, gyro):
 
 @pytest.mark.parametrize(("noise", "gain"), [("3/10000", "5.2"), ("1/100000", "22")])
 def test_noise_gains_are_those_that_are_known(noise, gain):
-    (taps,) = mean_square.design(Shape(14, 0, 4), [1], BAND, Fraction(noise))
+    (taps,) = mean_square.mean_square_filters(Shape(14, 0, 4), [1], BAND, Fraction(noise))
     digits = len(gain.split(".")[1]) if "." in gain else 0
     # 22.504 is 22 in the printed table, which has two digits of a value near 22.5.
     assert abs(float(sum(tap * tap for tap in taps)) ** 0.5 - float(gain)) < 0.6 * 10**-digits
@@ -59,7 +59,7 @@ def test_noise_gains_are_those_that_are_known(noise, gain):
 
 def test_conditions_hold_in_many_digits():
     for shape in (Shape(8, 6, 4), Shape(3, 3, 3, GYRO)):
-        for m, row in enumerate(mean_square.design(shape, [0, 1, 2], BAND, Fraction(0))):
+        for m, row in enumerate(mean_square.mean_square_filters(shape, [0, 1, 2], BAND, Fraction(0))):
             for condition, right in zip(
                 shape.rows, window_conditions.coefficients(m, shape.conditions), strict=True
             ):
@@ -74,7 +74,7 @@ def test_a_spectrum_lowers_the_error_where_it_is():
     weights = [ONE * 400 * inside // int(low.sum()) for inside in low.tolist()]
     errors = []
     for spectrum in (None, weights):
-        (taps,) = mean_square.design(shape, [1], BAND, Fraction(0), spectrum)
+        (taps,) = mean_square.mean_square_filters(shape, [1], BAND, Fraction(0), spectrum)
         errors.append(np.abs(A @ [float(tap) for tap in taps] - C))
     flat, shaped = errors
     assert shaped[low].max() < flat[low].max() / 10 and shaped[~low].max() > flat[~low].max()
@@ -82,4 +82,4 @@ def test_a_spectrum_lowers_the_error_where_it_is():
 
 def test_a_band_that_is_too_narrow_is_refused():
     with pytest.raises(InputError, match="the band is too narrow, or the samples are too many"):
-        mean_square.design(Shape(15, 15, 4), [1], Fraction(1, 10**6), Fraction(0))
+        mean_square.mean_square_filters(Shape(15, 15, 4), [1], Fraction(1, 10**6), Fraction(0))

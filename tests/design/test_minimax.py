@@ -8,10 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from strapgen.design.filters import exchange, minimax
+from strapgen.design.filters import exchange
 from strapgen.design.filters.band_grid import REAL
-from strapgen.design.filters.rounding import rounded
-from strapgen.design.filters.unknowns import Shape, Unknowns
+from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
 from strapgen.ir.exceptions import InputError, MissingExtraError
 
 BAND = Fraction(13, 10)
@@ -41,11 +40,11 @@ LEVELS = {
 @pytest.fixture(scope="module")
 def designs():
     """Return a function that designs a filter once."""
-    done: dict[tuple[int, int, int], minimax.Minimax] = {}
+    done: dict[tuple[int, int, int], exchange.Minimax] = {}
 
-    def design(side: int, powers: int, m: int) -> minimax.Minimax:
+    def design(side: int, powers: int, m: int) -> exchange.Minimax:
         if (side, powers, m) not in done:
-            done[side, powers, m] = minimax.design(Unknowns(Shape(side, side, powers), m), BAND)
+            done[side, powers, m] = exchange.minimax_filter(Unknowns(Shape(side, side, powers), m), BAND)
         return done[side, powers, m]
 
     return design
@@ -94,7 +93,7 @@ def test_noise_gains_are_those_that_are_known(size, gain, designs):
 )
 def test_two_grids_give_the_same_rationals(side, powers, m, designs):
     unknowns = Unknowns(Shape(side, side, powers), m)
-    first, second = designs(side, powers, m), minimax.design(unknowns, BAND, 1700)
+    first, second = designs(side, powers, m), exchange.minimax_filter(unknowns, BAND, 1700)
     assert max(abs(a - b) for a, b in zip(first.taps, second.taps, strict=True)) < REAL.mpf(10) ** -32
     assert rounded(unknowns, first.taps) == rounded(unknowns, second.taps)
 
@@ -116,7 +115,7 @@ def test_the_error_alternates_in_as_many_places_as_there_are_free_unknowns_and_o
 
 
 def test_without_free_unknowns_the_conditions_give_the_filter():
-    filter = minimax.design(Unknowns(Shape(1, 1, 3), 1), BAND)
+    filter = exchange.minimax_filter(Unknowns(Shape(1, 1, 3), 1), BAND)
     assert [float(tap) for tap in filter.taps] == [-0.25, 0.0, 0.25]
     # At the end of the band: |sin(b) s(b)/2 - 3 j_1(b/2)|.
     b = 1.3
@@ -128,7 +127,7 @@ def test_without_free_unknowns_the_conditions_give_the_filter():
 @pytest.mark.long
 def test_a_band_that_is_too_narrow_is_refused():
     with pytest.raises(InputError, match=r"a wider band|too narrow"):
-        minimax.design(Unknowns(Shape(12, 12, 4), 1), Fraction(1, 10**7))
+        exchange.minimax_filter(Unknowns(Shape(12, 12, 4), 1), Fraction(1, 10**7))
 
 
 def test_without_scipy_the_extra_is_named(monkeypatch):
@@ -136,7 +135,7 @@ def test_without_scipy_the_extra_is_named(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)
     with pytest.raises(MissingExtraError, match=r"needs SciPy: pip install 'strapgen\[design\]'"):
-        minimax.design(Unknowns(Shape(3, 3, 4), 1), BAND)
+        exchange.minimax_filter(Unknowns(Shape(3, 3, 4), 1), BAND)
 
 
 @pytest.mark.long
@@ -153,5 +152,5 @@ def test_the_programme_only_starts_the_exchange(designs, monkeypatch):
 
     monkeypatch.setattr(exchange, "_programme", inexact)
     unknowns = Unknowns(Shape(7, 7, 4), 3)
-    again = minimax.design(unknowns, BAND)
+    again = exchange.minimax_filter(unknowns, BAND)
     assert calls and rounded(unknowns, again.taps) == rounded(unknowns, designs(7, 4, 3).taps)

@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapgen.design.brief import read_brief
-from strapgen.design.environment import LineEnvironment
+from strapgen.design.brief import LineEnvironment, read_brief
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import Contender
-from strapgen.design.selection.choosing import algorithm_of
+from strapgen.design.selection.candidates import Contender, algorithm_of
 from strapgen.design.selection.simulated import software_drifts, start_phases
 
 BRIEFS = Path(__file__).resolve().parents[2] / "examples" / "briefs"

@@ -12,9 +12,7 @@ from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.filters import responses
-from strapgen.design.filters.rounding import rounded
-from strapgen.design.filters.unknowns import Shape, Unknowns
-from strapgen.design.filters.words import in_words
+from strapgen.design.filters.filter_taps import Shape, Unknowns, in_words, rounded
 from strapgen.ir.exceptions import InputError
 
 GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))

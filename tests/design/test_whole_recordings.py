@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.design.commit_late.late_recording import recording_attitudes
-from strapgen.design.commit_late.whole_recordings import covers, propagate_whole
+from strapgen.design.commit_late.late_recording import covers, propagate_whole, recording_attitudes
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.recording import Recording, propagate
 from strapgen.run.increments import pulses

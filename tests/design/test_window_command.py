@@ -15,7 +15,7 @@ from strapgen.catalogue.methods import windows
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
-from strapgen.design.windows import window_command as window
+from strapgen.design import window_command
 from strapgen.ir.exceptions import InputError
 
 FOLDER = Path(windows.__file__).parent / "window_filters"
@@ -260,10 +260,10 @@ def test_now_noise_of_a_brief_is_that_of_an_increment(tmp_path):
     brief = tmp_path / "brief.toml"
     head, tail = "max_rate_deg_s = 100\n[gyro]\nsample_hz = 100\n", "[budget]\ndrift_deg_h = 1\n[processor]\n"
     brief.write_text(f"{head}noise_deg_sqrt_h = 0.12\n{tail}")
-    assert window._now_noise(str(brief)) == Fraction(2, 10_000)
-    assert window._now_noise("3e-4") == Fraction(3, 10_000)
+    assert window_command._now_noise(str(brief)) == Fraction(2, 10_000)
+    assert window_command._now_noise("3e-4") == Fraction(3, 10_000)
     brief.write_text(
         "max_rate_deg_s = 100\n[gyro]\nsample_hz = 100\n[budget]\ndrift_deg_h = 1\n[processor]\n"
     )
     with pytest.raises(InputError, match="noise_deg_sqrt_h is 0"):
-        window._now_noise(str(brief))
+        window_command._now_noise(str(brief))

@@ -14,8 +14,8 @@ from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.cli import main
 from strapgen.design.commit_late.commit_late_sources import sources
-from strapgen.design.windows import family_file
-from strapgen.run.generated_files import command_of
+from strapgen.design.family import written
+from strapgen.run.standard_tree import command_of
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_filters_for_a_gyro_are_refused_at_another_rate(run, tmp_path):
     )
     one_sided = tuple(replace(one, conditions=1, gyro=family.gyro) for one in family.one_sided)
     family = replace(family, one_sided=one_sided)
-    (tmp_path / "gyro.toml").write_text(family_file.written(family, "strapgen window design"))
+    (tmp_path / "gyro.toml").write_text(written(family, "strapgen window design"))
     for option, reason in (
         ("", "no sampling rate is stated"),
         ("--sample-hz 200", "the sampling rate is 200 Hz"),

@@ -16,7 +16,7 @@ from strapgen.evidence import collection, gappa
 from strapgen.evidence.collection import Subject
 from strapgen.evidence.gappa_scripts import CannotFollowError, Script, fixed_script, floating_script
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import NUMBERS
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import Coefficient, FixedProgram, IntegerSum, Term
 from strapgen.ir.program import Program

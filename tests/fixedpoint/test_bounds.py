@@ -12,7 +12,7 @@ from fixed_inputs import corners_and_random, in_double
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen import build, generate
+from strapgen import generate
 from strapgen.catalogue import Choice, standard
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
@@ -20,7 +20,7 @@ from strapgen.ir.integer_program import IntegerSum
 from strapgen.run import exact
 from strapgen.run.backends import backend as make_backend
 from strapgen.run.backends import evaluator as make_evaluator
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 STEPS = [choice for choice in standard() if choice.method]
 
@@ -245,10 +245,3 @@ def test_guards_refuse_what_is_too_far_from_a_proper_input():
     assert abs(np.linalg.norm(normalize(half / np.linalg.norm(half))) - 1) < 4 * unit
     with pytest.raises(InputError, match="refuses its input"):
         normalize(half / 10)
-
-
-def test_a_back_end_is_built_from_a_quantized_program():
-    fixed = quantized(Choice("euler", "rk4", 2), Settings(16, Fraction(1, 60), carry="full"))
-    for target in ("c-fixed", "fixed-model"):
-        made = build(generate(fixed, target))
-        assert made.unit == 2.0**-14

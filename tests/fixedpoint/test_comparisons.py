@@ -8,13 +8,13 @@ from fractions import Fraction
 import pytest
 from small_integers import GRID, Known, at_corners, context, quantity, worst
 
-from strapgen.fixedpoint.integer_operations import (
+from strapgen.fixedpoint.quantities import ExactOperation
+from strapgen.fixedpoint.quantization import (
     lower_computed,
     lower_maximum,
     lower_nearest_integer,
     lower_selection,
 )
-from strapgen.fixedpoint.quantities import ExactOperation
 from strapgen.ir.exceptions import InputError
 
 FINE = Known(4, -7, 7, Fraction(1, 100))

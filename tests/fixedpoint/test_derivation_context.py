@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapgen.fixedpoint.derivation_context import samples
+from strapgen.fixedpoint.derived_sums import samples
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.signals import Signal
 

@@ -15,10 +15,10 @@ from strapgen.fixedpoint.format_plan import (
     FormatPlan,
     _result_fraction,
     format_plan,
+    limits,
     sums_of_inputs_are_exact,
 )
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.limits import limits
 from strapgen.fixedpoint.quantities import Quantities
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program, Reference, Result

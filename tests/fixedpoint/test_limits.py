@@ -10,7 +10,7 @@ from derived import quantized
 from small_programs import node, program
 
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint.limits import largest_magnitude, limits
+from strapgen.fixedpoint.format_plan import largest_magnitude, limits
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from strapgen import generate, quantize
 from strapgen.catalogue import Choice
 from strapgen.fixedpoint.derivation import quantities
+from strapgen.fixedpoint.integer_sums import _is_polynomial
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.quantization_context import _is_polynomial
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 EULER = Choice("euler", "rk4", 2)
 

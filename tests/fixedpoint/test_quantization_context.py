@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 from small_integers import Known, context, quantity
 
+from strapgen.fixedpoint.integer_sums import integer_value
 from strapgen.fixedpoint.quantities import Sum
-from strapgen.fixedpoint.quantization_context import integer_value
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import IntegerSum, Term
 

@@ -8,8 +8,8 @@ from fractions import Fraction
 import pytest
 from small_integers import GRID, Known, Worst, at_corners, context, quantity, worst
 
-from strapgen.fixedpoint.integer_operations import lower_quotient, lower_root
 from strapgen.fixedpoint.quantities import ExactOperation
+from strapgen.fixedpoint.quantization import lower_quotient, lower_root
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.integer_program import Value
 

@@ -19,8 +19,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Assignment, Reference
 from strapgen.ir.units import Sensor
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.run.c import CEvaluator
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
 
 EULER, DCM, HEUN = Choice("euler", "rk4", 2), Choice("dcm", "rk4", 2), Choice("euler", "rk2", 1)
 #: A gyro of 16 bits at 100 Hz whose whole range is used, and the same up to 400 deg/s.

@@ -14,9 +14,9 @@ import pytest
 from small_integers import quantity
 
 from strapgen.fixedpoint import functions
-from strapgen.fixedpoint.chain import Chain
-from strapgen.fixedpoint.function_series import PI_ERROR, arctangent_series, pi
+from strapgen.fixedpoint.functions import Chain
 from strapgen.fixedpoint.quantities import ExactOperation, InputElement, Sum
+from strapgen.fixedpoint.series import PI_ERROR, arctangent_series, pi
 from strapgen.ir.integer_program import cases_of
 
 PRECISE = mpmath.mp.clone()

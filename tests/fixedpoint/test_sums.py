@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 from small_integers import GRID, Known, at_corners, computed, context, quantity, with_feedback, worst
 
+from strapgen.fixedpoint.integer_sums import _is_attitude, lower_sum, word_of
 from strapgen.fixedpoint.quantities import ErrorPropagation, Sum
-from strapgen.fixedpoint.sums import _is_attitude, lower_sum, word_of
 
 EXACT = Known(4, -7, 7)
 OFF = Known(4, -9, 9, Fraction(1, 40))
@@ -305,7 +305,7 @@ def test_a_check_whose_value_is_taken_as_exact_says_nothing_of_its_parts(monkeyp
     check = quantity("y", Sum(((("a", "a"), ONE), (("b", "b"), ONE))), Fraction(1, 64), 4, range_checked=True)
     walk = context(known, check)
     monkeypatch.setattr(
-        "strapgen.fixedpoint.quantization_context._reset", lambda walk, item: walk.resets.add(item.name)
+        "strapgen.fixedpoint.integer_sums._reset", lambda walk, item: walk.resets.add(item.name)
     )
     lower_sum(walk, check, check.definition)
     assert walk.size("a") > 3

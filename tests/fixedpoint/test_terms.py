@@ -7,7 +7,7 @@ from fractions import Fraction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapgen.fixedpoint.terms import Placed, aligned, largest_wide, nearest, up
+from strapgen.fixedpoint.quantities import Placed, aligned, largest_wide, nearest, up
 from strapgen.ir.integer_program import Term
 
 numbers = st.fractions(min_value=-100, max_value=100, max_denominator=10**4)

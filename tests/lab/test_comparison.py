@@ -16,7 +16,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab import comparison
 from strapgen.lab.comparison_report import ComparedKernel, ComparisonResult
-from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
+from strapgen.run.backends import BACKENDS
 from strapgen.targets.registry import BUILT_IN
 
 
@@ -144,20 +144,6 @@ def test_what_does_not_go_with_a_choice_is_told(options, error, said):
         comparison.compare(
             strapgen.choose("euler", "rk2", 2), **({"increments": np.zeros((2, 2, 3))} | options)
         )
-
-
-def test_a_back_end_is_shown_under_the_name_that_was_asked_for(increments):
-    settings = Settings(largest_angle=strapgen.ir.fixed_settings.Fraction(3, 256))
-    rows = comparison.compare(
-        "euler", "rk4", 2, ["c-q31", "c-fixed32"], increments[:2] / 2, settings=settings
-    )
-    assert [row.backend for row in rows] == ["c-q31", "c-fixed32"]
-
-
-@pytest.mark.long
-def test_slow_back_ends_are_compared_where_they_are_named():
-    rows = comparison.compare("euler", "rk1", 1, increments=np.full((2, 1, 3), 0.01))
-    assert [row.backend for row in rows] == list(DEFAULT_BACKENDS)
 
 
 def test_all_back_ends_take_the_counts_of_a_gyro(increments):

@@ -17,7 +17,6 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Order
-from strapgen.lab import convergence
 from strapgen.lab.convergence import Convergence, Rung, converge
 from strapgen.lab.convergence_report import ConvergenceResult, ladder_table
 
@@ -119,14 +118,6 @@ def test_rounded_coefficients_are_the_floor(coning):
     assert catalogue.rounding(choose("euler", "rk4")) == catalogue.rounding(choose("error-matrix")) == 0
     found = converge(choice, coning, ["1/4", "1/8", "1/64"], 1)
     assert [rung.used for rung in found.rungs] == [True, True, False]
-
-
-def test_the_slope_is_that_of_a_power():
-    rungs = [(2.0**-k, 3 * 2.0 ** (-5 * k), True) for k in range(6)]
-    found = convergence.fitted("a-step", "exact", None, rungs)
-    assert found.observed == pytest.approx(5, abs=1e-12)
-    assert [rung.slope for rung in found.rungs[1:]] == pytest.approx([5.0] * 5)
-    assert [rung.used for rung in found.rungs] == [False] * 3 + [True] * convergence.FITTED
 
 
 def test_in_many_digits_the_error_is_that_of_double(coning):

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+from pathlib import Path
 
 import pytest
 from commands import run
 
 from strapgen import pipeline
 from strapgen.cli import main
-from strapgen.ir.exceptions import InputError
+from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.lab import cost
-from strapgen.lab.processors import PROCESSORS
+from strapgen.lab import cost, processors
+from strapgen.lab.processors import PROCESSORS, Runner
 
 #: Instructions of a call at most, by processor and kernel, with -O2.
 EXECUTED = {
@@ -25,6 +27,8 @@ EXECUTED = {
 #: Instructions of a call on a Cortex-M3 that takes the counts of a gyro: a tenth more than 226, which the step on
 #: angles took once, and for direction cosines 15 % more than 520.
 COUNTS = {"euler": 248, "dcm": 598}
+
+HOST = Runner("host", ("cc",), ("env",), "cc", "gcc")
 
 
 def needed(cpu: str) -> None:
@@ -123,3 +127,68 @@ def test_python_is_not_measured():
     sources = pipeline.generate(pipeline.lower(pipeline.derive("euler-product")), "numpy")
     with pytest.raises(InputError, match="not in C"):
         cost.cost(sources, "cortex-m3")
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / "cache"))
+
+
+@pytest.mark.long
+def test_the_cache_keeps_the_size_of_each_code(monkeypatch):
+    small, large = (
+        pipeline.generate(pipeline.lower(pipeline.derive(kernel)), "c")
+        for kernel in ("euler-normalize", "euler-product")
+    )
+    sizes = [cost.code_size(sources) for sources in (small, large)]
+    assert None not in sizes and sizes[0] != sizes[1]
+
+    def never(*_: object) -> None:
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr(cost, "_measured_size", never)
+    assert [cost.code_size(sources) for sources in (small, large)] == sizes
+
+
+def test_a_compiler_that_fails_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
+    sources = pipeline.generate(pipeline.lower(pipeline.derive("euler-normalize")), "c")
+    failing = tmp_path / "failing-cc"
+    failing.write_text(f'#!/bin/sh\ntest -e {tmp_path}/works || exit 1\nexec cc "$@"\n')
+    failing.chmod(0o755)
+    monkeypatch.setenv("CC", os.fspath(failing))
+    assert cost.code_size(sources) is None
+    (tmp_path / "works").touch()
+    assert cost.code_size(sources) > 0
+
+
+@pytest.fixture(autouse=True)
+def compiler():
+    if shutil.which("cc") is None:
+        pytest.skip("cc is not on this machine")
+
+
+def test_a_program_is_compiled_and_run_from_another_folder(tmp_path):
+    (tmp_path / "program.c").write_text(
+        '#include <stdio.h>\nint main(void)\n{\n    puts("\\033[32mdone\\033[0m");\n}\n'
+    )
+    folder = tmp_path / "host"
+    folder.mkdir()
+    assert HOST.run(folder, ["../program.c"]) == "done\n"
+    assert (
+        (folder / "run.sh")
+        .read_text()
+        .startswith("cc -std=c99 -O2 -ffp-contract=off ../program.c -o ./program.elf &&\n")
+    )
+
+
+def test_a_program_that_does_not_end_is_stopped(monkeypatch, tmp_path):
+    monkeypatch.setattr(processors, "_PATIENCE", 0.2)
+    (tmp_path / "program.c").write_text("int main(void)\n{\n    for (volatile int k = 0;; ++k) {\n    }\n}\n")
+    with pytest.raises(CompilerError, match=r"env: the program has not ended in 0\.2 s"):
+        HOST.run(tmp_path, ["program.c"])
+
+
+def test_a_program_that_does_not_compile_is_told_with_its_error(tmp_path):
+    (tmp_path / "program.c").write_text("int main(void)\n{\n    return missing;\n}\n")
+    with pytest.raises(CompilerError, match=r"cc failed: .*missing.* undeclared"):
+        HOST.run(tmp_path, ["program.c"])

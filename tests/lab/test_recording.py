@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import integrate
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
@@ -20,7 +19,6 @@ from tolerances import certified
 
 import strapgen
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.recordings import recording
 from strapgen.lab.recordings.recording import Recording, propagate, read_increments, read_rates
 from strapgen.run.increments import pulses
 
@@ -291,7 +289,6 @@ def samples(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
     return time, np.array(values)
 
 
-@pytest.mark.long
 @given(samples(), st.floats(20, 1500))
 @settings(max_examples=25, deadline=None)
 def test_resampling_integrates_a_piecewise_linear_rate_exactly(tmp_path_factory, sampled, hertz):
@@ -309,29 +306,6 @@ def test_resampling_integrates_a_piecewise_linear_rate_exactly(tmp_path_factory,
     grid = np.minimum(time[0] + np.arange(count + 1) / hertz, time[-1])
     # Round-off of the times counts: at 100 s it is 1e-14 s, times rates of up to 5 rad/s.
     np.testing.assert_allclose(got.increments, np.diff(integral(grid), axis=0), rtol=0, atol=5e-13)
-
-
-def test_even_rates_are_integrated_exactly_too(write):
-    time = np.arange(50) / 64
-    values = np.random.default_rng(1).normal(size=(50, 3))
-    integral = make_interp_spline(time, values, k=1).antiderivative()
-    got = rates(write(csv_of(time, values)))
-    np.testing.assert_allclose(got.increments, np.diff(integral(time), axis=0), rtol=0, atol=1e-15)
-
-
-def test_resampling_at_the_own_frequency_changes_nothing(write):
-    path = write(csv_of(np.arange(50) / 64, np.random.default_rng(2).normal(size=(50, 3))))
-    plain, resampled = rates(path), rates(path, resample_hz="64")
-    assert plain.interval == resampled.interval
-    np.testing.assert_allclose(resampled.increments, plain.increments, rtol=0, atol=1e-15)
-
-
-def test_resampling_keeps_the_whole_angle():
-    uneven = read_rates(DATA / "rates_uneven.csv", "deg/s", "50")
-    assert len(uneven.increments) == 200
-    table = np.loadtxt(DATA / "rates_uneven.csv", delimiter=",", skiprows=1)[:, :4]
-    whole = np.radians(integrate.trapezoid(table[:, 1:], table[:, 0], axis=0))
-    np.testing.assert_allclose(uneven.increments.sum(axis=0), whole, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -376,25 +350,6 @@ def test_records_and_orthonormalization_are_counted_in_steps(make, even):
     np.testing.assert_array_equal(history.time, 10 + 0.75 * np.arange(5))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("increments", "unused"),
-    [(1, 0), (5, 4), pytest.param(7, 3, marks=pytest.mark.long)],
-)
-def test_increments_that_make_no_whole_step_are_told(increments, unused, even):
-    backend = strapgen.backend("euler", "rk4", increments, "numpy")
-    history = propagate(backend, even)
-    assert history.unused == unused
-    assert len(history.time) == 1 + 24 // increments
-
-
-@pytest.mark.long
-def test_recording_shorter_than_a_step(even):
-    short = Recording(even.start, even.interval, even.increments[:3])
-    with pytest.raises(InputError, match=r"^the recording holds 3 increments; a step needs 4$"):
-        propagate(strapgen.backend("euler", "rk4", 4, "numpy"), short)
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -414,12 +369,6 @@ def test_intervals_that_cannot_be_used(options, said, even, make):
         propagate(make("euler"), even, **options)
 
 
-def test_interval_measured_from_a_file_is_matched_to_a_hundredth(even):
-    measured = Recording(even.start, 0.1250003, even.increments)
-    history = propagate(strapgen.backend("euler", backend="numpy"), measured, record="0.75")
-    assert len(history.time) == 5
-
-
 @pytest.mark.filterwarnings("error")
 def test_attitude_that_overflows_is_refused(make, even):
     large = Recording(even.start, even.interval, np.full((24, 3), 1e30))
@@ -429,11 +378,6 @@ def test_attitude_that_overflows_is_refused(make, even):
         said = r"^increments holds 1e\+30; the formats of dcm-rk4-2 were chosen for at most 0.125"
     with np.errstate(all="ignore"), pytest.raises(InputError, match=said):
         propagate(backend, large)
-
-
-def test_units_have_their_factors():
-    factors = {"rad/s": 1.0, "deg/s": math.pi / 180, "mdeg/s": math.pi / 180_000, "mrad/s": 0.001}
-    assert factors | {"deg/h": math.pi / 648_000} == recording.RATE_UNITS
 
 
 # Steps that keep increments
@@ -532,3 +476,9 @@ def test_rates_whose_integral_is_beyond_all_numbers_are_refused(write):
     path = write([[repr(time), value, "0", "0"] for time, value in EXTREME["late"]])
     with pytest.raises(InputError, match=r"the integral of a rate is beyond the range of double$"):
         read_rates(path, "rad/s", time_unit="s")
+
+
+def test_interval_measured_from_a_file_is_matched_to_a_hundredth(even):
+    measured = Recording(even.start, 0.1250003, even.increments)
+    history = propagate(strapgen.backend("euler", backend="numpy"), measured, record="0.75")
+    assert len(history.time) == 5

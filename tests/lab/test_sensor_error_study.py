@@ -243,19 +243,6 @@ def test_the_command_shows_causes_with_their_intervals(run, tmp_path):
     assert other["rows"][0]["deviation_deg"] != data["rows"][0]["deviation_deg"]
 
 
-def test_back_ends_agree_on_a_monte_carlo(run):
-    def deviations(words: str) -> np.ndarray:
-        status, text, said = run(f"noise.toml {MOTION} --format json {words}")
-        assert status == 0, said
-        return np.array([row["deviation_deg"] for row in json.loads(text)["rows"]])
-
-    plain = deviations("")
-    np.testing.assert_allclose(deviations("--backend c"), plain, rtol=1e-9)
-    # Increments are rounded to a format of some 2^-34 rad, and a state of 32 bits to 2^-31.
-    fixed = deviations("--backend c-fixed32 --carry full")
-    np.testing.assert_allclose(fixed, plain, atol=math.degrees(2.0**-28))
-
-
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -275,3 +262,16 @@ def test_what_cannot_be_used_is_refused_in_one_line(command, words, run):
     status, text, said = run(command)
     assert (status, text) == (2, "")
     assert words in said and said.count("\n") == 1
+
+
+def test_back_ends_agree_on_a_monte_carlo(run):
+    def deviations(words: str) -> np.ndarray:
+        status, text, said = run(f"noise.toml {MOTION} --format json {words}")
+        assert status == 0, said
+        return np.array([row["deviation_deg"] for row in json.loads(text)["rows"]])
+
+    plain = deviations("")
+    np.testing.assert_allclose(deviations("--backend c"), plain, rtol=1e-9)
+    # Increments are rounded to a format of some 2^-34 rad, and a state of 32 bits to 2^-31.
+    fixed = deviations("--backend c-fixed32 --carry full")
+    np.testing.assert_allclose(fixed, plain, atol=math.degrees(2.0**-28))

@@ -25,15 +25,6 @@ def outcomes():
     return [found[case] for case in planned]
 
 
-@pytest.mark.long
-def test_every_combination_is_run(outcomes):
-    cases = [outcome.case for outcome in outcomes]
-    assert len(set(cases)) == 2 * 3 * 2
-    assert {(case.word, case.carry, case.pulse_arcsec) for case in cases} == {
-        (word, carry, pulse) for word in (12, 16, 24) for carry in ("none", "full") for pulse in ("0", "30")
-    }
-
-
 def test_parts_of_the_drift(outcomes):
     for outcome in outcomes:
         assert outcome.rounding_deg <= outcome.bound_deg
@@ -85,10 +76,6 @@ def test_a_finished_case_is_not_run_again(outcomes, monkeypatch):
     monkeypatch.setattr(word_length, "backend", lambda *_, **__: pytest.fail("it was run before"))
     for outcome in outcomes:
         assert run_case(outcome.case) == outcome
-
-
-def test_one_process_finds_the_same(outcomes):
-    assert {o.case: o for o in run([o.case for o in outcomes], jobs=1)} == {o.case: o for o in outcomes}
 
 
 def test_a_run_that_leaves_its_range_is_told():

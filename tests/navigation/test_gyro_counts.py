@@ -17,7 +17,7 @@ from strapgen.navigation.systems.fitting import fitted
 from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import loops
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 #: A gyro whose counts are no power of two of a rad, at 400 Hz.
 GYRO = {"sample_hz": 400, "lsb": "0.0175dps"}

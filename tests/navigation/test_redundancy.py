@@ -17,7 +17,7 @@ from strapgen.navigation.redundancy.geometry_file import kernels, read
 from strapgen.navigation.redundancy.geometry_report import GeometryResult
 from strapgen.navigation.redundancy.parity_equations import SensorSet
 from strapgen.navigation.redundancy.redundancy_names import HEXAD_TRIADS, REDUNDANCY
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 #: The parity vectors of the six sensors, by the sensors of each.
 VECTORS = {

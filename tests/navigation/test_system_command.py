@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 from c_programs import needed
-from cli.test_generated_by import generated_by
+from cli.test_display import generated_by
 from navigation.described_files import ATTITUDE, TWO_SPEEDS
 
 from strapgen.cli import main

@@ -20,8 +20,8 @@ from strapgen.navigation.two_speed.loops import Loops, LoopSources
 from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.run import compiler
+from strapgen.run.backend_names import evaluator_class
 from strapgen.run.backends import BACKENDS
-from strapgen.run.registry import evaluator_class
 
 FORMS = [(a, s) for a in ALGORITHMS for s in SCULLING]
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O1"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import strapgen
-from strapgen.run import blocked_scan
-from strapgen.run.array_programs import ArrayProgram, work_arrays
+from strapgen.run import numpy_evaluator
+from strapgen.run.numpy_evaluator import ArrayProgram, work_arrays
 
 #: Sums and products, divisions, a root, an output that is an input, and conditions, with which a function runs whole.
 KERNELS = {
@@ -50,8 +50,8 @@ def test_the_bits_of_a_scan_do_not_depend_on_how_many_samples_go_together(
 ):
     backend = strapgen.backend("euler", backend="numpy")
     increments = rng.normal(scale=0.05, size=(runs, steps, 2, 3))
-    monkeypatch.setattr(blocked_scan, "_WIDTH", 60)
+    monkeypatch.setattr(numpy_evaluator, "_WIDTH", 60)
     whole = backend.propagate(increments, orthonormalize_every=every)
     for samples in (1, 50, 200):
-        monkeypatch.setattr(blocked_scan, "_PASS", samples)
+        monkeypatch.setattr(numpy_evaluator, "_PASS", samples)
         assert backend.propagate(increments, orthonormalize_every=every).tobytes() == whole.tobytes()

@@ -14,7 +14,6 @@ from tolerances import one_call, roundoff
 import strapgen
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.program import Program
-from strapgen.run import blocked_scan
 from strapgen.run import numpy_evaluator as numpy_module
 from strapgen.run.backends import BACKENDS
 from strapgen.run.increments import windows
@@ -112,8 +111,8 @@ def test_spans_of_the_numpy_scan_join_without_a_seam(monkeypatch, rng, span, ort
     increments = random_increments(rng, 2, 700, 2)
     whole = backend.propagate(increments, 1, orthonormalize_every)
     monkeypatch.setattr(numpy_module, "_SPAN", span)
-    monkeypatch.setattr(blocked_scan, "_WIDTH", 16)
-    monkeypatch.setattr(blocked_scan, "_PASS", 64)
+    monkeypatch.setattr(numpy_module, "_WIDTH", 16)
+    monkeypatch.setattr(numpy_module, "_PASS", 64)
     pieces = backend.propagate(increments, 1, orthonormalize_every)
     scale = np.abs(whole).max()  # without orthonormalization first order grows
     assert np.abs(pieces - whole).max() <= scale * roundoff(backend, 700)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen.ir.exceptions import InputError
 from strapgen.run import numpy_evaluator
-from strapgen.run.c import _parts
+from strapgen.run.compiled_code import _parts
 
 #: Attitude, method and increments of steps whose transitions differ in all: Taylor, staged, windows, odd sizes.
 STEPS = [

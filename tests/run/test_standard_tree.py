@@ -69,7 +69,7 @@ def command(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, 
 
 @pytest.mark.long
 def test_checked_in_tree_is_in_step_and_says_which_commands_made_it():
-    assert standard_tree.difference(resources.folder("generated"), files()) == ""
+    assert standard_tree.tree_difference(resources.folder("generated"), files()) == ""
     files_say_which_command_made_them(files())
     readme_lists_the_operations(files()["README.md"], programs().values())
 
@@ -324,7 +324,7 @@ def test_a_check_names_the_file_that_writing_leaves(folder, capsys):
 def test_drafts_of_earlier_versions_are_removed(folder, name, is_whole):
     draft = folder / name
     draft.write_text(few()[name.replace("/.", "/").removeprefix(".")[:-9]] if is_whole else "")
-    assert standard_tree.difference(folder, few())
+    assert standard_tree.tree_difference(folder, few())
     standard_tree.write(folder, few())
     assert contents(folder) == few()
 

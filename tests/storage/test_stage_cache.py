@@ -11,7 +11,7 @@ import strapgen
 from strapgen import catalogue, pipeline
 from strapgen.ir.fixed_settings import Settings
 from strapgen.run import compiler
-from strapgen.storage import cache, stage_cache
+from strapgen.storage import cache
 
 #: Runs with flags of the compiler.
 RUN = """
@@ -58,8 +58,8 @@ def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):
 
 def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(stage_cache, "_results", {})
-    monkeypatch.setattr(stage_cache, "_MOST_RESULTS", 2)
+    monkeypatch.setattr(cache, "_results", {})
+    monkeypatch.setattr(cache, "_MOST_RESULTS", 2)
     stored, asked = cache.stored, []
 
     def noted(kind, parts, work, what):
@@ -68,7 +68,7 @@ def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, 
 
     monkeypatch.setattr(cache, "stored", noted)
     for key in ("a", "b", "a", "c", "a", "b"):
-        assert stage_cache._remembered("kind", [key], "", lambda key=key: key, False) == key
+        assert cache._remembered("kind", [key], "", lambda key=key: key, False) == key
     assert asked == ["a", "b", "c", "b"]
 
 
@@ -88,7 +88,7 @@ def test_another_target_and_other_settings_derive_nothing_again(monkeypatch, tmp
     choice = catalogue.choose("euler-product")
     wanted = strapgen.lower(catalogue.derive(choice))
     pipeline.compile(choice, "numpy")
-    monkeypatch.setattr(stage_cache, "_results", {})  # as another process
+    monkeypatch.setattr(cache, "_results", {})  # as another process
 
     def never(_choice):
         raise AssertionError("derived again")

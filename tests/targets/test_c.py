@@ -26,7 +26,7 @@ from strapgen.catalogue import choose, standard
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.run.compiler import C_FLAGS
-from strapgen.targets.c.emit import DOUBLE, FLOAT, CPrinter
+from strapgen.targets.c import DOUBLE, FLOAT, CPrinter
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
 COMPILERS = {
@@ -122,15 +122,6 @@ def objects(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert (done.returncode, rest) == (0, [])
     (place / OPTIMIZED).write_text(done.stderr)
     return place
-
-
-@pytest.mark.long
-def test_every_file_compiles_alone(folder):
-    needed("gcc")
-    files = sorted(path.name for path in folder.glob("*.c"))
-    command = ["gcc", "-std=c99", *STRICT, "-fsyntax-only", *files]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.long
@@ -339,14 +330,6 @@ def test_propagation_is_the_step_repeated_bit_for_bit(propagate):
         assert record.tobytes() == state.tobytes()
 
 
-@pytest.mark.parametrize("steps", [1, 2, 3, 4, 5, 7, 8, 9, 19])
-def test_groups_of_prepared_steps_join_without_a_seam(propagate, steps):
-    _, whole = propagate(propagate.increments[0], 1, 7, function=propagate.normalize)
-    status, part = propagate(propagate.increments[0], 1, 7, steps=steps, function=propagate.normalize)
-    assert status == 0
-    assert part[0].tobytes() == whole[0, : steps + 1].tobytes()
-
-
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("step", [*STEPS, RODRIGUES])
 def test_the_stack_that_a_loop_is_said_to_use_holds_the_largest_of_its_arrays(step, target):
@@ -457,19 +440,6 @@ def test_propagation_orthonormalizes_before_it_records(propagate, every):
             state = done
         if number % 2 == 0:
             assert history[0, number // 2].tobytes() == state.tobytes()
-
-
-@pytest.mark.parametrize("runs", [1, 2, 7, 8, 9, 15, 16, 17, 33])
-@pytest.mark.parametrize("record_every", [1, 3, 20])
-def test_many_runs_equal_single_runs_bit_for_bit(propagate, runs, record_every):
-    arguments = {"record_every": record_every, "orthonormalize_every": 4, "function": propagate.normalize}
-    increments = np.concatenate([propagate.increments * k for k in range(1, 12)])[:runs]
-    starts = np.ascontiguousarray(np.tile(propagate(propagate.increments[0])[1][0], (2, 1))[:runs])
-    status, together = propagate(increments, runs=runs, initial=starts, **arguments)
-    assert status == 0
-    for run in range(runs):
-        _, alone = propagate(increments[run], initial=starts[run : run + 1], **arguments)
-        assert alone[0].tobytes() == together[run].tobytes()
 
 
 def test_no_steps_give_the_initial_state(propagate):
@@ -634,18 +604,6 @@ wide = st.builds(
 def test_literals_are_rounded_once(value):
     assert read(CPrinter(DOUBLE).constant(value)) == nearest_double(value)
     assert read(CPrinter(FLOAT).constant(value)) == nearest_single(value)
-
-
-def test_the_trap_is_one():
-    assert nearest_single(TRAP) == 1 + Fraction(1, 2**23)
-    assert nearest_single(nearest_double(TRAP)) == 1
-    assert CPrinter(FLOAT).constant(TRAP) == "1.0000001f"
-
-
-def test_a_tie_goes_to_even():
-    printer = CPrinter(FLOAT)
-    assert read(printer.constant(1 + Fraction(1, 2**24))) == 1
-    assert read(printer.constant(1 + Fraction(3, 2**24))) == 1 + Fraction(1, 2**22)
 
 
 def test_compiler_reads_literals_as_meant(tmp_path):

@@ -18,9 +18,8 @@ from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import above, places_above
-from strapgen.run.c import CEvaluator
-from strapgen.run.fixed import ModelEvaluator
-from strapgen.targets.c_fixed.statements import _noted
+from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
+from strapgen.targets.c_fixed import _noted
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
 CHOICES = [choice for choice in FIXED_POINT if not (choice.method and choice.name == "cayley-klein")]

@@ -16,7 +16,7 @@ from strapgen import generate
 from strapgen.catalogue import Choice
 from strapgen.ir import formats
 from strapgen.ir.fixed_settings import Settings
-from strapgen.run.c import CEvaluator
+from strapgen.run.compiled_code import CEvaluator
 from strapgen.storage import resources
 from strapgen.targets.contract_lines import Contract
 

@@ -143,7 +143,7 @@ def test_no_back_end_runs_its_code(toy):
 def test_a_target_of_fixed_point_takes_quantized_programs(site):
     (site / "wide.py").write_text(
         "from strapgen import Target\n"
-        "TARGET = Target('words of 20 bits', 'strapgen.targets.integer_model.emit:emit', True, (20,), 'Python')\n"
+        "TARGET = Target('words of 20 bits', 'strapgen.targets.integer_model:emit', True, (20,), 'Python')\n"
     )
     install(site, {"wide": "wide:TARGET"})
     sources = strapgen.generate(program(EULER), "wide", strapgen.Settings(word=20))
@@ -208,7 +208,7 @@ FAILING = {
 @pytest.mark.parametrize("fault", FAILING)
 def test_a_target_that_fails_on_a_program(fault, site):
     body, line = FAILING[fault]
-    head = "from strapgen.targets.c.emit import emit as c\nfrom dataclasses import replace\ndef emit(program, name):\n"
+    head = "from strapgen.targets.c import emit as c\nfrom dataclasses import replace\ndef emit(program, name):\n"
     tail = "\nfrom strapgen import Target\nTARGET = Target('mine', emit, number='double')\n"
     (site / "mine.py").write_text(f"{head}    {body}{tail}")
     install(site, {"mine": "mine:TARGET"})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from strapgen.targets.lines import fill, fill_arguments, fill_definition, fill_expression
+from strapgen.targets.printer import fill, fill_arguments, fill_definition, fill_expression
 
 
 @pytest.mark.parametrize("filled", [fill_arguments, fill_expression])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from collections import Counter
 from collections.abc import Iterable
 from itertools import product
@@ -20,7 +19,6 @@ from strapgen.targets.names import external
 
 #: The folders of generated/ with the ending of their names.
 FOLDERS = {"c": "", "c_float": "_float", "c_fixed": "_w32"}
-STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 
 
 def files(folder: str) -> list[Path]:
@@ -42,14 +40,6 @@ def names_of_the_file(text: str) -> set[str]:
         name for body in re.findall(r"\benum\s*\{(.*?)\}", code) for name in re.findall(r"[A-Za-z_]\w*", body)
     ]
     return {*static, *constants, *re.findall(r"\btypedef\b[^;]*?(\w+);", code)}
-
-
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_all_files_of_a_precision_make_one_translation_unit(folder):
-    unit = "".join(f'#include "{path}"\n' for path in files(folder))
-    command = ["cc", *STRICT, "-fsyntax-only", "-x", "c", "-"]
-    done = subprocess.run(command, input=unit, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 def recurring(texts: Iterable[str]) -> list[str]:

@@ -18,9 +18,9 @@ from strapgen.catalogue import Choice
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
-from strapgen.run import compiler, generated_files, octave
+from strapgen.run import compiler, octave, standard_tree
 from strapgen.run.backends import of_sources
-from strapgen.targets.matlab.emit import MATLAB, _MatlabPrinter
+from strapgen.targets.matlab import MATLAB, _MatlabPrinter
 
 #: Functions of MATLAB without a toolbox that Octave has too: all that generated code calls.
 COMMON = {
@@ -199,7 +199,7 @@ def test_the_command_generates_names_and_checks(tmp_path, monkeypatch, capsys):
     assert run("generate euler --target matlab --name turn --with-runs")[0] == 0
     text = (tmp_path / "turn.m").read_text()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["turn.m", "turn_propagate.m"]
-    command = generated_files.command_of(text)
+    command = standard_tree.command_of(text)
     assert command == "strapgen generate euler --method rk4 --increments 2 --name turn --target matlab"
     assert run(f"{command.removeprefix('strapgen ')} --check") == (0, "")
     assert run("generate euler-normalize --target matlab --name turn")[1].startswith(

@@ -31,8 +31,7 @@ from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 from strapgen.run import compiler, octave
-from strapgen.targets import c_library, names
-from strapgen.targets.matlab import emit as matlab
+from strapgen.targets import c_library, matlab, names
 
 STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 #: A file that includes all others.

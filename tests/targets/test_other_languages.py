@@ -1,4 +1,4 @@
-"""C++ and Rust: the bits and integers of the C, its contract, and what is told where a compiler is missing or fails."""
+"""C++ and Rust: the bits and integers of the C, its contract, strict compilers, and one line where one fails."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from languages import DOUBLE, SAMPLES, check_lines
 
+import strapgen
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import CompilerError, InputError
@@ -19,6 +20,10 @@ from strapgen.run import backends, compiler
 from strapgen.run.backends import of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.targets.contract_lines import Contract
+from strapgen.targets.cpp import constants
+from strapgen.targets.names import Naming
+from strapgen.targets.rendering import Macro
+from strapgen.targets.rust import _RUST_WORDS, _RustStatementPrinter, module_name
 
 #: The compiler that each target needs, and the target whose bits it has.
 TARGETS = {
@@ -131,10 +136,11 @@ def test_the_contract_is_that_of_the_c_but_for_the_command(target):
     assert ("-ffp-contract" in text) == (target in ("cpp", "cpp-float"))
 
 
-def written(folder: Path, target: str, settings: Settings) -> list[str]:
+def written(folder: Path, target: str, settings: Settings | None = None) -> list[str]:
     """Write the files of some kernels without their loops; return their names."""
     names = []
-    for choice in (choice for choice in catalogue.standard()[::4] if can_lower(choice, settings)):
+    choices = catalogue.standard()[::4]
+    for choice in choices if settings is None else (c for c in choices if can_lower(c, settings)):
         sources = pipeline.compile(choice, target, settings)
         check_lines(sources)
         for name, text in sources.step_files.items():
@@ -144,23 +150,53 @@ def written(folder: Path, target: str, settings: Settings) -> list[str]:
     return names
 
 
+def checked_cpp(folder: Path, text: str, *flags: str) -> subprocess.CompletedProcess[str]:
+    """Let the C++ compiler check a program in a folder, with all warnings on."""
+    (folder / "main.cpp").write_text(text)
+    strict = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wold-style-cast", "-Werror")
+    command = ["c++", "-std=c++17", *strict, "-ffp-contract=off", *flags, "-fsyntax-only", "main.cpp"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def built_crate(
+    folder: Path, names: list[str], edition: str, *flags: str
+) -> subprocess.CompletedProcess[str]:
+    """Build a crate without the standard library of the modules in a folder, each warning an error."""
+    modules = "".join(f"pub mod {name.removesuffix('.rs')};\n" for name in names)
+    (folder / "lib.rs").write_text(f"#![no_std]\n{modules}")
+    strict = (f"--edition={edition}", "--crate-type=rlib", "-Dwarnings", "-Cpanic=abort")
+    command = ["rustc", *strict, *flags, "lib.rs"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.needs("c++")
 def test_headers_stand_in_one_program_of_a_strict_compiler(tmp_path):
-    names = [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "cpp-fixed", s)]
-    (tmp_path / "main.cpp").write_text("".join(f'#include "{name}"\n' for name in names) + "int main() {}\n")
-    strict = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wold-style-cast", "-Werror")
-    command = ["c++", "-std=c++17", *strict, "-fsyntax-only", "main.cpp"]
-    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    names = [name for target in ("cpp", "cpp-float") for name in written(tmp_path, target)]
+    names += [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "cpp-fixed", s)]
+    said = checked_cpp(tmp_path, "".join(f'#include "{name}"\n' for name in names) + "int main() {}\n")
     assert said.returncode == 0, said.stderr
 
 
 @pytest.mark.needs("rustc")
-def test_modules_stand_in_one_crate_of_a_strict_compiler(tmp_path):
-    names = [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "rust-fixed", s)]
-    modules = "".join(f"pub mod {name.removesuffix('.rs')};\n" for name in names)
-    (tmp_path / "lib.rs").write_text(f"#![no_std]\n{modules}")
-    command = ["rustc", "--edition=2021", "--crate-type=rlib", "-Dwarnings", "-Cpanic=abort", "lib.rs"]
-    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+def test_modules_stand_in_one_crate_without_the_standard_library_and_never_panic(tmp_path):
+    names = [name for target in ("rust", "rust-float") for name in written(tmp_path, target)]
+    names += [n for s in (SETTINGS[0], SETTINGS[3]) for n in written(tmp_path, "rust-fixed", s)]
+    # Newer compilers leave short functions to the crates that call them, unless told to write all.
+    said = built_crate(tmp_path, names, "2021", "-Copt-level=1", "-Clink-dead-code", "--emit=asm")
+    assert said.returncode == 0, said.stderr
+    assembly = (tmp_path / "lib.s").read_text()
+    assert [name for name in names if name.removesuffix(".rs") not in assembly] == []
+    assert "panic" not in assembly
+
+
+@pytest.mark.needs("rustc")
+def test_the_oldest_edition_takes_the_text_too(tmp_path):
+    names = []
+    for kernel in ("euler-normalize", "euler-angles-from-dcm"):
+        for name, text in pipeline.compile(catalogue.choose(kernel), "rust").step_files.items():
+            (tmp_path / name).write_text(text)
+            names.append(name)
+    said = built_crate(tmp_path, names, "2015")
     assert said.returncode == 0, said.stderr
 
 
@@ -169,8 +205,8 @@ SMALL = "-D__ARM_ARCH_6M__"
 
 
 @pytest.mark.needs("c++")
-@pytest.mark.parametrize(("right", "flags"), [(True, ()), (False, ()), (True, (SMALL,)), (False, (SMALL,))])
-def test_a_step_of_c_plus_plus_is_a_constant_expression(tmp_path, right, flags):
+@pytest.mark.parametrize(("right", "flags"), [(True, ()), (False, ()), (True, (SMALL,))])
+def test_a_step_in_fixed_point_is_a_constant_expression(tmp_path, right, flags):
     choice, settings = catalogue.choose("euler"), Settings(word=32)
     sources = pipeline.compile(choice, "cpp-fixed", settings)
     (name,) = sources.step_files
@@ -179,17 +215,78 @@ def test_a_step_of_c_plus_plus_is_a_constant_expression(tmp_path, right, flags):
     state, increments = [0, 0, 0, 1 << 30], [1 << 20, 0, 0, 1 << 21, 0, 0]
     (outputs, _) = reference.run([np.array([state]), np.array([increments])], reference.fresh(1))
     expected = int(outputs[0][0, 0]) + (not right)
-    (tmp_path / "main.cpp").write_text(
+    said = checked_cpp(
+        tmp_path,
         f'#include "{name}"\n'
         "constexpr std::int32_t first()\n{\n    std::array<std::int32_t, 4> next{};\n"
         f"    const int status = strapgen::{sources.function.name}({{{{{', '.join(map(str, state))}}}}},\n"
         f"        {{{{{', '.join(map(str, increments))}}}}}, next);\n    return status == 0 ? next[0] : 0;\n}}\n"
-        f"static_assert(first() == {expected});\n"
+        f"static_assert(first() == {expected});\n",
+        *flags,
     )
-    command = ["c++", "-std=c++17", "-fsyntax-only", *flags, "main.cpp"]
-    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (said.returncode == 0) == right, said.stderr
     assert right or "static assertion failed" in said.stderr
+
+
+@pytest.mark.needs("c++")
+@pytest.mark.parametrize("right", [True, False])
+def test_a_step_is_a_constant_expression(tmp_path, right):
+    sources = pipeline.compile(catalogue.choose("euler"), "cpp")
+    (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
+    state = strapgen.backend("euler").step([0.0, 0.0, 0.0, 1.0], [[0.25, 0.0, 0.0], [0.125, 0.0, 0.0]])
+    expected = float(state[0]) if right else float(np.nextafter(state[0], 1))
+    said = checked_cpp(
+        tmp_path,
+        '#include "euler_rk4_2.hpp"\n'
+        "constexpr auto next = strapgen::euler_rk4_2(strapgen::euler_rk4_2_identity, {{0.25, 0, 0, 0.125, 0, 0}});\n"
+        f"static_assert(next[0] == {expected!r});\n",
+    )
+    assert (said.returncode == 0) == right, said.stderr
+    assert right or "static assertion failed" in said.stderr
+
+
+@pytest.mark.needs("c++")
+def test_fused_operations_and_fast_mathematics_are_refused(tmp_path):
+    sources = pipeline.compile(catalogue.choose("euler"), "cpp")
+    (tmp_path / "euler_rk4_2.hpp").write_text(sources.files["euler_rk4_2.hpp"])
+    said = checked_cpp(tmp_path, '#include "euler_rk4_2.hpp"\n', "-ffast-math")
+    assert "operations must round to double" in said.stderr
+
+
+def test_a_constant_stands_in_one_line_with_its_comment_or_below_it_up_to_the_width():
+    def lines(value: str, meaning: str) -> list[str]:
+        (text,) = constants([Macro("ONE", value, meaning, "int")])
+        return text.split("\n")
+
+    begin, comment = "inline constexpr int one = ", "/* one */"
+    for width in (99, 100):
+        value = "1" * (width - len(f"{begin}; {comment}"))
+        line = f"{begin}{value};"
+        assert lines(value, "one") == ([f"{line} {comment}"] if width == 99 else [comment, line])
+        value = "1" * (width - len(f"{begin};"))
+        broken = [f"{begin.rstrip()}", f"    {value};"] if width == 100 else [f"{begin}{value};"]
+        assert lines(value, "one") == [comment, *broken]
+
+
+def test_what_calls_the_library_is_no_constant_expression():
+    header = pipeline.compile(catalogue.choose("euler-normalize"), "cpp").files["euler_normalize.hpp"]
+    assert "constexpr std::array<double, 4> euler_normalize" not in header
+    assert "inline std::array<double, 4> euler_normalize" in header
+
+
+@pytest.mark.parametrize("value", [0, 1, 15, 16, 17, 31, 48, 2**40 - 1, 2**40, 2**40 + 1, -16, -31, -(2**40)])
+def test_a_wide_constant_is_its_integer_and_a_power_of_two_from_16_on_says_its_type(value):
+    printer = object.__new__(_RustStatementPrinter)
+    printer.word = _RUST_WORDS[32]
+    text = printer.constant(value, wide=True)
+    assert eval(text.replace("_i64", "")) == value
+    assert ("_i64" in text) == (abs(value) in {2**k for k in range(4, 63)})
+
+
+def test_words_of_rust_name_nothing():
+    assert module_name("loop") == "loop_Kernel"
+    named = Naming(name="match").of(strapgen.lower(strapgen.derive("euler-product")))
+    assert {*strapgen.generate(named, "rust").step_files} == {"match_Kernel.rs"}
 
 
 #: A step that no other test compiles: what is loaded already needs no compiler.

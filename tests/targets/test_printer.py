@@ -21,10 +21,10 @@ from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.run.compiler import C_FLAGS
-from strapgen.targets.c import emit
-from strapgen.targets.lines import fill_expression
-from strapgen.targets.numpy_code.emit import _NumpyPrinter
-from strapgen.targets.numpy_code.emit import emit as emit_numpy
+from strapgen.targets import c
+from strapgen.targets.numpy_code import _NumpyPrinter
+from strapgen.targets.numpy_code import emit as emit_numpy
+from strapgen.targets.printer import fill_expression
 
 NAMES = ("x_1", "x_2", "x_3", "x_4")
 VALUES = dict(zip(NAMES, (1.1, -0.37, 3.0000000000000004, 7e-3), strict=True))
@@ -131,7 +131,7 @@ def test_python_text_has_the_value_of_the_tree(tree):
 )
 def test_no_more_parentheses_than_needed(tree, text):
     assert _NumpyPrinter().text(tree) == text
-    assert emit.CPrinter(emit.DOUBLE).text(tree) == text
+    assert c.CPrinter(c.DOUBLE).text(tree) == text
 
 
 def random_tree(draw: random.Random, depth: int) -> Node:
@@ -160,13 +160,13 @@ def finite_trees(number: Any, wanted: int) -> list[Node]:
 
 
 @pytest.mark.parametrize(
-    ("target", "real", "number"), [("c", emit.DOUBLE, np.float64), ("c-float", emit.FLOAT, np.float32)]
+    ("target", "real", "number"), [("c", c.DOUBLE, np.float64), ("c-float", c.FLOAT, np.float32)]
 )
 def test_compiled_text_has_the_value_of_the_tree(target, real, number, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not on this machine")
     chosen = finite_trees(number, 50)
-    sources = emit.emit(program(*chosen), target)
+    sources = c.emit(program(*chosen), target)
     for name, text in sources.files.items():
         (tmp_path / name).write_text(text)
     source = next(tmp_path / name for name in sources.step_files if name.endswith(".c"))

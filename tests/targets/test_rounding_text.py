@@ -11,7 +11,7 @@ from derived import programs
 from strapgen.fixedpoint.floating import rounding_bounds
 from strapgen.ir.interfaces import RoundingBounds
 from strapgen.targets import emit
-from strapgen.targets.c.rounding_text import rounding_text
+from strapgen.targets.contract import rounding_text
 
 
 def said(name: str, number: str = "double") -> tuple[RoundingBounds, str]:

@@ -10,7 +10,7 @@ from derived import program, quantized
 
 from strapgen.catalogue import Choice
 from strapgen.ir.fixed_settings import Settings
-from strapgen.targets.run_text import run_paragraphs
+from strapgen.targets.contract import run_paragraphs
 
 RATES = {"max_rate_deg_s": 400, "step": "0.01", "increments": 2}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from fractions import Fraction
 
@@ -14,7 +15,18 @@ from tolerances import roundoff
 import strapgen
 from strapgen.run.backends import BACKENDS
 from strapgen.thesis import thesis_tables
-from strapgen.thesis.thesis_tables import TABLES, agrees, build_all, entries, table_settings
+from strapgen.thesis.predicted_tables import predicted, predicted_text
+from strapgen.thesis.tables_report import thesis_table_text
+from strapgen.thesis.thesis_tables import (
+    ALGORITHMS,
+    ORDERS,
+    TABLES,
+    TableEntry,
+    agrees,
+    build_all,
+    entries,
+    table_settings,
+)
 
 # What an independent program computed from the thesis's equations, in double precision: orders 1, 2, 4.
 REPRODUCED = {
@@ -25,7 +37,6 @@ REPRODUCED = {
     5: {"dcm": (1, 0.436, 1.87e-5), "euler": (0.662, 0.156, 2.30e-7)},
 }
 BASE_DEG = {1: 0.2855, 2: 0.856, 4: 6.251e-2, 5: 1.026}
-ORDERS = (1, 2, 4)
 
 #: A table takes arithmetic of 40 digits a quarter of a minute.
 LONG_RUNS = [
@@ -35,6 +46,8 @@ LONG_RUNS = [
 
 # Two figures stand nearer to the round-off of double precision than the rest.
 LOOSER = {(4, "dcm", 4): 0.03, (4, "euler", 4): 0.15, (1, "dcm", 4): 0.03, (1, "euler", 4): 0.03}
+
+TABLE = TABLES[0]
 
 
 def certify(table, rows, backend_name):
@@ -201,3 +214,68 @@ def test_the_kernels_of_a_back_end_are_compiled_together(monkeypatch):
         assert {each.kernel for each in sources} == {*kernels, *beside}
         assert {each.target for each in sources} == {target}
         assert len({name for each in sources for name in each.files}) == 4 * 8  # no name twice: one module
+
+
+def made(backend: str, **rest: object) -> list[TableEntry]:
+    return [
+        TableEntry(
+            TABLE.number, backend, algorithm, order, 0.125 / order, 0.5, "0.5", **{"agrees": True, **rest}
+        )
+        for algorithm in ALGORITHMS
+        for order in ORDERS
+    ]
+
+
+@pytest.mark.parametrize("backend", ["c", "fixed-model", "a-back-end-of-a-long-name"])
+def test_figures_end_under_their_heads_and_orders(backend):
+    lines = thesis_table_text(TABLE, made(backend)).splitlines()
+    orders, heads = lines[2:4]
+    ends = [match.end() for match in re.finditer("drift|ratio", heads)]
+    assert len(ends) == 2 * len(ORDERS)
+    rows = [line for line in lines if line.strip().startswith(backend)]
+    assert len(rows) == len(ALGORITHMS)
+    for row in rows:
+        assert [match.end() for match in re.finditer(r"\S+", row)][1:] == ends
+    for k, match in enumerate(re.finditer(r"order \d", orders)):
+        assert ends[2 * k] < match.end() < ends[2 * k + 1]
+
+
+def test_marks_are_explained_where_they_stand():
+    text = thesis_table_text(TABLE, made("c"))
+    assert "not the thesis's figure" not in text
+    assert "round-off" not in text
+    text = thesis_table_text(TABLE, [*made("c", agrees=False), *made("d", roundoff_dominates=True)])
+    assert "0.5*" in text
+    assert "0.5r" in text
+    assert "* not the thesis's figure in its printed digits" in text
+    assert "r round-off dominates" in text
+
+
+def test_a_note_stands_once_for_all_back_ends():
+    both = [*made("c", note="A repaired figure."), *made("d", note="A repaired figure of d.")]
+    text = thesis_table_text(TABLE, both)
+    assert text.count("A repaired figure.") == len(ALGORITHMS) * len(ORDERS)
+    assert "figure of d" not in text
+
+
+def test_a_repaired_figure_has_the_text_of_the_scan_below_it_and_the_reason():
+    lines = thesis_table_text(TABLE, made("c")).splitlines()
+    (place,) = (k for k, line in enumerate(lines) if line.split()[:1] == ["scan"])
+    assert lines[place].split()[1:] == [".75e-?"]
+    assert lines[place - 1].split() == ["thesis", ".25", ".125", ".75e-6"]
+    assert lines[place].index(".75e-?") == lines[place - 1].index(".75e-6")
+    assert ".75e-6 is repaired, the scan reads .75e-?" in "\n".join(lines)
+    unrepaired = thesis_table_text(TABLES[2], [])
+    assert "scan" not in unrepaired
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: str(table.number))
+def test_every_figure_is_predicted(table):
+    """Within 0.3 % of the simulation, where 1 % and 3 % are asked for; the thesis's digits too."""
+    found = list(predicted([table]))
+    for entry in found:
+        assert abs(entry.deviation) < 3e-3, entry
+        assert abs(entry.drift_deg / entry.simulated_deg - 1) < 3e-3, entry
+        assert entry.agrees, entry
+    assert f"Table {table.number}" in predicted_text(found)

@@ -23,7 +23,7 @@ from strapgen.run.backends import DEFAULT_BACKENDS, Backend
 from strapgen.run.backends import backend as attitude_backend
 
 if TYPE_CHECKING:
-    from strapgen.analysis.error_analysis.error_analysis import ErrorAnalysis
+    from strapgen.analysis.error_analysis import ErrorAnalysis
     from strapgen.kernel.kernel import Kernel
 
 
@@ -93,7 +93,7 @@ class AttitudeAlgorithm:
         >>> algorithm("euler", "rk4", 2).series("constant", terms=1).step.order
         4
         """
-        from strapgen.analysis.error_analysis.error_analysis import analyse  # loads SymPy
+        from strapgen.analysis.error_analysis import analyse  # loads SymPy
 
         return analyse(self.choice, motion, terms)
 

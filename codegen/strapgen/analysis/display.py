@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from strapgen.analysis.algorithm import AttitudeAlgorithm
-from strapgen.analysis.error_analysis.error_analysis import ErrorAnalysis
-from strapgen.analysis.growth.growth import Stability
-from strapgen.analysis.growth.growth_report import stability_latex
-from strapgen.analysis.series.notation import LATEX, covariant_text
+from strapgen.analysis.error_analysis import ErrorAnalysis
+from strapgen.analysis.growth import Stability, stability_latex
+from strapgen.analysis.series.invariants import LATEX, covariant_text
 from strapgen.analysis.series.series import PARTS, STEP, ErrorSeries
-from strapgen.analysis.series.velocity_series import VelocitySeries
-from strapgen.analysis.series.velocity_series_report import velocity_series_latex
-from strapgen.analysis.unknowns import unknowns_latex
-from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
+from strapgen.analysis.series.velocity_series import VelocitySeries, velocity_series_latex
+from strapgen.analysis.unknowns import unknowns_report
+from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
 from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.results.display import formulas
@@ -30,32 +28,32 @@ def _(stability: Stability) -> str | None:
 
 @latex.register
 def _(tableau: UnknownTableau) -> str | None:
-    return unknowns_latex.unknown_tableau_latex(tableau)
+    return unknowns_report.unknown_tableau_latex(tableau)
 
 
 @latex.register
 def _(equation: Equation) -> str | None:
-    return unknowns_latex.conditions_latex([equation])
+    return unknowns_report.conditions_latex([equation])
 
 
 @latex.register
 def _(family: Family) -> str | None:
-    return unknowns_latex.family_latex(family)
+    return unknowns_report.family_latex(family)
 
 
 @latex.register
 def _(solution: PolynomialSolution) -> str | None:
-    return unknowns_latex.solution_latex(solution)
+    return unknowns_report.solution_latex(solution)
 
 
 @latex.register
 def _(solved: SolvedStep) -> str | None:
-    return unknowns_latex.solved_latex(solved)
+    return unknowns_report.solved_latex(solved)
 
 
 @latex.register
 def _(error: LeadingError) -> str | None:
-    return unknowns_latex.leading_latex(error)
+    return unknowns_report.leading_latex(error)
 
 
 @latex.register

@@ -22,7 +22,7 @@ from strapgen.ir.exceptions import InputError
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
     from strapgen.targets.names import Naming
 
 
@@ -101,7 +101,7 @@ class SourceOptions:
 
     def write(self, files: Mapping[str, str]) -> list[Path]:
         """Write files into the folder, but over none that has another contract, unless that is forced."""
-        from strapgen.run.generated_files import command_of, text_of
+        from strapgen.run.standard_tree import command_of, text_of
         from strapgen.storage.files import write_files
 
         folder = self.out or Path()
@@ -121,9 +121,9 @@ class SourceOptions:
 
     def compare(self, files: Mapping[str, str]) -> str:
         """Return the difference of the files in the folder from generated ones; "" if there is none."""
-        from strapgen.run import generated_files
+        from strapgen.run.standard_tree import difference
 
-        return generated_files.difference(self.out or Path(), files)
+        return difference(self.out or Path(), files)
 
     def show_difference(self, files: Mapping[str, str], format: str) -> None:
         """Print the difference of the files in the folder from generated ones, and exit with 1 if there is one."""
@@ -225,7 +225,7 @@ def request(
     algorithm: str, method: MethodOptions, target: str, fixed: FixedOptions, output: SourceOptions
 ) -> Request:
     """Return the request of the command's options."""
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
     from strapgen.targets import TARGETS, fixed_targets
 
     choice = method.choose(algorithm, step=False)
@@ -282,7 +282,7 @@ def _generate_all(targets: tuple[str, ...] | None, output: SourceOptions, format
     total = len(catalogue.standard())
     files = standard_tree.tree(track(standard_tree.programs(), "deriving", total), targets)
     if output.check:
-        difference = standard_tree.difference(out, files)
+        difference = standard_tree.tree_difference(out, files)
         show_step(difference, format)
         if difference:
             left = standard_tree.strangers(out, files)

@@ -65,12 +65,12 @@ StrapdownAlgorithm = Annotated[str, _argument("dcm or euler in two speeds, or a 
 
 _SHOWN_BACKENDS = "strapgen list backends shows all."
 #: Reads the name of a back end.
-a_backend = names("strapgen.run.registry:BACKENDS")
+a_backend = names("strapgen.run.backend_names:BACKENDS")
 
 
 def default_backends() -> tuple[str, ...]:
     """Return the back ends of a run that names none."""
-    from strapgen.run.registry import DEFAULT_BACKENDS
+    from strapgen.run.backend_names import DEFAULT_BACKENDS
 
     return DEFAULT_BACKENDS
 

@@ -251,7 +251,7 @@ def run(words: Sequence[str], completing: bool = False) -> Any:
 def _show_versions(chosen: bool) -> None:
     if not chosen:
         return
-    from strapgen.run.versions import versions
+    from strapgen.run.compiler import versions
 
     typer.echo("\n".join(f"{name} {version}" for name, version in versions().items()))
     raise typer.Exit

@@ -23,7 +23,7 @@ from strapgen.firmware.vectors import MODEL, vectors_of_choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.interfaces import AngleAccumulation
 from strapgen.ir.program import OPERATIONS, Program
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 #: Calls, and steps of a run; steps from one look at the state to the next.
 COUNT, BETWEEN = 10_000, 100

@@ -18,9 +18,8 @@ from strapgen.ir.sources import Sources
 from strapgen.lab.runner_c import CallRun, run_files
 from strapgen.storage.drafts import temporary_folder
 from strapgen.storage.files import write_files
-from strapgen.targets.c.number_text import numbers_of, types_of
-from strapgen.targets.definitions import word_literal
-from strapgen.targets.rendering import render
+from strapgen.targets.c_numbers import numbers_of, types_of
+from strapgen.targets.rendering import render, word_literal
 
 #: Checks of clang-tidy. That parameters of one type can be swapped is left out: an input, an output and a state are
 #: arrays of one type by nature, and their names stand in the header.

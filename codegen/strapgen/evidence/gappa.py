@@ -13,7 +13,7 @@ from pathlib import Path
 from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.evidence.gappa_scripts import DEGREES, CannotFollowError, Script, fixed_script, floating_script
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import NUMBERS
 
 #: Processor time after which a proof is given up, and bits of the ends of intervals.
 SECONDS, PRECISION = 60, 256

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
 
-from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
+from strapgen.fixedpoint.floating.errors import CONSTANT, INPUT, NUMBERS, Expression, Expressions
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import is_power_of_two
 from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value

@@ -37,7 +37,7 @@ from strapgen.lab.runner_c import (
     run_files,
 )
 from strapgen.run.backends import evaluator
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 from strapgen.storage.files import write_files
 from strapgen.targets.contract import options
 

@@ -12,7 +12,7 @@ from strapgen.cli import generate_command
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import CommandOptions, Option
 from strapgen.cli.options import MethodOptions
-from strapgen.design.commit_late import window_generate_command
+from strapgen.design import window_command
 from strapgen.firmware.verification import file_backend as file_backend
 from strapgen.firmware.verification import paths_of, sources_of_files, whole_header
 from strapgen.ir import checks
@@ -20,7 +20,7 @@ from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
-from strapgen.run.generated_files import command_of, text_of
+from strapgen.run.standard_tree import command_of, text_of
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from strapgen.navigation.systems.fitting import Fitted
     from strapgen.navigation.systems.system_comparison import RunsSamples
     from strapgen.navigation.systems.wiring import Description
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
 
 
 #: The commands that generate C; a header can state these alone.
 COMMANDS: dict[str, Callable[..., Any]] = {
     "generate": generate_command.generate,
     "two-speed": two_speed.two_speed,
-    "window generate": window_generate_command.generate,
+    "window generate": window_command.generate,
     "system": system.system,
 }
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
@@ -78,7 +78,7 @@ class HeaderCommand:
 
             return two_speed_sources.sources(*self.two_speed())
         if self.name == "window generate":
-            return window_generate_command.generated(
+            return window_command.generated(
                 values["window"],
                 values["algorithm"],
                 values["target"],

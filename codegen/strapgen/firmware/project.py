@@ -19,7 +19,7 @@ from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed.two_speed_c import Wiring
 from strapgen.run.kernel_sources import StepSources
-from strapgen.targets.c.number_text import numbers_of, types_of
+from strapgen.targets.c_numbers import numbers_of, types_of
 from strapgen.targets.contract import options
 from strapgen.targets.names import UNNAMED, Naming
 from strapgen.targets.registry import BUILT_IN

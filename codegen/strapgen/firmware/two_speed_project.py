@@ -23,8 +23,8 @@ from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.loops import Cycles, Loops, LoopSources
 from strapgen.navigation.two_speed.two_speed_c import wiring
+from strapgen.run.compiled_code import ModelEvaluator
 from strapgen.run.evaluators import Array
-from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program
 
 #: Fast cycles in a slow cycle, slow cycles in a navigation cycle, and navigation cycles of the run that is tested.

@@ -25,12 +25,12 @@ from strapgen.ir.program import OPERATIONS, RESOLUTION, Operation, Program, walk
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.results.result import Result
+from strapgen.run.compiled_code import ModelEvaluator
 from strapgen.run.evaluators import Array, Evaluator
 from strapgen.run.exact import ExactEvaluator
-from strapgen.run.fixed import ModelEvaluator
 from strapgen.run.kernel_sources import program_of, sources_of_program
 from strapgen.targets import BUILT_IN
-from strapgen.targets.c.emit import CPrinter, real_of
+from strapgen.targets.c import CPrinter, real_of
 from strapgen.targets.contract import options
 from strapgen.targets.names import UNNAMED, Naming
 

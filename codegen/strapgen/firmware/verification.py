@@ -27,13 +27,11 @@ from strapgen.ir.sources import Sources
 from strapgen.results.records import entry, properties
 from strapgen.results.result import Result
 from strapgen.run.backends import Backend
-from strapgen.run.c import CEvaluator
+from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.exact import DIGITS, Interpreter, number
-from strapgen.run.fixed import ModelEvaluator
-from strapgen.run.generated_files import command_of, text_of
-from strapgen.run.generation import Request
-from strapgen.run.kernel_sources import StepSources
+from strapgen.run.kernel_sources import Request, StepSources
+from strapgen.run.standard_tree import command_of, text_of
 from strapgen.targets.contract_lines import Contract
 
 Array = NDArray[Any]

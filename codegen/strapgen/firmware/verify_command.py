@@ -76,7 +76,7 @@ def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, outp
     from strapgen.cli.progress import waiting
     from strapgen.firmware import header_command
     from strapgen.firmware.verification import verify_whole
-    from strapgen.run.generated_files import command_of
+    from strapgen.run.standard_tree import command_of
 
     with waiting(f"verifying {header.name}"):
         sources = header_command.read_file(header).whole(algorithms)

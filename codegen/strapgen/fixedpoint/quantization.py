@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from strapgen.fixedpoint import derivation
-from strapgen.fixedpoint.format_plan import FormatPlan, format_plan, sums_of_inputs_are_exact
-from strapgen.fixedpoint.integer_operations import LOWER
-from strapgen.fixedpoint.limits import Limit, limits
-from strapgen.fixedpoint.quantities import ExactOperation, Quantities, Quantity, Sum
-from strapgen.fixedpoint.quantization_context import Quantization
-from strapgen.fixedpoint.runs.accumulation import accumulation, step_errors
-from strapgen.fixedpoint.runs.angle_accumulation import angle_accumulation
-from strapgen.fixedpoint.sums import lower_sum
-from strapgen.fixedpoint.words.alignment import aligning
+from strapgen.fixedpoint.accumulation import accumulation, step_errors
+from strapgen.fixedpoint.angle_accumulation import angle_accumulation
+from strapgen.fixedpoint.format_plan import FormatPlan, Limit, format_plan, limits, sums_of_inputs_are_exact
+from strapgen.fixedpoint.integer_sums import Quantization, integer_value, lower_sum, word_of
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.quantities import (
+    ExactOperation,
+    Operand,
+    Quantities,
+    Quantity,
+    Sum,
+    is_dyadic,
+    largest_wide,
+    nearest,
+)
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.ir.formats import Format
-from strapgen.ir.integer_program import FixedProgram, IntegerSum, Value, operation_counts, used_by
+from strapgen.ir.formats import Format, finest
+from strapgen.ir.integer_program import (
+    FixedProgram,
+    IntegerOperation,
+    IntegerSum,
+    Scaled,
+    Term,
+    Value,
+    cases_of,
+    operation_counts,
+    used_by,
+)
 from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Program, Result
 from strapgen.ir.signals import CYCLE, Signal
@@ -201,3 +218,266 @@ def _errors(context: Quantization, signal: Signal, values: Sequence[Value]) -> t
         else max(value.error, value.saturated * Fraction(2) ** -value.fraction)
         for value in values
     )
+
+
+# Operations that are no sums
+
+
+def lower_quotient(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
+    """Lower a quotient to a word of the finest format for which the numerator has room."""
+    word, values = context.word, context.values
+    numerator, denominator = operation.arguments[0], str(operation.arguments[1])
+    if values[denominator].error:  # what is exact, a wide number too, stays so
+        denominator = word_of(context, denominator)
+    if isinstance(numerator, str) and values[numerator].error:
+        numerator = word_of(context, numerator)
+    below, above = values[denominator], _at_one_fraction(context, [numerator])
+    (top,) = above.scaled
+    size = abs(top.value) if isinstance(top.value, int) else values[top.value].magnitude
+    room = largest_wide(word) - below.magnitude
+    least = min(abs(below.low), abs(below.high)) / Fraction(2) ** below.fraction
+    inherited = (above.error + quantity.range.magnitude * below.error) / least
+    is_forced = quantity.name in context.plan.forced
+    fraction = context.plan.forced.get(quantity.name, finest(quantity.range.magnitude, word))
+    while True:
+        shift = fraction + below.fraction - above.fraction
+        value = integer_value(
+            context,
+            quantity,
+            IntegerOperation("divide", (Scaled(top.value, top.shift + shift), Scaled(denominator))),
+            fraction,
+            inherited + context.rounding_error / Fraction(2) ** fraction,
+            size << max(0, shift),
+        )
+        if value.magnitude <= context.largest(fraction) and shift >= 0 and size << shift <= room:
+            break
+        if is_forced or fraction < -word:
+            raise context.too_short(quantity.name)
+        fraction -= 1
+    context.add(value)
+
+
+def lower_root(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
+    """Lower a square root: as many places below the argument as a wide number has room for, an even number in all."""
+    radicand = str(operation.arguments[0])
+    argument, inside = context.values[radicand], context.quantities.items[radicand].range
+    shift = 2 * context.word - 3 - max(1, argument.high).bit_length()
+    shift -= (argument.fraction + shift) % 2
+    fraction = (argument.fraction + shift) // 2
+    lost = argument.error + (Fraction(2) ** -(2 * fraction) if shift < 0 else 0)
+    least = inside.lowest - lost
+    near_zero = Interval.of(0, lost).sqrt().highest
+    error = lost / (2 * Interval.of(least).sqrt().lowest) if least > 0 else near_zero
+    value = integer_value(
+        context,
+        quantity,
+        IntegerOperation("sqrt", (Scaled(radicand, shift),)),
+        fraction,
+        error + context.rounding_error / Fraction(2) ** fraction,
+        argument.high << shift if shift > 0 else argument.high,
+    )
+    value = replace(value, low=max(value.low, 0), high=min(value.high, 1 << (context.word - 1)))
+    if value.magnitude > context.largest(fraction):
+        raise context.too_short(quantity.name)
+    context.add(value)
+
+
+def lower_maximum(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
+    """Lower the largest of several quantities."""
+    operands = _at_one_fraction(context, operation.arguments)
+    _add(context, quantity, IntegerOperation("maximum", operands.scaled), operands.fraction, operands.error)
+
+
+def lower_selection(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
+    """Lower a selection; where a comparison is inexact, another case may be selected, and the error is the range."""
+    conditions = cases_of(operation.arguments)
+    outcomes = [*(outcome for _, _, outcome in conditions), operation.arguments[-1]]
+    values = _at_one_fraction(context, outcomes, lossless=False)
+    selected: list[Scaled] = []
+    error = values.error
+    for (left, right, _), value in zip(conditions, values.scaled, strict=False):
+        selected += [*_at_one_fraction(context, [left, right]).scaled, value]
+        if any(context.values[side].error for side in (left, right) if isinstance(side, str)):
+            error += quantity.range.highest - quantity.range.lowest
+    selection = IntegerOperation("select", (*selected, values.scaled[-1]))
+    _add(context, quantity, selection, values.fraction, error)
+
+
+def lower_computed(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
+    """Keep the computed value inside the range of the exact one, which brings it no farther from that."""
+    argument = str(operation.arguments[0])
+    name = word_of(context, argument)
+    value = context.values[name]
+    unit = Fraction(2) ** value.fraction
+    low, high = math.ceil(quantity.range.lowest * unit), math.floor(quantity.range.highest * unit)
+    if low > high:
+        raise context.too_short(argument)
+    cases: list[Scaled] = []
+    if value.high > high:
+        cases += [Scaled(name), Scaled(high), Scaled(high)]
+    if value.low < low:
+        cases += [Scaled(low), Scaled(name), Scaled(low)]
+    whole = IntegerSum((Term((name,), 1),))
+    clamped = IntegerOperation("select", (*cases, Scaled(name))) if cases else whole
+    inside = integer_value(context, quantity, clamped, value.fraction, Fraction(0), value.magnitude)
+    context.add(replace(inside, low=max(low, value.low), high=min(high, value.high)))
+
+
+def lower_nearest_integer(context: Quantization, quantity: Quantity, operation: ExactOperation) -> None:
+    """Round a multiple to an integer, halves up whatever the rounding of words is."""
+    argument, multiple = operation.arguments
+    name, exact = word_of(context, str(argument)), Fraction(multiple)
+    value = context.values[name]
+    factor = exact.numerator
+    shift = value.fraction + exact.denominator.bit_length() - 1
+    if shift < 1:
+        raise context.too_short(name)
+    half = 1 << (shift - 1)
+    terms = [Term((name,), factor)]
+    if context.settings.rounding != "nearest":
+        terms.append(Term((), half))
+    peak = value.magnitude * abs(factor) + half
+    integer = integer_value(context, quantity, IntegerSum(tuple(terms), shift), 0, Fraction(0), peak)
+    low, high = sorted((end * factor + half) >> shift for end in (value.low, value.high))
+    context.add(replace(integer, low=low, high=high))
+
+
+def _add(
+    context: Quantization, quantity: Quantity, definition: IntegerOperation, fraction: int, error: Fraction
+) -> None:
+    """Add a value that is one of its operands: a wide number if a word does not hold it."""
+    value = integer_value(context, quantity, definition, fraction, error, 0)
+    peak = value.magnitude
+    context.add(replace(value, wide=peak > context.largest(fraction), peak=peak))
+
+
+# Operands at one fraction
+
+
+@dataclass(frozen=True)
+class _Operands:
+    scaled: tuple[Scaled, ...]
+    fraction: int  # bits
+    error: Fraction  # the largest of all
+
+
+def _at_one_fraction(context: Quantization, operands: Sequence[Operand], lossless: bool = True) -> _Operands:
+    """Return operands as integers of one fraction: the finest of theirs, or if not `lossless` one with room for all."""
+    room = largest_wide(context.word)
+    fraction = max(_finest_fraction(context, operand) for operand in operands)
+    while not lossless and max(_size(context, operand, fraction) for operand in operands) > room:
+        fraction -= 1
+    scaled: list[Scaled] = []
+    error = Fraction(0)
+    for operand in operands:
+        if isinstance(operand, Fraction):
+            integer = nearest(operand * Fraction(2) ** fraction)
+            error = max(error, abs(integer / Fraction(2) ** fraction - operand))
+            scaled.append(Scaled(integer))
+        else:
+            value = context.values[operand]
+            lost = Fraction(2) ** -fraction if fraction < value.fraction else Fraction(0)
+            error = max(error, value.error + lost)
+            scaled.append(Scaled(operand, fraction - value.fraction))
+        if _size(context, operand, fraction) > room:
+            raise InputError(
+                f"{context.program.kernel}: words of {context.word} bits are too short to compare {operand}"
+            )
+    return _Operands(tuple(scaled), fraction, error)
+
+
+def _finest_fraction(context: Quantization, operand: Operand) -> int:
+    """Return the fraction bits at which an operand is exact; of a number without end, those of a word."""
+    if isinstance(operand, str):
+        return context.values[operand].fraction
+    return operand.denominator.bit_length() - 1 if is_dyadic(operand) else context.word
+
+
+def _size(context: Quantization, operand: Operand, fraction: int) -> int:
+    """Return the largest magnitude of an operand as an integer of so many fraction bits."""
+    if isinstance(operand, Fraction):
+        return abs(nearest(operand * Fraction(2) ** fraction))
+    value = context.values[operand]
+    return math.ceil(value.magnitude * Fraction(2) ** (fraction - value.fraction))
+
+
+#: Lowers each kind of operation to integers that stand for a quantity.
+LOWER: dict[str, Callable[[Quantization, Quantity, ExactOperation], None]] = {
+    "divide": lower_quotient,
+    "sqrt": lower_root,
+    "maximum": lower_maximum,
+    "select": lower_selection,
+    "computed": lower_computed,
+    "nearest": lower_nearest_integer,
+}
+
+
+# Coarser formats, with which products of a sum are added without shifts
+
+#: Bits below the last place of a sum down to which its products are computed.
+_BELOW = 8
+#: A coarser format may add a part of the rounding error of a value that it is multiplied into: so many bits less.
+_PART = 4
+#: Bits by which that is less where the sum's own rounding comes with the next call: other errors add up alone.
+_FED_BACK = 4
+
+
+def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Container[str]) -> dict[str, int]:
+    """Return, by name, the most fraction bits of values that are finer than the sums that use them can tell.
+
+    In `body` every value has its finest format; values in `fixed` keep theirs.
+    """
+    useful: dict[str, int] = {}
+    allowed: dict[str, int] = {}
+    for value in body:
+        for name, bits, most in _uses(value, values):
+            useful[name] = max(bits, useful.get(name, 0))
+            allowed[name] = min(most, allowed.get(name, most))
+    coarser: dict[str, int] = {}
+    for name in useful:
+        definition = values[name].definition
+        rounded = isinstance(definition, IntegerSum) and definition.shift and definition.residual is None
+        bits = min(useful[name], allowed[name])
+        if bits > 0 and rounded and name not in fixed:
+            coarser[name] = values[name].fraction - bits
+    return coarser
+
+
+def _uses(value: Value, values: Mapping[str, Value]) -> Iterator[tuple[str, int, int]]:
+    """Yield the operands of a value, each with the bits by which it should be coarser, and by which it may be."""
+    definition = value.definition
+    if not isinstance(definition, IntegerSum) or value.wide or not definition.shift:
+        # Every bit counts of what is compared, or added at full precision.
+        for name in used_by(value):
+            yield name, 0, 0
+        return
+    for term in definition.coarse:
+        for name in term.names:
+            yield name, 0, 0
+    place = value.fraction + definition.shift + definition.drop
+    lowest = value.fraction + _BELOW
+    goal = max(min((place - term.shift for term in definition.fine if term.names), default=place), lowest)
+    for term in definition.fine:
+        term_place = place - term.shift
+        for name in term.names:
+            others = [other for other in term.names if other != name]
+            is_square = len(others) < len(term.names) - 1
+            room = (
+                0 if is_square else _room(term, term_place, value, values[name], [values[o] for o in others])
+            )
+            finer = len(others) == 1 and values[others[0]].fraction > values[name].fraction
+            yield name, 0 if finer else max(0, term_place - goal), min(max(0, term_place - lowest), room)
+
+
+def _room(term: Term, place: int, value: Value, factor: Value, others: list[Value]) -> int:
+    """Return the bits by which a factor of a term may be coarser, so that the error of the sum hardly grows."""
+    # What an error of the factor is multiplied with, as an integer with fraction bits.
+    size, bits = abs(term.factor), place - factor.fraction
+    for other in others:
+        size, bits = other.magnitude, other.fraction
+    if not size:  # a product with what is always zero
+        return place
+    is_fed_back = isinstance(value.definition, IntegerSum) and value.definition.residual is not None
+    fraction = value.fraction + (_FED_BACK if is_fed_back else 0)
+    units = factor.fraction + bits - fraction - _PART
+    return max(0, ((1 << units) // size).bit_length() - 1) if units > 0 else 0

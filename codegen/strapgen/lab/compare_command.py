@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.lab.comparison_report import ComparedKernel
     from strapgen.run.backends import Backend
-    from strapgen.run.generation import Request
+    from strapgen.run.kernel_sources import Request
 
 RunDiffering = Annotated[
     bool,

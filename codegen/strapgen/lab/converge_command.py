@@ -40,7 +40,7 @@ _STEPS = tuple(Positive(f"1/{2**halvings}") for halvings in range(1, 8))
 
 
 @dataclass(frozen=True)
-class Ladder:
+class _Ladder:
     """Options of the motion, the ladder of steps and the duration of the runs."""
 
     panel: ClassVar[str] = "Input"
@@ -98,7 +98,7 @@ def converge(
     *,
     methods: Annotated[SeveralMethods, Shown(only=STEP_OPTIONS)],
     backend: SeveralBackends = ("exact",),
-    ladder: Ladder,
+    ladder: _Ladder,
     fail_beyond: Annotated[
         NotNegative | None,
         option(

@@ -142,7 +142,7 @@ class LadderCase:
     duration: str
 
     def moved(self, begin: Path, end: Path) -> LadderCase:
-        """Return the case with the file of its motion in another folder, see `clusters.Movable`."""
+        """Return the case with the file of its motion in another folder, see `parallel_cases.Bundle`."""
         return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
 
 

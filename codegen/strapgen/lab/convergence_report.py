@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,30 +11,25 @@ import numpy as np
 
 from strapgen.lab.convergence import Convergence, Rung, labels
 from strapgen.results import figures
-from strapgen.results.records import entry, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import ERROR, SECONDS, Column, TextTable
 
 if TYPE_CHECKING:
     from strapgen.lab.convergence import Convergence
 
+_LADDER_COLUMNS = (
+    Column("kernel", "<"),
+    Column("backend", "<"),
+    Column("step_s", spec=SECONDS),
+    Column("error_rad", spec=ERROR),
+    Column("slope", spec=".2f"),
+    Column("used"),
+    Column("observed_order", spec=".3f"),
+    Column("predicted_order"),
+    Column("label", "<"),
+)
 #: Algorithms side by side in a text.
 _MOST_COLUMNS = 4
-
-
-@dataclass(frozen=True)
-class LadderRow:
-    """One step of one algorithm in a table."""
-
-    kernel: str = field(metadata=entry("kernel", align="<"))
-    backend: str = field(metadata=entry("backend", align="<"))
-    step_s: float = field(metadata=entry("step_s", SECONDS))
-    error_rad: float | None = field(metadata=entry("error_rad", ERROR))
-    slope: float | None = field(metadata=entry("slope", ".2f"))
-    used: bool = field(metadata=entry("used"))
-    observed_order: float | None = field(metadata=entry("observed_order", ".3f"))
-    predicted_order: int | None = field(metadata=entry("predicted_order"))
-    label: str = field(metadata=entry("label", align="<"))
 
 
 @dataclass(frozen=True)
@@ -93,14 +88,14 @@ def _cell(rung: Rung) -> str:
 def ladder_table(*outcomes: Convergence) -> TextTable:
     """Return a table with a row for every step of every algorithm."""
     rows = [
-        LadderRow(
+        (
             *(one.kernel, one.backend, rung.step_s, rung.error_rad, rung.slope, rung.used),
             *(one.observed, one.predicted, name),
         )
         for name, one in zip(labels(outcomes), outcomes, strict=True)
         for rung in one.rungs
     ]
-    return reader_table(rows, LadderRow)
+    return TextTable(_LADDER_COLUMNS, rows)
 
 
 def convergence_image(result: ConvergenceResult, path: str | Path) -> bytes:

@@ -25,7 +25,7 @@ _A_COUNT = whole(1, 10**9)
 
 
 @dataclass(frozen=True)
-class RandomRunOptions:
+class _RandomRunOptions:
     """Options of the gyro, of the turn and of the runs."""
 
     panel: ClassVar[str] = "Run"
@@ -92,7 +92,7 @@ def study_monte_carlo(
     algorithm: StepAlgorithm,
     *,
     method: Annotated[MethodOptions, Shown(only=STEP_OPTIONS)],
-    run: RandomRunOptions,
+    run: _RandomRunOptions,
     workers: WorkerOptions,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:

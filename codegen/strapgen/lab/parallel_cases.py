@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, Any, Protocol, cast
+from typing import IO, Any
 
 from strapgen.ir.exceptions import InputError, MissingExtraError, StrapgenError
 from strapgen.run.processes import begin_worker
@@ -193,16 +193,12 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-class Movable(Protocol):
-    """A case that names files of the user's."""
-
-    def moved(self, begin: Path, end: Path) -> Any:
-        """Return the case with its files in the folder `end`, in place of the folder `begin`."""
-
-
 @dataclass(frozen=True)
 class Bundle:
-    """Files of the user's that cases name."""
+    """Files of the user's that cases name.
+
+    Such a case has a method ``moved(begin, end)``, which returns it with its files in another folder.
+    """
 
     #: The folder that holds them all
     folder: Path
@@ -357,9 +353,7 @@ def _remote(work: Callable[[Any], Any], case: Any, digest: str, files: Bundle | 
             "a worker has another version of strapgen; the same one is needed on all machines"
         )
     with _one_at_a_time:
-        return work(
-            case if files is None else cast("Movable", case).moved(files.folder, _placed(files.contents))
-        )
+        return work(case if files is None else case.moved(files.folder, _placed(files.contents)))
 
 
 def _placed(contents: Mapping[str, bytes]) -> Path:

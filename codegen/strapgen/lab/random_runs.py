@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +36,6 @@ _AXES = 3
 _HOUR = 3600
 
 
-class SteadyAlgorithm(Protocol):
-    """What runs: an attitude step, or another algorithm that takes some samples at a time; it has a hash."""
-
-    increments: int
-    previous: int
-    ahead: int
-
-    def runner(self) -> Any:
-        """Return what has `propagate` and `matrices` of a back end."""
-
-
 @dataclass(frozen=True)
 class Errors:
     """What a gyro adds to its increments, and the turn in which it does."""
@@ -63,7 +52,8 @@ class Errors:
 class SteadyRuns:
     """Some runs of an algorithm in a steady turn, with random errors of their own."""
 
-    #: An attitude step
+    #: A choice of an attitude step; or another algorithm, whose method `runner` returns what has `propagate` and
+    #: `matrices` of a back end
     algorithm: Any
     errors: Errors
     #: Steps of each run

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
-from strapgen.targets.c.number_text import numbers_of, types_of
-from strapgen.targets.lines import fill_arguments
+from strapgen.targets.c_numbers import numbers_of, types_of
+from strapgen.targets.printer import fill_arguments
 from strapgen.targets.rendering import render
 
 #: Accepted calls in each part of a run, and the most that are tried.

@@ -26,7 +26,7 @@ def _group() -> None:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class _Sweep:
     """Options with lists of values; a study runs every combination of them."""
 
     panel: ClassVar[str] = "Sweep"
@@ -88,7 +88,7 @@ class Sweep:
 def word_length(
     *,
     algorithm: StepName = "euler",
-    sweep: Sweep,
+    sweep: _Sweep,
     motion: Annotated[str, motion_option()] = "coning",
     settings: Annotated[
         dict[str, str] | None,

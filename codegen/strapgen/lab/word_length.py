@@ -77,7 +77,7 @@ class Case:
     __repr__ = short_repr
 
     def moved(self, begin: Path, end: Path) -> Case:
-        """Return the case with the file of a user's motion in another folder, see `clusters.Movable`."""
+        """Return the case with the file of a user's motion in another folder, see `parallel_cases.Bundle`."""
         return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
 
     @property
@@ -297,20 +297,9 @@ def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float
 
 
 def expected_noise(case: Case, pulse: float, increments: Any) -> float:
-    """Return the root mean square of the angle that pulses cause in a run, if their errors are independent.
+    """Return the root mean square of the angle in deg that pulses cause in a run, if their errors are independent.
 
-    Parameters
-    ----------
-    case : Case
-    pulse : float
-        Angle of a pulse in rad.
-    increments : array, (N, K, 3)
-        Exact increments of the run in rad.
-
-    Returns
-    -------
-    float
-        In degrees, at the end of the run.
+    `pulse`: angle in rad. `increments` (N, K, 3): exact increments of the run in rad.
     """
     noise = noise_of(case.algorithm, case.method, case.increments)
     turned = np.square(increments.sum(axis=1)).sum()

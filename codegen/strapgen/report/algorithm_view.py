@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.cli.generated_result import GeneratedSources, GenerateResult
-from strapgen.design.frontier.frontier import Standing
-from strapgen.design.frontier.frontier_report import FrontierResult
+from strapgen.design.frontier import FrontierResult, Standing
 from strapgen.evidence.collection import Subject
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.ir import checks
@@ -36,12 +35,13 @@ TARGET_TITLES = {
     "c-fixed": "C in fixed point",
 }
 
-#: What makes every command print its data.
-_JSON = "--format json"
+#: The "command" that prints a result, and its plain JSON "data". The lists of files that `generate` writes are empty,
+#: since nothing is written.
+CommandResult = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class SignalRow:
+class _SignalRow:
     """A row of the table of inputs and outputs."""
 
     #: "in" or "out"
@@ -59,16 +59,6 @@ class SignalRow:
 
 
 @dataclass(frozen=True)
-class CodeFile:
-    """A file of code."""
-
-    name: str
-    text: str
-    #: "python" or "c", which the page colours
-    language: str
-
-
-@dataclass(frozen=True)
 class AlgorithmView:
     """What the page shows of one algorithm."""
 
@@ -79,14 +69,14 @@ class AlgorithmView:
     operations: str
     order: str
     notes: tuple[str, ...]
-    signals: tuple[SignalRow, ...]
+    signals: tuple[_SignalRow, ...]
     formulas: tuple[FormulaRow, ...]
     #: Name, format, range and error bound of every value on the way in fixed point
     values: tuple[tuple[str, str, str, str], ...]
     #: Why there is no fixed point
     no_fixed: str
-    #: By the title of the target
-    code: dict[str, tuple[CodeFile, ...]]
+    #: By the title of the target, for each file its name, text, and language, "python" or "c", which the page colours
+    code: dict[str, list[dict[str, str]]]
     #: A result by claim; empty where the tools have not run on this very code
     evidence: dict[str, str]
     #: What back ends say that do not hold the run
@@ -113,7 +103,7 @@ def view(known: AlgorithmDossier, evidence: EvidencePage | None) -> AlgorithmVie
     )
 
 
-def _signals(known: AlgorithmDossier) -> Iterable[SignalRow]:
+def _signals(known: AlgorithmDossier) -> Iterable[_SignalRow]:
     arguments = (
         {}
         if known.fixed is None
@@ -130,7 +120,7 @@ def _signals(known: AlgorithmDossier) -> Iterable[SignalRow]:
             )
             fixed = {"format": str(argument.format), "range": f"{below(low)} to {above(high)}"}
             fixed["bound"] = "" if direction == "in" else above(bound, 4) if bound else "exact"
-        yield SignalRow(
+        yield _SignalRow(
             direction,
             signal.name,
             " × ".join(map(str, signal.shape)) or "scalar",
@@ -157,10 +147,11 @@ def _values(fixed: FixedProgram) -> Iterable[tuple[str, str, str, str]]:
         yield value.name, str(formats[value.name]), f"{below(low)} to {above(high)}", error
 
 
-def _files(files: dict[str, str]) -> tuple[CodeFile, ...]:
-    return tuple(
-        CodeFile(name, text, "python" if name.endswith(".py") else "c") for name, text in files.items()
-    )
+def _files(files: dict[str, str]) -> list[dict[str, str]]:
+    return [
+        {"name": name, "text": text, "language": "python" if name.endswith(".py") else "c"}
+        for name, text in files.items()
+    ]
 
 
 def _evidence(known: AlgorithmDossier, fixed: FixedProgram, evidence: EvidencePage) -> dict[str, str]:
@@ -171,18 +162,8 @@ def _evidence(known: AlgorithmDossier, fixed: FixedProgram, evidence: EvidencePa
     return evidence.results.get(subject.name, {})
 
 
-@dataclass(frozen=True)
-class CommandResult:
-    """What a command prints as JSON."""
-
-    #: The command line
-    command: str
-    #: Plain JSON data. The lists of files that `generate` writes are empty, since nothing is written
-    data: Any
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the result as plain JSON data."""
-        return {"command": self.command, "data": self.data}
+def _result(command: str, data: Any) -> CommandResult:
+    return {"command": f"{command} --format json", "data": data}
 
 
 def arguments(known: AlgorithmDossier) -> str:
@@ -194,12 +175,12 @@ def arguments(known: AlgorithmDossier) -> str:
 def of_algorithm(known: AlgorithmDossier, conditions: Conditions) -> dict[str, CommandResult]:
     """Return the results of one algorithm by the names of the commands; `generate` is that of fixed point."""
     formulas = KernelResult.of(known.kernel, known.program, "operations")
-    derive = f"strapgen derive {arguments(known)} --show operations {_JSON}"
-    results = {"derive": CommandResult(derive, formulas.data())}
+    derive = f"strapgen derive {arguments(known)} --show operations"
+    results = {"derive": _result(derive, formulas.data())}
     if known.fixed is not None:
-        command = f"{contract.command(known.fixed, 'c-fixed')} {_JSON}"
+        command = contract.command(known.fixed, "c-fixed")
         generated = GeneratedSources.of(known.choice, known.sources["c-fixed"], "c-fixed", ())
-        results["generate"] = CommandResult(command, GenerateResult([generated]).data())
+        results["generate"] = _result(command, GenerateResult([generated]).data())
     if known.runs is not None:
         results |= _of_runs(known, known.runs, conditions)
     return results
@@ -209,23 +190,21 @@ def _of_runs(known: AlgorithmDossier, runs: StepRuns, conditions: Conditions) ->
     """Return the results of the runs of a step."""
     step, schedule = arguments(known), runs.schedule
     where = f"{conditions.options} {schedule.options}"
-    simulate = f"strapgen simulate {step} {where} --record {schedule.record} {_JSON}"
+    simulate = f"strapgen simulate {step} {where} --record {schedule.record}"
     facts = step_facts(runs.backend, known.choice) | {
         "motion": runs.profile.name,
         "step_s": float(schedule.step),
         "duration_s": float(schedule.duration),
     }
-    results = {"simulate": CommandResult(simulate, RunResult(facts, runs.run).data())}
+    results = {"simulate": _result(simulate, RunResult(facts, runs.run).data())}
     if runs.comparison:
         names = ",".join(row.backend for row in runs.comparison)
         rounding = _rounding(runs.settings) if any("fixed" in row.backend for row in runs.comparison) else ""
-        compare = (
-            f"strapgen compare {step} --backend {names} --reference {REFERENCE} {where}{rounding} {_JSON}"
-        )
+        compare = f"strapgen compare {step} --backend {names} --reference {REFERENCE} {where}{rounding}"
         compared = ComparedKernel(known.choice.kernel, "", runs.comparison)
-        results["compare"] = CommandResult(compare, ComparisonResult([compared], REFERENCE, "").data())
+        results["compare"] = _result(compare, ComparisonResult([compared], REFERENCE, "").data())
     ladder = ConvergenceResult([runs.ladder], "").data()
-    results["converge"] = CommandResult(f"strapgen converge {step} {_JSON}", ladder)
+    results["converge"] = _result(f"strapgen converge {step}", ladder)
     return results
 
 
@@ -240,8 +219,8 @@ def _rounding(settings: Settings) -> str:
 
 def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> CommandResult:
     """Return the tables of the thesis as the result of `tables`."""
-    command = f"strapgen tables --backend {','.join(backends)} {_JSON}"
-    return CommandResult(command, ThesisTablesResult([*entries]).data())
+    command = f"strapgen tables --backend {','.join(backends)}"
+    return _result(command, ThesisTablesResult([*entries]).data())
 
 
 def of_frontier(
@@ -250,6 +229,6 @@ def of_frontier(
     """Return what algorithms cost and how they drift as the result of `frontier`."""
     words = f"--sample-hz {conditions.sample_hz} --duration {conditions.duration}"
     names = shlex.quote(",".join(methods))
-    command = f"strapgen frontier --method {names} {conditions.options} {words} {_JSON}"
+    command = f"strapgen frontier --method {names} {conditions.options} {words}"
     hertz, seconds = (float(checks.number("", text)) for text in (conditions.sample_hz, conditions.duration))
-    return CommandResult(command, FrontierResult(standings, hertz, seconds, motions(conditions)).data())
+    return _result(command, FrontierResult(standings, hertz, seconds, motions(conditions)).data())

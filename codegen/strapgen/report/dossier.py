@@ -6,14 +6,15 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import pipeline
 from strapgen.catalogue import ALGORITHMS, Choice
-from strapgen.design.frontier import frontier
-from strapgen.design.frontier.frontier import Candidate, Standing
+from strapgen.design import frontier
+from strapgen.design.frontier import Candidate, Standing
 from strapgen.fixedpoint import can_lower
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -311,25 +312,17 @@ def tables(choices: Iterable[Choice], backends: tuple[str, ...]) -> list[TableEn
     return [*thesis_tables.run_tables(backends)]
 
 
-@dataclass(frozen=True)
-class DossierCase:
-    """What a process needs for the dossier of an algorithm: the parameters of `dossier`."""
-
-    choice: Choice
-    conditions: Conditions
-    settings: Settings | None
-    backends: tuple[str, ...]
-
-
-def dossiers(cases: Sequence[DossierCase], jobs: int | None = None) -> Iterator[AlgorithmDossier]:
-    """Yield the dossiers of algorithms, in the order in which they come."""
+def dossiers(
+    cases: Sequence[tuple[Choice, Conditions, Settings | None, Sequence[str]]], jobs: int | None = None
+) -> Iterator[AlgorithmDossier]:
+    """Yield the dossiers of algorithms, whose cases are the parameters of `dossier`, as they are ready."""
     numbered = {str(place): case for place, case in enumerate(cases)}
     for _, known in side_by_side(_gathered, numbered, jobs):
         yield known
 
 
-def _gathered(case: DossierCase) -> AlgorithmDossier:
-    return dossier(case.choice, case.conditions, case.settings, case.backends)
+def _gathered(case: tuple[Any, ...]) -> AlgorithmDossier:
+    return dossier(*case)
 
 
 def standings(

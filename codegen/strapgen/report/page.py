@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.design.frontier.frontier import Standing, pareto
+from strapgen.design.frontier import Standing, pareto
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.report.algorithm_view import (
     AlgorithmView,
@@ -105,7 +105,7 @@ def _finite(data: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class PageCell:
+class _PageCell:
     """A cell of a table."""
 
     text: str
@@ -117,18 +117,6 @@ class PageCell:
     mark: str = ""
     #: Text in a smaller type below
     small: str = ""
-
-
-@dataclass(frozen=True)
-class ThesisTable:
-    """A table of the thesis, as the page shows it."""
-
-    number: int
-    title: str
-    caption: str
-    #: Algorithm, what it ran on, and a cell for each order
-    rows: tuple[tuple[str, str, tuple[PageCell, ...]], ...]
-    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -170,10 +158,7 @@ class Content:
     def data(self) -> dict[str, Any]:
         """Return what the page embeds: the results as plain JSON data, and what charts show beside them."""
         return {
-            "results": {
-                kernel: {name: result.as_dict() for name, result in several.items()}
-                for kernel, several in self.results.items()
-            },
+            "results": self.results,
             "motion": self.conditions.motion,
             "front": self.front,
             "chosen": self.chosen,
@@ -203,16 +188,16 @@ class Content:
         """The algorithms that ran."""
         return [known for known in self.algorithms if known.runs is not None]
 
-    def step_rows(self) -> list[list[PageCell]]:
+    def step_rows(self) -> list[list[_PageCell]]:
         """Return the overview of the steps: a row for each."""
         return [self._step_row(known) for known in self.steps]
 
-    def _step_row(self, known: AlgorithmDossier) -> list[PageCell]:
+    def _step_row(self, known: AlgorithmDossier) -> list[_PageCell]:
         assert known.runs is not None, "a step ran"
         data = self.results[known.choice.kernel]
-        run, ladder = data["simulate"].data, data["converge"].data[0]
+        run, ladder = data["simulate"]["data"], data["converge"]["data"][0]
         drift = float(np.linalg.norm(run["drift_deg"], axis=1).max())
-        rows = {row["backend"]: row for row in data["compare"].data} if "compare" in data else {}
+        rows = {row["backend"]: row for row in data["compare"]["data"]} if "compare" in data else {}
         return [
             *_costs(known),
             _figure(ladder["predicted_order"]),
@@ -221,40 +206,40 @@ class Content:
             *(_figure(rows.get(name, {}).get("max_abs_rad")) for name in self.backends),
         ]
 
-    def kernel_rows(self) -> list[list[PageCell]]:
+    def kernel_rows(self) -> list[list[_PageCell]]:
         """Return the overview of all kernels: a row for each."""
         return [
             [
                 *_costs(known),
                 self._bound(known),
                 _evidence_cell(shown.evidence),
-                PageCell(known.kernel.title, known.kernel.title),
+                _PageCell(known.kernel.title, known.kernel.title),
             ]
             for known, shown in zip(self.algorithms, self.views, strict=True)
         ]
 
-    def _bound(self, known: AlgorithmDossier) -> PageCell:
+    def _bound(self, known: AlgorithmDossier) -> _PageCell:
         """Return the error bound of the worst output in fixed point."""
         if "generate" not in (results := self.results[known.choice.kernel]):
-            return PageCell("no fixed point", None, mark="note")
-        return _figure(max(results["generate"].data["error_bound"].values()))
+            return _PageCell("no fixed point", None, mark="note")
+        return _figure(max(results["generate"]["data"]["error_bound"].values()))
 
-    def frontier_rows(self) -> list[list[PageCell]]:
+    def frontier_rows(self) -> list[list[_PageCell]]:
         """Return the algorithms that are compared by cost and drift: a row for each."""
         if not self.standings:
             return []
         rows = []
-        algorithms = self.results[""][_FRONTIER].data["algorithms"]
+        algorithms = self.results[""][_FRONTIER]["data"]["algorithms"]
         for one in sorted(algorithms, key=lambda one: one["multiply_per_sample"]):
             name, kernels = one["algorithm"], self.chosen.get(one["algorithm"], [])
             front = name in self.front
             rows.append(
                 [
-                    PageCell(name, name, f"#{kernels[0]}" if kernels else "", "good" if front else ""),
-                    PageCell("●" if front else "", 0 if front else 1),
+                    _PageCell(name, name, f"#{kernels[0]}" if kernels else "", "good" if front else ""),
+                    _PageCell("●" if front else "", 0 if front else 1),
                     *(_figure(one[f"{kind}_per_sample"], ".4g") for kind in ("multiply", "add", "other")),
                     _figure(one["drift_deg_h"][self.conditions.motion]),
-                    PageCell(one["title"], one["title"], small=self._rest(one["source"])),
+                    _PageCell(one["title"], one["title"], small=self._rest(one["source"])),
                 ]
             )
         return rows
@@ -269,8 +254,8 @@ class Content:
         first, *others = [one.source.split(_SOURCES) for one in self.standings] or [[]]
         return [part for part in first if all(part in parts for parts in others)] if others else []
 
-    def thesis_tables(self) -> list[ThesisTable]:
-        """Return the tables of the thesis."""
+    def thesis_tables(self) -> list[dict[str, Any]]:
+        """Return the tables of the thesis with their captions and notes."""
         by_number: dict[int, list[TableEntry]] = {}
         for entry in self.tables:
             by_number.setdefault(entry.table, []).append(entry)
@@ -297,7 +282,7 @@ class Content:
             facts.append(("algorithms compared", str(len(self.standings)), f"{len(self.front)} on the front"))
         return facts
 
-    def claim_rows(self) -> list[list[PageCell]]:
+    def claim_rows(self) -> list[list[_PageCell]]:
         """Return what tools said by claim: of each how many kernels have it, by the kind of result."""
         kinds = ("proved", "agrees", "fails", "not examined", "not installed")
         claims = dict.fromkeys(claim for shown in self.views for claim in shown.evidence)
@@ -307,45 +292,48 @@ class Content:
                 shown.evidence[claim].partition(",")[0] for shown in self.views if claim in shown.evidence
             ]
             counts = [results.count(kind) for kind in kinds]
-            rows.append([PageCell(claim, claim), *(PageCell(str(count or "–"), count) for count in counts)])
+            rows.append([_PageCell(claim, claim), *(_PageCell(str(count or "–"), count) for count in counts)])
         return rows
 
 
-def _costs(known: AlgorithmDossier) -> list[PageCell]:
+def _costs(known: AlgorithmDossier) -> list[_PageCell]:
     """Return the name of a kernel and the operations of its program."""
     count = known.program.operations
     others = sum(n for kind, n in count.items() if kind not in ("multiply", "add", "negate"))
     name = known.choice.kernel
     return [
-        PageCell(name, name, f"#{name}"),
-        *(PageCell(str(number), number) for number in (count["multiply"], count["add"], others)),
+        _PageCell(name, name, f"#{name}"),
+        *(_PageCell(str(number), number) for number in (count["multiply"], count["add"], others)),
     ]
 
 
-def _figure(value: float | None, spec: str = _FIGURE) -> PageCell:
+def _figure(value: float | None, spec: str = _FIGURE) -> _PageCell:
     """Return a number as a cell; a dash for none."""
-    return PageCell("–") if value is None else PageCell(format(value, spec), value)
+    return _PageCell("–") if value is None else _PageCell(format(value, spec), value)
 
 
-def _evidence_cell(evidence: Mapping[str, str]) -> PageCell:
+def _evidence_cell(evidence: Mapping[str, str]) -> _PageCell:
     """Return how many claims tools have proved, and how many agree with what ran."""
     if not evidence:
-        return PageCell("none on this code", None, mark="note")
+        return _PageCell("none on this code", None, mark="note")
     proved, agrees = (
         sum(result.startswith(kind) for result in evidence.values()) for kind in ("proved", "agrees")
     )
     rest = len(evidence) - proved - agrees
     text = f"{proved} proved, {agrees} agree" + (f", {rest} open" if rest else "")
-    return PageCell(text, proved + agrees)
+    return _PageCell(text, proved + agrees)
 
 
-def _thesis_table(table: Table, entries: Iterable[TableEntry]) -> ThesisTable:
-    """Return a table with the figures of the thesis above those of every back end."""
+def _thesis_table(table: Table, entries: Iterable[TableEntry]) -> dict[str, Any]:
+    """Return a table with the figures of the thesis above those of every back end.
+
+    A row has the algorithm, what it ran on, and a cell for each order.
+    """
     by_place = {(entry.algorithm, entry.backend, entry.order): entry for entry in entries}
     backends = dict.fromkeys(entry.backend for entry in by_place.values())
     rows = []
     for algorithm in ALGORITHMS:
-        printed = tuple(PageCell(text, mark="note") for text in table.printed[algorithm])
+        printed = tuple(_PageCell(text, mark="note") for text in table.printed[algorithm])
         rows.append((NAMES[algorithm], "thesis", printed))
         for name in backends:
             cells = tuple(_entry_cell(by_place[algorithm, name, order]) for order in ORDERS)
@@ -355,12 +343,16 @@ def _thesis_table(table: Table, entries: Iterable[TableEntry]) -> ThesisTable:
     notes = dict.fromkeys(entry.note for entry in by_place.values() if entry.note)
     first = [note for note in notes if note is not None][:1]
     repairs = " ".join(line.strip() for line in repair_notes(table))
-    return ThesisTable(
-        table.number, table.title, caption, tuple(rows), tuple(filter(None, [*first, repairs]))
-    )
+    return {
+        "number": table.number,
+        "title": table.title,
+        "caption": caption,
+        "rows": rows,
+        "notes": [*filter(None, [*first, repairs])],
+    }
 
 
-def _entry_cell(entry: TableEntry) -> PageCell:
+def _entry_cell(entry: TableEntry) -> _PageCell:
     """Return a simulated figure, marked by whether it is that of the thesis."""
     mark = "note" if entry.roundoff_dominates else "good" if entry.agrees else "bad"
-    return PageCell(f"{entry.normalised:.4g}", entry.normalised, mark=mark, small=f"{entry.drift_deg:.4g}°")
+    return _PageCell(f"{entry.normalised:.4g}", entry.normalised, mark=mark, small=f"{entry.drift_deg:.4g}°")

@@ -43,7 +43,7 @@ _MOST_NAMES = 3
 
 
 @dataclass(frozen=True)
-class ReportRuns:
+class _ReportRuns:
     """Options of the runs that a page shows."""
 
     panel: ClassVar[str] = "Input"
@@ -71,7 +71,7 @@ class ReportRuns:
 
 
 @dataclass(frozen=True)
-class ReportOutput(Output):
+class _ReportOutput(Output):
     """Where the page goes."""
 
     out: Annotated[Path, option("--out", metavar="FILE", help="File of the page; - is the terminal.")] = Path(
@@ -111,9 +111,9 @@ def report(
             panel="Algorithm",
         ),
     ] = ("all",),
-    runs: ReportRuns,
+    runs: _ReportRuns,
     fixed: Annotated[FixedOptions, Shown(only=_FIXED)],
-    output: Annotated[ReportOutput, Shown(only=("out",))],
+    output: Annotated[_ReportOutput, Shown(only=("out",))],
 ) -> None:
     """Write one HTML file with formulas, code, bounds, runs and evidence.
 
@@ -146,19 +146,16 @@ def _page(
 ) -> str:
     """Run all that a page shows, and return it."""
     from strapgen import catalogue
-    from strapgen.design.frontier import frontier
+    from strapgen.design import frontier
     from strapgen.report import dossier
     from strapgen.report.page import Content, report_page
-    from strapgen.run.versions import versions
+    from strapgen.run.compiler import versions
     from strapgen.storage import cache
 
     shown = choices or catalogue.standard()
     if fixed.max_rate_deg_s is not None or fixed.lsb is not None:
         fixed = replace(fixed, sample_hz=Positive(conditions.sample_hz))
-    cases = [
-        dossier.DossierCase(choice, conditions, fixed.settings(choice.increments_per_step), places)
-        for choice in shown
-    ]
+    cases = [(choice, conditions, fixed.settings(choice.increments_per_step), places) for choice in shown]
     several = dossier.compared(shown, beside)
     frontier.require_steps(several, conditions.sample_hz, conditions.duration)  # before what takes long
     known = [*track(dossier.dossiers(cases), "gathering", len(cases))]

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
+from strapgen import registration, targets
+from strapgen.ir.exceptions import InputError
+from strapgen.registry import Registry
 from strapgen.targets import TARGETS
+
+if TYPE_CHECKING:
+    from strapgen.ir.sources import Sources
+    from strapgen.run.evaluators import Evaluator
 
 
 class Entry(NamedTuple):
@@ -43,10 +51,10 @@ class Entry(NamedTuple):
         return target is not None and target.fixed
 
 
-_C = f"{__package__}.c:CEvaluator"
+_C = f"{__package__}.compiled_code:CEvaluator"
 
-#: Back ends by name.
-BACKENDS = {
+#: The back ends of strapgen by name.
+BUILT_IN = {
     "numpy": Entry(
         "generated numpy code in double",
         "numpy",
@@ -83,7 +91,7 @@ BACKENDS = {
     "fixed-model": Entry(
         "integer model of the fixed-point C in Python, any word",
         "fixed-model",
-        f"{__package__}.fixed:ModelEvaluator",
+        f"{__package__}.compiled_code:ModelEvaluator",
         slow=True,
     ),
     "exact": Entry(
@@ -94,3 +102,45 @@ BACKENDS = {
         many_digits=True,
     ),
 }
+
+
+#: Other names of back ends, which every command takes too.
+ALIASES = {"c-q31": "c-fixed32", "c-q15": "c-fixed16"}
+
+
+class _Backends(Registry[Entry]):
+    """Back ends by name; one can be looked up by its other name, too."""
+
+    def __getitem__(self, name: str) -> Entry:
+        return super().__getitem__(ALIASES.get(name, name))
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(ALIASES.get(str(name), name))
+
+
+#: Back ends by name.
+BACKENDS = _Backends("backends", Entry)
+
+#: Back ends on which an experiment runs by default.
+DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.own.items() if entry.by_default and not entry.slow)
+
+
+def _of_target(target: str) -> Entry:
+    for entry in BACKENDS.values():
+        if entry.target == target:
+            return entry
+    runnable = ", ".join(
+        dict.fromkeys(e.target for e in BACKENDS.own.values() if e.target in targets.BUILT_IN)
+    )
+    raise InputError(f"no back end runs code for target {target}; those for these targets run: {runnable}")
+
+
+def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
+    """Return the class that runs a kernel for a target."""
+    loaded: Callable[[Sources], Evaluator] = registration.load(_of_target(target).evaluator)
+    return loaded
+
+
+def of_sources(sources: Sources) -> Evaluator:
+    """Return any kernel as a callable from its sources."""
+    return evaluator_class(sources.target)(sources)

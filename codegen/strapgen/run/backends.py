@@ -20,11 +20,10 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
 from strapgen.ir.sources import Sources
-from strapgen.run.backend_names import Entry
+from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
 from strapgen.run.increments import PART, run_parts
 from strapgen.run.kernel_sources import StepSources, sources_of_choice
-from strapgen.run.registry import BACKENDS, DEFAULT_BACKENDS, of_sources
 from strapgen.targets.registry import NUMPY
 
 __all__ = [

@@ -20,8 +20,10 @@ import sys
 import sysconfig
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -29,6 +31,7 @@ from typing import Any
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.sources import Sources
 from strapgen.ir.timing import timed
+from strapgen.ir.version import VERSION
 from strapgen.storage import cache
 from strapgen.targets import TARGETS
 
@@ -351,3 +354,27 @@ def declarations(header: str) -> str:
     text = re.sub(r"^#(?:.*\\\n)*.*$", "", header, flags=re.MULTILINE).replace('extern "C" {', "")
     head, _, tail = text.rpartition("}")
     return head + tail
+
+
+_MISSING = "is not installed"
+_SHAPES_OUTPUT = ("sympy", "numpy", "jinja2", "cffi", "typer", "rich")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of strapgen, Python, the packages that shape the output, and the C compiler, by name."""
+    known = {"strapgen": VERSION, "python": platform.python_version()}
+    for name in _SHAPES_OUTPUT:
+        known[name] = _MISSING
+        with suppress(PackageNotFoundError):
+            known[name] = version(name)
+    return known | {"C compiler": _compiler()}
+
+
+def _compiler() -> str:
+    """Return what the compiler says of itself."""
+    try:
+        path = C.path()
+    except CompilerError:
+        return _MISSING
+    said = subprocess.run([path, "--version"], capture_output=True, text=True, check=False).stdout
+    return said.splitlines()[0] if said else path

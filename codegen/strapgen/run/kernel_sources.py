@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
@@ -13,6 +14,7 @@ from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.targets import TARGETS
+from strapgen.targets.names import UNNAMED, Naming
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,3 +115,12 @@ class StepSources:
                 except InputError as error:  # raised only where the kernel is used, as without a copy
                     beside[kernel, target] = str(error)
         return replace(self, choice=None, beside=beside)
+
+
+class Request(NamedTuple):
+    """What one call of ``strapgen generate`` generates: the arguments of `pipeline.compile`."""
+
+    choice: Choice
+    target: str
+    settings: Settings | None = None
+    naming: Naming = UNNAMED

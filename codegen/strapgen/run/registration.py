@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from strapgen.registration import Registration
 
-REGISTRATION = Registration("running generated code", backends=(f"{__package__}.backend_names:BACKENDS",))
+REGISTRATION = Registration("running generated code", backends=(f"{__package__}.backend_names:BUILT_IN",))

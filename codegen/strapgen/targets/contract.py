@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable
+from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 
 from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.formats import Format, above, below, places_above
 from strapgen.ir.integer_program import FixedProgram, Value
-from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface, RoundingAccumulation
+from strapgen.ir.interfaces import (
+    LARGEST_ERROR,
+    AngleAccumulation,
+    Argument,
+    Condition,
+    ErrorFeedback,
+    Interface,
+    RoundingAccumulation,
+    RoundingBounds,
+)
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.ir.units import Sensor
@@ -188,3 +201,174 @@ def exact_text(value: Fraction) -> str:
     """Return an exact number as a fraction if that is short, otherwise with 17 digits."""
     text = str(value)
     return text if len(text) <= 24 else f"{float(value):.17g}"
+
+
+#: Bounds are written with four digits.
+_above, _below = partial(above, digits=4), partial(below, digits=4)
+#: Steps from one normalization to the next in the examples, unless fewer are proved.
+_APART = 1000
+#: Units of the last place by which an element of an orthonormalization is off in the examples.
+_UNITS = 4
+
+
+def run_paragraphs(interface: Interface, program: Program) -> list[str]:
+    """Return the bound of a run of N steps in words, and for some N; empty for a kernel that is no step."""
+    angles = interface.angle_accumulation
+    if angles is not None:
+        is_matrix = len(program.inputs[0].shape) == 2
+        words = _matrix_words(angles) if is_matrix else _parameter_words(angles)
+        return [*words, *_table(interface, angles)]
+    if interface.accumulation is not None:
+        return [
+            "Over a run of N steps without orthonormalization the distance from exact arithmetic on the same "
+            f"increments is at most {accumulation_text(interface.accumulation, program, interface.settings.state)}."
+        ]
+    return []
+
+
+def _parameter_words(angles: AngleAccumulation) -> list[str]:
+    """Return the bound of a run of a vector of parameters in words."""
+    return [
+        f"Attitude error by rounding after N steps: at most {_formula(angles)} rad against exact arithmetic on the "
+        f"same increments, while the length of the state is at least {_above(angles.shortest)}. From a length of at "
+        f"least {_above(angles.start)} that is proved for {angles.proved_steps:,} steps. M normalizations in between, "
+        "which multiply the words of the state by one factor and round each of them once, add at most "
+        f"{_above(angles.per_normalization)} M rad.",
+    ]
+
+
+def _matrix_words(angles: AngleAccumulation) -> list[str]:
+    """Return the bound of a run of a matrix in words."""
+    inner, outer = angles.start**2, angles.shortest**2
+    words = [
+        "Error by rounding of the nearest rotation to the matrix C after N steps: at most "
+        f"{_formula(angles)} rad against exact arithmetic on the same increments, for N up to "
+        f"{angles.proved_steps:,} from a C whose C'C has eigenvalues from {_above(inner)} to {_below(2 - inner)}; over "
+        f"more steps {_above(angles.beyond)} times as much, while they stay between {_above(outer)} and "
+        f"{_below(2 - outer)}.",
+    ]
+    if angles.per_element is not None:
+        fixed = f"{_above(angles.per_normalization)} + " if angles.per_normalization else ""
+        words.append(
+            "M orthonormalizations in between, at most as many steps apart, which multiply C by a symmetric expansion "
+            f"of the inverse root of C'C, make {_above(angles.orthonormalized)} times as much of it and add at most "
+            f"({fixed}{_above(angles.per_element)} h) M rad, with h the error of an element that their header states, "
+            f"up to {_below(LARGEST_ERROR)}."
+        )
+    if angles.dual_rows_apart:
+        words.append(
+            f"With dual rows, as dcm_orthonormalize has them, at most {angles.dual_rows_apart} steps apart, h up to "
+            f"{_below(angles.dual_rows_error)}, from a C'C with eigenvalues within {_below(angles.dual_rows_start)} "
+            f"of 1, all that is exp({_above(angles.dual_rows_growth)} M) times as much."
+        )
+    return words
+
+
+def _formula(angles: AngleAccumulation) -> str:
+    once = f"{_above(angles.once)} + " if angles.once else ""
+    return f"{once}{_above(angles.per_step)} N"
+
+
+def _table(interface: Interface, angles: AngleAccumulation) -> list[str]:
+    """Return the bounds of some runs, a line each."""
+    apart = min(_APART, interface.normalized_within)
+    is_restored = angles.per_element is not None and apart > 0
+    error = _UNITS * interface.inputs[0].format.unit if angles.per_element else Fraction(0)
+    to_first_order = f"orthonormalized to first order (h = {_UNITS} ulp)"
+    kind = to_first_order if angles.per_element else "normalized"
+    lines = []
+    for steps, what in _runs(interface.settings.stated):
+        line = f"- N = {steps}{what}: {_angle(angles.bound(steps))}"
+        if is_restored:
+            line += f"; {kind} every {apart} steps: {_angle(angles.bound(steps, steps // apart, error))}"
+        lines.append(line)
+    return lines
+
+
+def _runs(stated: str) -> list[tuple[int, str]]:
+    """Return numbers of steps for the examples; an hour where the step is stated."""
+    runs = [(10**4, ""), (10**6, "")]
+    step = re.search(r"--step (\S+)", stated)
+    if step is not None:
+        runs.append((int(3600 / Fraction(step[1])), ", an hour"))
+    return sorted(runs)
+
+
+def _angle(value: float) -> str:
+    """Return a bound of an angle, unless it says nothing."""
+    return f"{_above(Fraction(value))} rad" if value < math.pi else "no bound"
+
+
+def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
+    """Return the bounds of a program with the names that are printed."""
+    # A value on the way may have the name of an input or of an output.
+    inputs = _renamed([s.name for s in program.inputs], [s.name for s in named.inputs])
+    values = _renamed([a.name for a in program.body], [a.name for a in named.body])
+    outputs = _renamed([r.signal.name for r in program.outputs], [r.signal.name for r in named.outputs])
+
+    def renamed(condition: Condition, names: dict[str, str]) -> Condition:
+        words, space, name = condition.value.rpartition(" ")
+        return replace(condition, value=words + space + names[name])
+
+    return replace(
+        bounds,
+        inputs=tuple(renamed(condition, inputs) for condition in bounds.inputs),
+        conditions=tuple(renamed(c, outputs | inputs | values) for c in bounds.conditions),
+        errors={outputs[name]: errors for name, errors in bounds.errors.items()},
+    )
+
+
+def _renamed(names: list[str], printed: list[str]) -> dict[str, str]:
+    return dict(zip(names, printed, strict=True))
+
+
+def rounding_text(
+    bounds: RoundingBounds,
+    program: Program,
+    flag: str = "-ffp-contract=off",
+    library: str = "the C library",
+) -> str:
+    """Return the error bounds of a call and of a run, with their conditions, as sentences without the last full stop.
+
+    `flag` keeps a compiler from fusing a product and a sum, "" where none does so; `library` computes the sines.
+    """
+    if bounds.reason:
+        return f"no bound: {bounds.reason}"
+    if not any(bounds.worst.values()):
+        return "none; every output is exact"
+    text = f"against exact arithmetic on the same inputs, {_errors(bounds)}"
+    if bounds.accumulation is not None:
+        row = "row of the error" if len(program.inputs[0].shape) == 2 else "error"
+        growth = bounds.accumulation.growth - 1
+        stretched = f" exp({above(growth)} N)" if growth else ""
+        text += (
+            f"; the {row} after N steps is at most {above(bounds.accumulation.per_step)} N{stretched} long"
+        )
+    return f"{text}. This holds for {_conditions(bounds, flag, library)}"
+
+
+def _errors(bounds: RoundingBounds) -> str:
+    """Return the largest error of every output."""
+    parts = [
+        f"error of {name} <= {above(worst)}" if worst else f"{name} is exact"
+        for name, worst in bounds.worst.items()
+    ]
+    if len(parts) == 1:
+        parts[0] += f" ({above(bounds.worst.popitem()[1] / bounds.unit)} ulp of 1)"
+    return ", ".join(parts)
+
+
+def _conditions(bounds: RoundingBounds, flag: str, library: str) -> str:
+    """Return the conditions of the bounds."""
+    sizes: dict[str, list[str]] = {}
+    for condition in bounds.inputs:
+        sizes.setdefault(f"up to {below(condition.high)}", []).append(condition.value)
+    for condition in bounds.conditions:
+        limits = f"from {above(condition.low)} to {below(condition.high)}"
+        sizes.setdefault(limits, []).append(condition.value)
+    parts = [f"{', '.join(names)} {size}" for size, names in sizes.items()]
+    if bounds.functions:
+        names = " and ".join(bounds.functions)
+        parts.append(f"{names} of {library} within 1 ulp")
+    parts += ["IEEE 754, each operation rounded to the nearest", *filter(None, [flag])]
+    return "; ".join(parts)

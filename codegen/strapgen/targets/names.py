@@ -13,15 +13,14 @@ import symtable
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import TYPE_CHECKING, TypeVar
+from typing import NamedTuple, TypeVar
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.integer_program import FixedProgram
+from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
+from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
+from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
+from strapgen.ir.signals import Signal
 from strapgen.targets.c_library import LIBRARY
-
-if TYPE_CHECKING:
-    from strapgen.ir.program import Program
-    from strapgen.targets.renaming import Key
 
 #: Keywords of C99 to C23 and of C++, which reads the headers too, and macros without arguments in lower case.
 _C_TEXT = """
@@ -44,7 +43,7 @@ _C_MACROS = re.compile(
     r"|(U?INT(MAX|PTR|(_LEAST|_FAST)?\d+)?|FLT|L?DBL|[SU]?CHAR|U?SHRT|U?L?LONG|WCHAR|WINT|S?SIZE|PTRDIFF|SIG_ATOMIC|FP|FE|LC"
     r"|EXIT|SEEK|MATH|SA)_[A-Z0-9_]+|(PRI|SCN)[diouxX](LEAST|FAST)?(\d+|MAX|PTR)"
 )
-_P = TypeVar("_P", "Program", "FixedProgram")
+_P = TypeVar("_P", Program, FixedProgram)
 
 #: A letter that no name has: admission lets letters of ASCII alone in.
 _MARK = "ж"
@@ -250,8 +249,6 @@ def printed(
     `text` prints the files of a renamed program; it gets the kernel's name of every changed one. Signals that are
     `joined` have one name with their only element.
     """
-    from strapgen.targets.renaming import keys, renamed  # what is in the cache is printed already
-
     names = keys(program, frozenset(joined))
     marks = {key: f"{_MARK}{number}{_MARK}" for number, key in enumerate(names)}
     marked = text(renamed(program, marks, joined), {})
@@ -303,3 +300,123 @@ def _alike(key: Key) -> Iterator[str]:
     base = key.name.lstrip("_") or "value"
     yield f"{base}_"
     yield from (f"{base}_v{number}" for number in count(2))  # no macro has small letters there
+
+
+class Key(NamedTuple):
+    """A named part of a program, of kind "function", "signal", "value" or "residual" (an error feedback)."""
+
+    kind: str
+    name: str
+
+
+def keys(program: Program | FixedProgram, joined: Iterable[str] = ()) -> list[Key]:
+    """Return the named parts of a program, each once: the function, signals but those joined to an element, values."""
+    plain = program if isinstance(program, Program) else program.program
+    signals = [*plain.inputs, *(result.signal for result in plain.results)]
+    names = [Key("function", plain.name)]
+    names += [Key("signal", signal.name) for signal in signals if signal.name not in joined]
+    names += [Key("value", name) for signal in signals for name in signal.elements]
+    if isinstance(program, Program):
+        names += [Key("value", assignment.name) for assignment in program.body]
+    else:
+        names += [Key("value", value.name) for value in program.body]
+        names += [Key("residual", feedback.name) for feedback in program.interface.residuals]
+    return list(dict.fromkeys(names))
+
+
+def renamed(program: _P, names: Mapping[Key, str], joined: Iterable[str] = ()) -> _P:
+    """Return a program with other names; a part that has none keeps its own."""
+    work = _Renaming(names, frozenset(joined))
+    return work.program(program) if isinstance(program, Program) else work.fixed(program)
+
+
+class _Renaming:
+    """The new names, and a method that renames each kind of part."""
+
+    def __init__(self, names: Mapping[Key, str], joined: frozenset[str]) -> None:
+        self.names, self.joined = names, joined
+
+    def value(self, name: str) -> str:
+        return self.names.get(Key("value", name), name)
+
+    def signal(self, signal: Signal) -> Signal:
+        if signal.name in self.joined:
+            name = self.value(*signal.elements)
+        else:
+            name = self.names.get(Key("signal", signal.name), signal.name)
+        return replace(signal, name=name, elements=tuple(map(self.value, signal.elements)))
+
+    # Programs
+
+    def node(self, node: Node) -> Node:
+        if isinstance(node, Reference):
+            return Reference(self.value(node.name))
+        if isinstance(node, Operation):
+            return Operation(node.kind, tuple(map(self.node, node.arguments)))
+        return node
+
+    def result(self, result: Result) -> Result:
+        return Result(self.signal(result.signal), tuple(map(self.node, result.nodes)))
+
+    def program(self, program: Program) -> Program:
+        return replace(
+            program,
+            name=self.names.get(Key("function", program.name), program.name),
+            inputs=tuple(map(self.signal, program.inputs)),
+            body=tuple(Assignment(self.value(a.name), self.node(a.value), a.meaning) for a in program.body),
+            outputs=tuple(map(self.result, program.outputs)),
+            transition=program.transition and self.result(program.transition),
+        )
+
+    # Programs on integers: their interface and body say all that is printed
+
+    def fixed(self, fixed: FixedProgram) -> FixedProgram:
+        interface = fixed.interface
+        return replace(
+            fixed,
+            program=replace(
+                fixed.program,
+                name=self.names.get(Key("function", fixed.program.name), fixed.program.name),
+            ),
+            interface=self.interface(interface),
+            body=tuple(map(self.fixed_value, fixed.body)),
+        )
+
+    def interface(self, interface: Interface) -> Interface:
+        return replace(
+            interface,
+            inputs=tuple(map(self.argument, interface.inputs)),
+            outputs=tuple(map(self.argument, interface.outputs)),
+            residuals=tuple(map(self.feedback, interface.residuals)),
+        )
+
+    def argument(self, argument: Argument) -> Argument:
+        values = tuple(map(self.value, argument.values))
+        return replace(argument, signal=self.signal(argument.signal), values=values)
+
+    def feedback(self, feedback: ErrorFeedback) -> ErrorFeedback:
+        return replace(feedback, name=self.names.get(Key("residual", feedback.name), feedback.name))
+
+    def fixed_value(self, value: Value) -> Value:
+        return replace(value, name=self.value(value.name), definition=self.definition(value.definition))
+
+    def definition(
+        self, definition: IntegerSum | IntegerOperation | None
+    ) -> IntegerSum | IntegerOperation | None:
+        match definition:
+            case IntegerSum(residual=feedback):
+                return replace(
+                    definition,
+                    fine=tuple(map(self.term, definition.fine)),
+                    coarse=tuple(map(self.term, definition.coarse)),
+                    residual=feedback and self.feedback(feedback),
+                )
+            case IntegerOperation(kind, arguments):
+                return IntegerOperation(kind, tuple(map(self.scaled, arguments)))
+        return None
+
+    def term(self, term: Term) -> Term:
+        return replace(term, names=tuple(map(self.value, term.names)))
+
+    def scaled(self, scaled: Scaled) -> Scaled:
+        return replace(scaled, value=self.value(scaled.value)) if isinstance(scaled.value, str) else scaled

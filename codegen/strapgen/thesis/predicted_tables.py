@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from strapgen import catalogue
-from strapgen.analysis.ratios.ratios import Claim
-from strapgen.analysis.ratios.ratios_report import claims_text
+from strapgen.analysis.ratios import Claim, claims_text
 from strapgen.analysis.series.prediction import Prediction, predict
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.runs import simulate

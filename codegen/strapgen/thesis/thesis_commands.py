@@ -96,7 +96,7 @@ def _simulated(
 
 def _predict(output: Output) -> None:
     """Deliver the tables as the series predict them, and the ratios that the thesis reads from its tables."""
-    from strapgen.analysis.ratios import ratios
+    from strapgen.analysis import ratios
     from strapgen.thesis import predicted_tables
     from strapgen.thesis.predicted_tables import PredictedTablesResult
     from strapgen.thesis.thesis_tables import ALGORITHMS, ORDERS, TABLES

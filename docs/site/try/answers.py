@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import strapgen
-from strapgen.analysis.error_analysis.error_analysis import analyse
-from strapgen.analysis.error_analysis.series_report import series_latex, series_text
+from strapgen.analysis.error_analysis import analyse, series_latex, series_text
 from strapgen.catalogue.methods import tableaux
 from strapgen.fixedpoint.floating import proved, rounding_bounds
 from strapgen.ir.program import Program

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from strapgen import Program, Sources, Target
-from strapgen.targets.numpy_code.emit import emit as numpy_code
+from strapgen.targets.numpy_code import emit as numpy_code
 
 
 def emit(program: Program, target: str) -> Sources:

@@ -9,9 +9,16 @@ import pytest
 from small_programs import EXACT, node, program
 
 from strapgen.fixedpoint.floating import rounding_bounds
-from strapgen.fixedpoint.floating.errors import _ComputedNumber, _ComputedNumbers, _root_share
-from strapgen.fixedpoint.floating.expressions import Expression, Expressions
-from strapgen.fixedpoint.floating.number_formats import NUMBERS, NumberFormat, exponent
+from strapgen.fixedpoint.floating.errors import (
+    NUMBERS,
+    Expression,
+    Expressions,
+    NumberFormat,
+    _ComputedNumber,
+    _ComputedNumbers,
+    _root_share,
+    exponent,
+)
 from strapgen.fixedpoint.intervals import Interval, root
 from strapgen.ir.program import Operation, Program
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from small_programs import EXACT, TYPES, computed, exactly, node, program
 
 from strapgen.fixedpoint.floating import bounds, rounding_bounds
-from strapgen.fixedpoint.floating.errors import _ComputedNumbers
-from strapgen.fixedpoint.floating.number_formats import NUMBERS, NumberFormat
+from strapgen.fixedpoint.floating.errors import NUMBERS, NumberFormat, _ComputedNumbers
 from strapgen.ir.program import Program
 
 THIRD = Fraction(1, 3)

@@ -9,8 +9,8 @@ import pytest
 from derived import programs
 from small_programs import EXACT, node, program
 
+from strapgen.fixedpoint.floating.errors import Expressions
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
-from strapgen.fixedpoint.floating.expressions import Expressions
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Program
 

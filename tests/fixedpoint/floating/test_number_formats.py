@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
-from strapgen.targets.c.emit import DOUBLE, FLOAT, CPrinter
+from strapgen.fixedpoint.floating.errors import NUMBERS
+from strapgen.targets.c import DOUBLE, FLOAT, CPrinter
 
 TYPES = {"double": (np.float64, DOUBLE), "float": (np.float32, FLOAT)}
 RATIONALS = st.fractions(min_value=-8, max_value=8, max_denominator=10**9)

@@ -16,6 +16,14 @@ from small_integers import computed, with_feedback
 
 from strapgen import generate
 from strapgen.catalogue import Choice
+from strapgen.fixedpoint.accumulation import (
+    StepErrors,
+    _away,
+    _moves,
+    accumulation,
+    step_errors,
+    transition_growth,
+)
 from strapgen.fixedpoint.derivation import quantities
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.fixedpoint.quantities import (
@@ -27,20 +35,12 @@ from strapgen.fixedpoint.quantities import (
     Sum,
 )
 from strapgen.fixedpoint.quantization import _planned, _walked
-from strapgen.fixedpoint.runs.accumulation import (
-    StepErrors,
-    _away,
-    _moves,
-    accumulation,
-    step_errors,
-    transition_growth,
-)
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.program import OPERATIONS, Assignment, Constant, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
-from strapgen.run.fixed import ModelEvaluator
+from strapgen.run.compiled_code import ModelEvaluator
 
 
 def test_a_sum_of_products_moves_by_no_more_than_is_told():
@@ -352,9 +352,9 @@ def test_a_state_that_saturates_loses_a_unit_of_its_last_place():
 
 
 def test_a_transition_of_which_no_stretch_is_known_stretches_by_its_distance_from_the_identity(monkeypatch):
-    monkeypatch.setattr("strapgen.fixedpoint.runs.accumulation.stretch", lambda *_: None)
+    monkeypatch.setattr("strapgen.fixedpoint.accumulation.stretch", lambda *_: None)
     far = (Fraction(3, 8), Fraction(1, 2))
-    monkeypatch.setattr("strapgen.fixedpoint.runs.accumulation._away", lambda *_: far)
+    monkeypatch.setattr("strapgen.fixedpoint.accumulation._away", lambda *_: far)
     assert float(accumulation(planar(), None, sized()).growth) == pytest.approx(1 + 5 / 8, rel=1e-12)
 
 

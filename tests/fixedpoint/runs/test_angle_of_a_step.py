@@ -11,9 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.runs.accumulation import StepErrors
-from strapgen.fixedpoint.runs.angle_accumulation import (
+from strapgen.fixedpoint.accumulation import StepErrors
+from strapgen.fixedpoint.angle_accumulation import (
     _dual_rows,
     _matrix_angles,
     _parameter_angles,
@@ -23,6 +22,7 @@ from strapgen.fixedpoint.runs.angle_accumulation import (
     _turning,
     _unsteadiness,
 )
+from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.interfaces import LARGEST_ERROR
 from strapgen.ir.signals import Signal
 
@@ -324,7 +324,7 @@ def test_sizes_are_lengths_of_all_elements_and_feedback_is_told_from_its_middle(
     ],
 )
 def test_a_transition_stretches_by_what_is_known_of_it(stretched, contraction, expansion, monkeypatch):
-    monkeypatch.setattr("strapgen.fixedpoint.runs.angle_accumulation.stretch", lambda *_: stretched)
+    monkeypatch.setattr("strapgen.fixedpoint.angle_accumulation.stretch", lambda *_: stretched)
     state = Signal("state", (4,), tuple("abcd"), bound=1)
     context = SimpleNamespace(
         program=SimpleNamespace(inputs=(state,)),

@@ -13,9 +13,9 @@ from derived import program
 
 import strapgen
 from strapgen.catalogue import choose_step
+from strapgen.fixedpoint import accumulation
+from strapgen.fixedpoint.accumulation import singular_value_bounds
 from strapgen.fixedpoint.intervals import Interval
-from strapgen.fixedpoint.runs import singular_values
-from strapgen.fixedpoint.runs.singular_values import singular_value_bounds
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Operation, Program
 
@@ -79,7 +79,7 @@ def test_a_coarser_bound_counts_where_no_closer_one_is_proved(monkeypatch):
     three = program(choose_step("euler", "rk4", 3))
     assert bounds(three, known=known) == Interval.symmetric(known)
     assert singular_value_bounds(step, step.transition, (), 4, FAR) == Interval.symmetric(FAR)
-    monkeypatch.setattr(singular_values, "_MOST_PRODUCTS", 10)
+    monkeypatch.setattr(accumulation, "_MOST_PRODUCTS", 10)
     assert bounds(step) == Interval.symmetric(FAR)
 
 
@@ -106,20 +106,20 @@ def test_a_transition_that_does_not_turn_with_its_increments_has_the_coarser_bou
 def test_a_matrix_turns_with_its_vectors_if_its_rows_and_its_columns_do():
     """The transposed matrix does too; one with a row multiplied does not."""
     step = program(choose_step("dcm", "rk2", 2))
-    elements = singular_values._polynomials(step, step.transition)
-    assert singular_values._turns_with_vectors(elements)
-    assert singular_values._turns_with_vectors([elements[3 * (k % 3) + k // 3] for k in range(9)])
+    elements = accumulation._polynomials(step, step.transition)
+    assert accumulation._turns_with_vectors(elements)
+    assert accumulation._turns_with_vectors([elements[3 * (k % 3) + k // 3] for k in range(9)])
     doubled = [{m: 2 * c for m, c in p.items()} if k < 3 else p for k, p in enumerate(elements)]
-    assert not singular_values._turns_with_vectors(doubled)
-    assert not singular_values._turns_with_vectors([*elements[3:], *elements[:3]])
+    assert not accumulation._turns_with_vectors(doubled)
+    assert not accumulation._turns_with_vectors([*elements[3:], *elements[:3]])
 
 
 def test_a_quaternion_turns_with_its_vectors_if_its_scalar_stays():
     step = program(choose_step("euler", "rk2", 2))
-    elements = singular_values._polynomials(step, step.transition)
-    assert singular_values._turns_with_vectors(elements)
-    assert not singular_values._turns_with_vectors([*elements[:3], elements[0]])
-    assert not singular_values._turns_with_vectors([elements[1], elements[0], *elements[2:]])
+    elements = accumulation._polynomials(step, step.transition)
+    assert accumulation._turns_with_vectors(elements)
+    assert not accumulation._turns_with_vectors([*elements[:3], elements[0]])
+    assert not accumulation._turns_with_vectors([elements[1], elements[0], *elements[2:]])
 
 
 @pytest.mark.parametrize("longer", [0, 1])
@@ -129,7 +129,7 @@ def test_either_increment_may_be_the_longer_one(longer, monkeypatch):
     scalar = {(): Fraction(1)}
     for vector, axis in product(range(2), range(3)):
         scalar[(vector, axis), (vector, axis)] = Fraction(1 if vector == longer else -1)
-    monkeypatch.setattr(singular_values, "_polynomials", lambda *_: [{}, {}, {}, scalar])
+    monkeypatch.setattr(accumulation, "_polynomials", lambda *_: [{}, {}, {}, scalar])
     most = 3 * float(LIMIT) ** 2
     proved = bounds(step)
     assert (1 + most) ** 2 - 1 <= float(proved.highest) <= 1.04 * ((1 + most) ** 2 - 1)
@@ -179,4 +179,4 @@ def test_only_parts_beyond_the_disc_are_left_out():
     side = 1 / 64
     for k, m in product(range(64), repeat=2):
         cube = ((0.0, side), (k * side, (k + 1) * side), (m * side, (m + 1) * side))
-        assert singular_values._is_outside(cube) == (k * k + m * m > 64 * 64)
+        assert accumulation._is_outside(cube) == (k * k + m * m > 64 * 64)

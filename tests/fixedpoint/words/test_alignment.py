@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from strapgen.fixedpoint.words.alignment import aligning
+from strapgen.fixedpoint.quantization import aligning
 from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Scaled, Term, Value
 from strapgen.ir.interfaces import ErrorFeedback
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from strapgen import Settings, backend, choose, motion, quantize, simulate
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.fixedpoint import sums
-from strapgen.fixedpoint.words.filters import nearest_word, rounded_together
+from strapgen.fixedpoint import integer_sums
+from strapgen.fixedpoint.filters import nearest_word, rounded_together
 from strapgen.ir.integer_program import FixedProgram, IntegerSum
 from strapgen.lab.runs import angles
 
@@ -95,7 +95,7 @@ def test_at_a_constant_rate_nothing_of_the_taps_adds_up(monkeypatch):
     # A rate that grows evenly: only c_1 is there, and no unit of c_3.
     steady = stages(0, 1 << 22)
     assert steady[0] > 0 == steady[1]
-    monkeypatch.setattr(sums, "filter_words", lambda *_: {})
+    monkeypatch.setattr(integer_sums, "filter_words", lambda *_: {})
     assert moments(taps("window-3-3", 32), 3, "legendre_1")[1] != Fraction(1, 2)
     assert moments(taps("window-3-3", 32), 3, "lever_3")[0] != 0
 

@@ -12,8 +12,7 @@ import mpmath
 import sympy as sp
 
 from strapgen import pipeline
-from strapgen.analysis.series.accumulation import antiderivative
-from strapgen.analysis.series.error_rate import ErrorRate, error_rate
+from strapgen.analysis.series.error_rate import ErrorRate, antiderivative, error_rate
 from strapgen.analysis.series.motion_rates import TIME, parameters
 from strapgen.catalogue import Choice
 from strapgen.ir import checks

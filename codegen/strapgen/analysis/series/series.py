@@ -13,16 +13,15 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
-from strapgen import catalogue
+from strapgen import catalogue, pipeline
 from strapgen.analysis.series import motion_rates
-from strapgen.analysis.series.invariants import Invariants, invariants, matrix
-from strapgen.analysis.series.notation import covariant_text, vector_texts
+from strapgen.analysis.series.invariants import Invariants, covariant_text, invariants, matrix, vector_texts
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel import reading
-from strapgen.kernel.power_series import Powers
+from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab import one_step
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.one_step import Step, errors
@@ -277,3 +276,38 @@ def _series(
 
 def _powers(elements: Sequence[Powers]) -> list[int]:
     return sorted({power for element in elements for power in element.parts})
+
+
+#: The error P of the computed matrix (I + s P) C, where C is the true matrix and s the size of the error.
+ERROR = sp.Matrix(3, 3, sp.symbols("p11 p12 p13 p21 p22 p23 p31 p32 p33"))
+
+
+def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
+    """Return the error after a scheme of orthonormalization, as a series in the error before it.
+
+    The scheme changes the matrix (I + s P) C into (I + s F_1(P) + s^2 F_2(P) + ...) C. To first order every scheme
+    leaves the skew part of P: scale and skew vanish, and the drift does not change (B.4). To second order the nearest
+    rotation changes the drift by -(K Y + Y K)/2, where K and Y are the skew and symmetric parts of P (B.14).
+
+    >>> (effect("dcm-orthonormalize")[1] - (ERROR - ERROR.T) / 2).expand().is_zero_matrix
+    True
+    """
+    checks.choice("scheme", scheme, catalogue.orthonormalizations("dcm"))
+    checks.count("order", order, largest=4)
+    kernel = pipeline.derive(scheme)
+    ring, *elements = sp.ring([str(symbol) for symbol in ERROR], sp.QQ)
+
+    (computed,) = kernel.inputs
+    values = {
+        name: Powers(ring, {0: ring(int(k % 4 == 0)), 1: element}, order)
+        for k, (name, element) in enumerate(zip(computed.elements, elements, strict=True))
+    }
+    try:
+        results = outputs(kernel, values, ring, order)
+    except ArithmeticError as error:
+        raise InputError(f"kernel {scheme} has no series in the error: {error}") from None
+    result = results[kernel.outputs[-1].signal.name]
+    return {
+        power: sp.Matrix(3, 3, [x.parts.get(power, ring.zero).as_expr() for x in result])
+        for power in range(1, order + 1)
+    }

@@ -15,7 +15,7 @@ import sympy as sp
 
 from strapgen import pipeline
 from strapgen.analysis.series import invariants
-from strapgen.analysis.series.notation import TEXT, covariant_text, with_forces
+from strapgen.analysis.series.invariants import LATEX, TEXT, covariant_text, with_forces
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -26,7 +26,9 @@ from strapgen.kernel.covariants import Coefficients, Frame
 from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab import one_step, sampled_motion
+from strapgen.results.display.latex import equations
 from strapgen.results.records import entry, plain_record
+from strapgen.results.result import Result
 
 #: The parts of a series, which are the outputs of a kernel by what changes.
 PARTS = ("velocity", "position")
@@ -281,7 +283,7 @@ def coefficients(kernel: Kernel, top: int, terms: int | None = None) -> dict[str
     for part, elements in errors(kernel, ring, (vectors[:top], vectors[top:]), top).items():
         powers = sorted({power for element in elements for power in element.parts})[:terms]
         parts[part] = {
-            power: invariants.vector(frame, [x.parts.get(power, ring.zero) for x in elements])
+            power: invariants.vector_invariants(frame, [x.parts.get(power, ring.zero) for x in elements])
             for power in powers
         }
     return parts
@@ -292,3 +294,55 @@ def _series(kernel: Kernel, terms: int, top: int) -> VelocitySeries:
     parts = coefficients(kernel, top, terms)
     velocity, position = (parts.get(part, {}) for part in PARTS)
     return VelocitySeries(kernel.name, velocity, position, top, parts_of(kernel), kernel.unknowns)
+
+
+#: Names of the errors in LaTeX.
+_SYMBOLS = {"velocity": r"\delta\mathbf{v}", "position": r"\delta\mathbf{r}/h"}
+
+
+@dataclass(frozen=True)
+class VelocitySeriesResult(Result):
+    """What one step of velocity and position loses, as power series in its length."""
+
+    each = VelocityTerms
+
+    several: Sequence[VelocitySeries]
+
+    def results(self) -> Sequence[VelocityTerms]:
+        """Return the series as text and terms."""
+        return [VelocityTerms.of(one) for one in self.several]
+
+    def text(self) -> str:
+        """Return the series one after the other."""
+        return "\n\n".join(map(_text, self.several))
+
+    def latex(self) -> str:
+        """Return the series as align environments."""
+        return "\n\n".join(map(velocity_series_latex, self.several))
+
+
+def _text(series: VelocitySeries) -> str:
+    lines = [f"{series.kernel}, any motion: what one step of length h loses, computed less true"]
+    if series.order is None:
+        return "\n".join([*lines, f"nothing in the {series.parts[0]}, to the power {series.known} of h"])
+    lines += [
+        f"order {series.order} in the {series.parts[0]}; terms to the power {series.known} of h were looked at",
+        "w0, w1, ... : the rate and its derivatives; f0, f1, ... : the specific force and its derivatives",
+    ]
+    notation = with_forces(TEXT, series.known)
+    for part in series.parts:
+        title = "velocity" if part == "velocity" else "position/h"
+        for power, one in series.coefficients(part).items():
+            lines += ["", f"h^{power}  {title:10}  {covariant_text(one, notation=notation)}"]
+    return "\n".join(lines)
+
+
+def velocity_series_latex(series: VelocitySeries) -> str:
+    """Return the errors of a step as one align environment."""
+    notation = with_forces(LATEX, series.known, r"\mathbf{{f}}_{{{}}}".format)
+    rows = [
+        (rf"h^{{{power}}}\!:\ {_SYMBOLS[part]}", covariant_text(one, notation=notation))
+        for part in series.parts
+        for power, one in series.coefficients(part).items()
+    ]
+    return equations(rows)

@@ -8,8 +8,10 @@ cases exclude each other, and together they hold all solutions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from operator import le
 from typing import Any
 
 import sympy as sp
@@ -17,17 +19,181 @@ from sympy.core.random import rng
 from sympy.polys.groebnertools import groebner
 from sympy.polys.orderings import grevlex, lex
 
-from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution, simple, with_roots
-from strapgen.analysis.unknowns.ring_quotients import (
-    cancelled,
-    linear_coefficient,
-    may_divide,
-    quotient_of,
-    substituted,
-    without,
-)
+from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.kernel.power_series import field
+from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.kernel import power_series, reading
+from strapgen.results.records import entry, properties
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A polynomial that has to be zero.
+
+    Parameters
+    ----------
+    label : str
+        What it says, in words or as a formula.
+    order : int
+        Its order; those of lower orders are solved first.
+    value : Expr
+        A polynomial in the unknowns, or a quotient whose numerator has to be zero.
+    """
+
+    label: str
+    order: int = field(metadata=entry(key="power"))
+    value: sp.Expr = field(metadata=entry(key="expression"))
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        return f"{self.label}: {self.value} = 0"
+
+
+def _shown(expressions: Sequence[sp.Expr]) -> list[str]:
+    return list(map(shown, expressions))
+
+
+@dataclass(frozen=True)
+class Family:
+    """Solutions with free parameters.
+
+    Parameters
+    ----------
+    values : dict of Symbol to Expr
+        Every unknown that is not free, as a function of those that are.
+    free : tuple of Symbol
+        Unknowns with any value, except where `nonzero` vanishes; some are tied by `equations`.
+    nonzero : tuple of Expr
+        Polynomials in the free unknowns that must not be zero.
+    equations : tuple of Expr
+        Irreducible polynomials in the free unknowns that must be zero; empty for almost all families.
+    """
+
+    computed = properties(dimension=entry())
+
+    values: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
+    free: tuple[sp.Symbol, ...] = field(metadata=entry(key="parameters", kind=list[str]))
+    nonzero: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_shown, kind=list[str]))
+    equations: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_shown, kind=list[str]))
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        free = ", ".join(symbol.name for symbol in self.free)
+        values = ", ".join(f"{symbol} = {value}" for symbol, value in self.values.items())
+        return f"free {free or 'nothing'}\n{values or 'no other unknowns'}"
+
+    @property
+    def dimension(self) -> int:
+        """Number of parameters that can be chosen."""
+        return len(self.free) - len(self.tied)
+
+    @property
+    def tied(self) -> tuple[sp.Symbol, ...]:
+        """Free unknowns that the equations fix up to finitely many values, once the others are chosen."""
+        held = [symbol for symbol in self.free if any(symbol in x.free_symbols for x in self.equations)]
+        leading = [sp.Poly(x, *held).monoms(order="grevlex")[0] for x in self.equations]
+        # The others are a largest set of unknowns in which alone no leading monomial stands.
+        for count in range(len(held), -1, -1):
+            for chosen in combinations(range(len(held)), count):
+                if all(any(power for k, power in enumerate(m) if k not in chosen) for m in leading):
+                    return tuple(symbol for k, symbol in enumerate(held) if k not in chosen)
+        return ()
+
+    def holds(self, expression: sp.Expr) -> bool:
+        """Tell whether an expression in the unknowns is zero for all members of the family."""
+        numerator = sp.numer(sp.together(expression.xreplace(self.values)))
+        numerator = sp.expand(numerator)
+        if numerator == 0 or not self.equations:
+            return bool(numerator == 0)
+        _, rest = sp.reduced(numerator, list(self.equations), *self.free)
+        return bool(rest == 0)
+
+
+@dataclass(frozen=True)
+class PolynomialSolution:
+    """What equations say of their unknowns.
+
+    Parameters
+    ----------
+    unknowns : tuple of Symbol
+    families : tuple of Family
+        The families of all solutions, those with most parameters first; empty if there is none.
+    reason : str
+        Why there is no solution; "" if there is one.
+    solvable : int or None
+        If there is no solution, the highest order up to which the equations have one; None if not even the lowest have.
+    """
+
+    unknowns: tuple[sp.Symbol, ...] = field(metadata=entry(kind=list[str]))
+    families: tuple[Family, ...]
+    reason: str = field(default="", metadata=entry(write=lambda reason: reason or None, kind=str | None))
+    solvable: int | None = field(default=None, metadata=entry(key="solvable_order"))
+
+    __repr__ = short_repr
+    _repr_latex_ = notebook_latex
+
+    def _in_words(self) -> str:
+        names = ", ".join(symbol.name for symbol in self.unknowns)
+        return f"of {names}: " + (self.reason or counted(len(self.families), "family", "families"))
+
+
+def simple(expression: sp.Expr) -> sp.Expr:
+    """Return an expression in the shorter of two forms: factored, or with brackets multiplied out."""
+    factored = sp.factor(expression)
+    if not factored.is_polynomial():
+        return factored
+    expanded = sp.expand(expression)
+    return factored if len(str(factored)) < len(str(expanded)) else expanded
+
+
+def shown(polynomial: sp.Expr) -> str:
+    """Return a polynomial as text with whole numbers, up to a factor.
+
+    >>> shown(sp.Symbol("c") - sp.Rational(2, 3))
+    '3*c - 2'
+    """
+    if polynomial.free_symbols and power_series.field([polynomial]) == sp.QQ:
+        polynomial = sp.Poly(polynomial, *polynomial.free_symbols, domain=sp.QQ).clear_denoms(convert=True)[1]
+        polynomial = polynomial.primitive()[1].as_expr()
+    return str(sp.sstr(polynomial))
+
+
+def member(family: Family, what: str, parameters: Mapping[str, Any]) -> dict[str, sp.Expr]:
+    """Return the values of all unknowns of a family that parameters fix."""
+    chosen = reading.values_of_unknowns(what, tuple(symbol.name for symbol in family.free), parameters)
+    for excluded in family.nonzero:
+        if sp.expand(excluded.subs(chosen)) == 0:
+            raise InputError(f"{what}: {shown(excluded)} is 0 with these values; the family excludes it")
+    for equation in family.equations:
+        rest = sp.expand(equation.subs(chosen))
+        if rest.is_number and rest != 0:
+            raise InputError(f"{what}: {shown(equation)} has to be 0; with these values it is {rest}")
+    values = {symbol: sp.cancel(value.subs(chosen)) for symbol, value in family.values.items()}
+    return {symbol.name: value for symbol, value in {**chosen, **values}.items()}
+
+
+def with_roots(family: Family) -> list[Family]:
+    """Return a family with the roots of an equation of second degree in one unknown in its place."""
+    if len(family.equations) != 1 or len(family.equations[0].free_symbols) != 1:
+        return [family]
+    (equation,), (symbol,) = family.equations, family.equations[0].free_symbols
+    polynomial = sp.Poly(equation, symbol)
+    if polynomial.degree() != 2:
+        return [family]
+    a, b, c = polynomial.all_coeffs()
+    roots = [sp.expand((-b + sign * sp.sqrt(b * b - 4 * a * c)) / (2 * a)) for sign in (-1, 1)]
+    free = tuple(other for other in family.free if other != symbol)
+    families = []
+    for root in roots:
+        values = {name: sp.radsimp(sp.expand(x.subs(symbol, root))) for name, x in family.values.items()}
+        nonzero = tuple(sp.expand(x.subs(symbol, root)) for x in family.nonzero)
+        families.append(Family({symbol: root, **values}, free, tuple(x for x in nonzero if x.free_symbols)))
+    return families
+
 
 #: Most cases that are looked at, most terms of an equation, and most unknowns.
 MOST_CASES, MOST_TERMS, MOST_UNKNOWNS = 400, 5000, 40
@@ -95,7 +261,7 @@ class _CaseSearch:
 
     def __init__(self, equations: Sequence[Equation], unknowns: Sequence[sp.Symbol]) -> None:
         self.unknowns = list(unknowns)
-        numbers = field([equation.value for equation in equations])
+        numbers = power_series.field([equation.value for equation in equations])
         self.ring = sp.polys.rings.PolyRing(self.unknowns, numbers, lex)
         self.equations: dict[int, list[tuple[str, Any]]] = {}
         for equation in equations:
@@ -308,3 +474,60 @@ class _CaseSearch:
         free = tuple(symbol for symbol in self.unknowns if symbol not in values)
         nonzero = tuple(p.as_expr() for p in case.nonzero)
         return Family(values, free, nonzero, tuple(p.as_expr() for _, p in case.equations))
+
+
+def linear_coefficient(polynomial: Any, place: int) -> Any:
+    """Return the coefficient of an unknown in which a polynomial is linear; None if it is not."""
+    terms = {}
+    for exponents, number in polynomial.terms():
+        if exponents[place] > 1:
+            return None
+        if exponents[place]:
+            terms[(*exponents[:place], 0, *exponents[place + 1 :])] = number
+    return polynomial.ring.from_dict(terms) if terms else None
+
+
+def without(polynomial: Any, place: int, coefficient: Any) -> Any:
+    """Return a polynomial minus its term in an unknown, in which it is linear."""
+    return polynomial - coefficient * polynomial.ring.gens[place]
+
+
+def substituted(polynomial: Any, place: int, top: Any, bottom: Any) -> Any:
+    """Return the numerator of a polynomial after the substitution of top/bottom for an unknown."""
+    parts: dict[int, dict[Any, Any]] = {}
+    for exponents, number in polynomial.terms():
+        parts.setdefault(exponents[place], {})[(*exponents[:place], 0, *exponents[place + 1 :])] = number
+    degree = max(parts, default=0)
+    if not degree:
+        return polynomial
+    total = polynomial.ring.zero
+    for power, terms in parts.items():
+        part = polynomial.ring.from_dict(terms)
+        if power:  # zero to the power 0 is an error in a ring
+            part = part * top**power
+        total += part * bottom ** (degree - power)
+    return total
+
+
+def quotient_of(above: Any, below: Any, place: int, top: Any, bottom: Any) -> tuple[Any, Any]:
+    """Return above/below after the substitution of top/bottom for an unknown."""
+    degrees = max(above.degree(place), 0), max(below.degree(place), 0)
+    x, y = (substituted(p, place, top, bottom) for p in (above, below))
+    return x * bottom ** max(degrees[1] - degrees[0], 0), y * bottom ** max(degrees[0] - degrees[1], 0)
+
+
+def cancelled(top: Any, bottom: Any) -> tuple[Any, Any]:
+    """Return a quotient in lowest terms."""
+    common = top.gcd(bottom)
+    return top.exquo(common), bottom.exquo(common)
+
+
+def may_divide(divisor: Any, polynomial: Any) -> bool:
+    """Return whether the leading and the last monomial of a divisor divide those of a polynomial, as they must.
+
+    Both are of a ring in lexical order; a division that cannot be without a rest need not be tried.
+    """
+    return all(
+        all(map(le, one, other))
+        for one, other in ((divisor.LM, polynomial.LM), (min(divisor), min(polynomial)))
+    )

@@ -10,10 +10,9 @@ from typing import Any, TypeAlias
 import sympy as sp
 
 from strapgen import pipeline
-from strapgen.analysis.unknowns import elimination, families, velocity_conditions
-from strapgen.analysis.unknowns.conditions import conditions
-from strapgen.analysis.unknowns.demands import Demand
-from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
+from strapgen.analysis.unknowns import conditions, elimination
+from strapgen.analysis.unknowns.conditions import Demand, attitude_conditions
+from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -113,7 +112,7 @@ class SolvedStep:
             raise InputError(
                 f"kernel {self.kernel.name} has {len(self.families)} families of solutions; there is no number {family}"
             )
-        return families.member(self.families[family], f"kernel {self.kernel.name}", parameters or {})
+        return elimination.member(self.families[family], f"kernel {self.kernel.name}", parameters or {})
 
     def substitute(self, parameters: Mapping[str, Any] | None = None, family: int = 0) -> Kernel:
         """Return the kernel with the values of a family; parameters and errors are those of `values`.
@@ -183,9 +182,9 @@ def _statement(choice: Choice) -> tuple[Kernel, State]:
     """Return the kernel of a choice, and what states the conditions on it."""
     if isinstance(choice, Choice) and choice.takes_velocity:
         kernel = pipeline.derive(choice)
-        return kernel, partial(velocity_conditions.conditions, kernel)
+        return kernel, partial(conditions.velocity_conditions, kernel)
     attitude_step = one_step.step(choice)
-    return attitude_step.kernel, partial(conditions, attitude_step)
+    return attitude_step.kernel, partial(attitude_conditions, attitude_step)
 
 
 def _leading(state: State, demand: Demand, family: Family) -> LeadingError | None:
@@ -193,7 +192,7 @@ def _leading(state: State, demand: Demand, family: Family) -> LeadingError | Non
     for more in range(1, _PATIENCE + 1):
         power = demand.order + more
         terms = [
-            Equation(each.label, each.order, families.simple(each.value.xreplace(family.values)))
+            Equation(each.label, each.order, elimination.simple(each.value.xreplace(family.values)))
             for each in state(demand, more)
             if each.order == power
         ]

@@ -10,14 +10,13 @@ from typing import Annotated, Any, ClassVar
 
 import sympy as sp
 
-from strapgen.analysis.unknowns import elimination, families
-from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
+from strapgen.analysis.unknowns import elimination
+from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
 from strapgen.catalogue.methods import coefficient_files, tableaux
 from strapgen.catalogue.methods.coefficient_files import Source, Title
 from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text, word_text, words
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, parse, refused
+from strapgen.catalogue.methods.tableaux import Tableau
+from strapgen.catalogue.toml_models import Key, UserFile, parse, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -117,14 +116,14 @@ class UnknownTableau:
         terms = []
         for tree in trees(self.order + 1):
             value = self.stages.number(self.stages.tree_residual(tree)) / symmetry(tree)
-            left = families.simple(value.xreplace(family.values))
+            left = elimination.simple(value.xreplace(family.values))
             if left != 0:
                 terms.append(Equation(weight_text(tree), self.order + 1, left))
         return terms
 
     def member(self, family: Family, parameters: Mapping[str, Any]) -> Tableau:
         """Return the method of a family with these parameters; errors are those of `substitute`."""
-        return self.substitute(families.member(family, f"tableau {self.title}", parameters))
+        return self.substitute(elimination.member(family, f"tableau {self.title}", parameters))
 
     def substitute(self, values: Mapping[str, Any]) -> Tableau:
         """Return the tableau with values for all unknowns, its order verified.
@@ -185,7 +184,7 @@ class UnknownTableauFile:
 
     name: Title
     source: Source
-    order: Annotated[int, Key("Order that the method is to have", "1", least=1, most=MOST_ORDER)]
+    order: Annotated[int, Key("Required order of the method", "1", least=1, most=MOST_ORDER)]
     unknowns: Annotated[
         tuple[str, ...], Key("Names; where there is a choice, the first ones express the last", least=1)
     ]

@@ -3,7 +3,7 @@
 from strapgen.analysis.series.series import ErrorSeries, series
 from strapgen.analysis.series.velocity_series import VelocitySeries
 from strapgen.analysis.series.velocity_series import series as velocity_series
-from strapgen.analysis.unknowns.families import Equation, Family, PolynomialSolution
+from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
 from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep, solve
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.analysis.unknowns.unknown_tableau import read as read_tableau

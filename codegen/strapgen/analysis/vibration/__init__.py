@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from strapgen.analysis.vibration.assessment import drift as drift
     from strapgen.analysis.vibration.assessment import of as of
     from strapgen.analysis.vibration.assessment import sculling as sculling
+    from strapgen.analysis.vibration.assessment import through_gyro as through_gyro
+    from strapgen.analysis.vibration.assessment import through_gyros as through_gyros
     from strapgen.analysis.vibration.assessment import two_speed as two_speed
-    from strapgen.analysis.vibration.gyro import through_gyro as through_gyro
-    from strapgen.analysis.vibration.gyro import through_gyros as through_gyros
     from strapgen.analysis.vibration.mean_rates import Assessment as Assessment
     from strapgen.analysis.vibration.mean_rates import Rates as Rates
     from strapgen.analysis.vibration.rectification import Rectification as Rectification
@@ -23,42 +23,19 @@ if TYPE_CHECKING:
     from strapgen.analysis.vibration.spectrum import random_rates as random_rates
     from strapgen.analysis.vibration.spectrum import read_spectrum as read_spectrum
 
-__all__ = [
-    "Assessment",
-    "RandomRates",
-    "Rates",
-    "Rectification",
-    "Spectrum",
-    "Tone",
-    "drift",
-    "of",
-    "random_rates",
-    "read_spectrum",
-    "rectified",
-    "sculling",
-    "through_gyro",
-    "through_gyros",
-    "two_speed",
-]
-
 #: The modules of the names above, imported when one is first used.
 _MODULES = {
-    "drift": "assessment",
-    "of": "assessment",
-    "sculling": "assessment",
-    "two_speed": "assessment",
-    "through_gyro": "gyro",
-    "through_gyros": "gyro",
-    "Assessment": "mean_rates",
-    "Rates": "mean_rates",
-    "Rectification": "rectification",
-    "Tone": "rectification",
-    "rectified": "rectification",
-    "RandomRates": "spectrum",
-    "Spectrum": "spectrum",
-    "random_rates": "spectrum",
-    "read_spectrum": "spectrum",
+    name: module
+    for module, names in {
+        "assessment": ("drift", "of", "sculling", "through_gyro", "through_gyros", "two_speed"),
+        "mean_rates": ("Assessment", "Rates"),
+        "rectification": ("Rectification", "Tone", "rectified"),
+        "spectrum": ("RandomRates", "Spectrum", "random_rates", "read_spectrum"),
+    }.items()
+    for name in names
 }
+
+__all__ = [*_MODULES]
 
 if not TYPE_CHECKING:
 

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
-from strapgen.analysis.vibration.expansion import Number
 from strapgen.analysis.vibration.systems import CHANNELS, T_L, T_M, F, System, T
-from strapgen.analysis.vibration.waves import Shift, Wave, combined, resolvent
+from strapgen.analysis.vibration.waves import Number, Shift, Wave, combined, resolvent
 from strapgen.ir.exceptions import InputError
 
 #: Two channels, in the order of `CHANNELS`.

@@ -11,8 +11,7 @@ from typing import Any
 import sympy as sp
 
 from strapgen import catalogue, pipeline
-from strapgen.analysis.vibration.expansion import Expander, Expansion, Number
-from strapgen.analysis.vibration.waves import Shift, Wave
+from strapgen.analysis.vibration.waves import Expander, Expansion, Number, Shift, Wave
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError

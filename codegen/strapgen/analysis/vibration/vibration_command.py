@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from strapgen.analysis.vibration.band_options import GYRO_DAMPING, GYRO_RULES
-from strapgen.cli.option_groups import Excludes, Needs, Rule, Shown, grouped, rules, stated
+from strapgen.cli.option_groups import Excludes, Needs, OneOf, Rule, Shown, grouped, rules, stated
 from strapgen.cli.options import ANY_STEP_OPTIONS, MethodOptions, Samples, SeveralMethods, option, samples
 from strapgen.cli.output import Output, plot_option
 from strapgen.cli.values import Number, Positive, written
@@ -20,8 +20,78 @@ from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
     from strapgen.analysis.vibration import Assessment
-    from strapgen.analysis.vibration.curves import Curve
+    from strapgen.analysis.vibration.mean_rates import Curve
     from strapgen.analysis.vibration.vibration_report import AssessedCase, CaseRates
+    from strapgen.catalogue.methods.window import GyroResponse
+
+
+#: The damping of a gyro of second order, beside its natural frequency.
+GYRO_DAMPING = option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
+#: Either option of that gyro needs the other
+GYRO_RULES = (Needs("--gyro-bandwidth-hz", "--gyro-damping"), Needs("--gyro-damping", "--gyro-bandwidth-hz"))
+
+
+@dataclass(frozen=True)
+class BandOptions:
+    """Options of the band of the motion, and of the gyro."""
+
+    panel: ClassVar[str] = "Band"
+    rules: ClassVar[tuple[Rule, ...]] = (
+        OneOf("--band --band-hz"),
+        *GYRO_RULES,
+        Needs("--band-hz --gyro-bandwidth-hz --spectrum", "--sample-hz"),
+        Needs("--sample-hz", "--band-hz --gyro-bandwidth-hz --spectrum"),
+    )
+
+    band: Annotated[
+        Positive | None,
+        option("--band", metavar="RAD", help="Highest angular frequency of the rate in rad a sample."),
+    ] = None
+    band_hz: Annotated[
+        Positive | None,
+        option(
+            "--band-hz",
+            metavar="HZ",
+            help="Highest frequency of the rate in Hz, in place of --band; it goes with --sample-hz.",
+        ),
+    ] = None
+    sample_hz: Annotated[
+        Positive | None, option("--sample-hz", metavar="HZ", help="Samples of the gyro in a second.")
+    ] = None
+    gyro_bandwidth_hz: Annotated[
+        Positive | None,
+        option(
+            "--gyro-bandwidth-hz",
+            metavar="HZ",
+            help="Natural frequency of a gyro of second order, whose response the design takes out.",
+        ),
+    ] = None
+    gyro_damping: Annotated[Positive | None, GYRO_DAMPING] = None
+
+    def radians(self) -> Fraction:
+        """Return the band in rad a sample."""
+        from strapgen.catalogue.methods.window_conditions import PI
+
+        if self.band is not None:
+            band = Fraction(self.band)
+        elif self.band_hz is None or self.sample_hz is None:
+            raise InputError("a band is needed, as --band in rad a sample, or as --band-hz with --sample-hz")
+        else:
+            band = Fraction(round(2 * PI * self.band_hz / self.sample_hz * 10**6), 10**6)
+        if band >= 3:
+            raise InputError(
+                f"the band is {float(band):g} rad a sample; a number below 3 is needed, pi is half the sampling rate"
+            )
+        return band
+
+    def gyro(self) -> GyroResponse | None:
+        """Return the gyro; None if it is ideal."""
+        from strapgen.catalogue.methods.window import GyroResponse
+
+        if self.gyro_bandwidth_hz is None or self.gyro_damping is None or self.sample_hz is None:
+            return None
+        return GyroResponse(self.gyro_bandwidth_hz, self.gyro_damping, self.sample_hz)
+
 
 _Text = str | None
 
@@ -358,14 +428,14 @@ def _curves(
     cases: list[AssessedCase], source: VibrationSource, output: VibrationOutput
 ) -> tuple[list[tuple[str, Curve]], str, float]:
     """Return the errors over frequency by label, a title, and the frequency in Hz to mark."""
-    from strapgen.analysis.vibration import curves
+    from strapgen.analysis.vibration import mean_rates
 
     assert source.step and source.frequency, "the source is checked"
     step, marked = source.step, float(source.frequency)
     sampling = max(case.samples for case in cases) / float(step)
-    hertz = curves.frequencies(*output.frequencies(sampling, marked))
+    hertz = mean_rates.frequencies(*output.frequencies(sampling, marked))
     drawn = [
-        (case.label, curves.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
+        (case.label, mean_rates.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
         for case in cases
     ]
     return drawn, f"Errors under vibration, step {step} s\n{source.words}", marked

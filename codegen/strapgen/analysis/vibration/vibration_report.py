@@ -17,7 +17,7 @@ from strapgen.results.result import Result
 from strapgen.results.table import READABLE_UNITS, Column, TextTable
 
 if TYPE_CHECKING:
-    from strapgen.analysis.vibration.curves import Curve
+    from strapgen.analysis.vibration.mean_rates import Curve
 
 #: The units as parts of the names of data.
 _UNIT_SUFFIXES = {"rad/s": "rad_s", "m/s^2": "m_s2"}
@@ -244,7 +244,7 @@ class VibrationResult(Result):
     """Mean rates of algorithms under vibration, computed and true."""
 
     each = VibrationRates
-    drawn_by = "strapgen.analysis.vibration.vibration_plot:vibration_image"
+    drawn_by = "strapgen.analysis.analysis_plots:vibration_image"
 
     outcomes: Sequence[CaseRates]
     cases: Sequence[AssessedCase]

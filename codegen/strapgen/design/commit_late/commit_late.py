@@ -14,17 +14,22 @@ import numpy as np
 
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.commit_late import commit_late_sources
-from strapgen.design.commit_late.late_unit import LateUnit, LateUnitOnIntegers, SampleKind, sample_integers
-from strapgen.design.commit_late.late_unit_in_c import LateUnitInC
+from strapgen.design.commit_late.late_unit import (
+    LateUnit,
+    LateUnitInC,
+    LateUnitOnIntegers,
+    SampleKind,
+    sample_integers,
+)
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sources import Sources
+from strapgen.run.backend_names import BACKENDS
 from strapgen.run.backends import fitted
 from strapgen.run.evaluators import Array, integers, numbers
-from strapgen.run.registry import BACKENDS
 
 
 class CommitLate:

@@ -1,7 +1,11 @@
-"""The least largest error over a band, by exchange from a linear programme.
+"""The least largest error over a band, by exchange from a linear programme, and the least sum of absolute errors.
 
 The programme on a grid tells where the largest errors lie; from there the exchange of Remez finds the solution in many
-digits. Only these decide, so that a design is the same on every machine.
+digits. The least weighted sum of absolute errors goes from vertex to vertex, as the simplex method does. At a vertex as
+many errors are zero as there are unknowns; its multipliers tell which of them to let go, and the weighted median along
+the edge which error becomes zero in its place. Only the many digits decide, so that a design is the same everywhere.
+
+Source: I. Barrodale, F. D. K. Roberts, SIAM J. Numer. Anal. 10 (1973) 839-848, for the sum of absolute errors.
 """
 
 from __future__ import annotations
@@ -13,7 +17,17 @@ from math import isqrt
 from operator import mul
 from typing import Any, NamedTuple, Protocol
 
-from strapgen.design.filters.band_grid import BITS, REAL, SEARCH_POINTS, integer, mean_points, search_points
+from strapgen.design.filters.band_grid import (
+    BITS,
+    REAL,
+    SEARCH_POINTS,
+    BandGrid,
+    distance,
+    integer,
+    mean_points,
+    search_points,
+)
+from strapgen.design.filters.filter_taps import Unknowns
 from strapgen.design.filters.mean_square import solve
 from strapgen.ir.exceptions import InputError, MissingExtraError
 
@@ -198,3 +212,146 @@ def _programme(basis: list[list[float]], right: list[float]) -> list[float]:
     if solution.x is None:
         raise InputError(f"the linear programme that starts the design has no solution ({solution.message})")
     return [float(value) for value in target - matrix @ solution.x[:-1]]
+
+
+class Minimax(NamedTuple):
+    """A filter of the least largest error."""
+
+    #: The oldest first
+    taps: tuple[Any, ...]
+    #: The largest error, for each unit of rate times the sampling interval
+    level: Any
+
+
+def minimax_filter(unknowns: Unknowns, band: Fraction, points: int = SEARCH_POINTS) -> Minimax:
+    """Return the filter of the least largest error over a band under its conditions.
+
+    `band`: highest angular frequency in rad a sample.
+
+    >>> from strapgen.design.filters.filter_taps import Shape
+    >>> filter = minimax_filter(Unknowns(Shape(3, 3, 4), 1), Fraction(13, 10))
+    >>> [round(float(tap), 12) for tap in filter.taps[4:]], f"{float(filter.level):.6e}"
+    ([0.408856141152, -0.099584912922, 0.013437894897], '2.160751e-03')
+    """
+    solution = least_largest(FilterProblem(unknowns), band, points)
+    values = [REAL.mpf(x.numerator) / x.denominator for x in unknowns.complete([Fraction(0)] * unknowns.free)]
+    for value, direction in zip(solution.free, unknowns.directions, strict=True):
+        values = [x + value * d.numerator / d.denominator for x, d in zip(values, direction, strict=True)]
+    return Minimax(unknowns.taps(values), solution.level)
+
+
+class FilterProblem:
+    """The error of a symmetric or antisymmetric filter, whose answers are real."""
+
+    def __init__(self, unknowns: Unknowns) -> None:
+        self._unknowns = unknowns
+        self.title = f"the filter of c_{unknowns.m}"
+        self.free = unknowns.free
+        self._directions = [[integer(x) for x in direction] for direction in unknowns.directions]
+        self._base = [integer(x) for x in unknowns.complete([Fraction(0)] * unknowns.free)]
+
+    def answers(self, points: Sequence[Any]) -> Answers:
+        """Return the answers at frequencies in rad a sample."""
+        unknowns = self._unknowns
+        shape = unknowns.shape
+        grid = BandGrid(points, shape.twice_middle // 2, increments=shape.increments)
+        tables = grid.sines if unknowns.m % 2 else grid.cosines
+        single = []
+        for group in unknowns.groups:
+            number, _ = distance(group[0][0], shape.twice_middle)
+            single.append(
+                [
+                    len(group) * gain * row[number] >> BITS
+                    for (gain, _), row in zip(grid.gains, tables, strict=True)
+                ]
+            )
+        rows = list(zip(*single, strict=True)) or [()] * len(points)
+        return Answers(
+            [[sum(map(mul, direction, row)) >> BITS for row in rows] for direction in self._directions],
+            [
+                value - (sum(map(mul, self._base, row)) >> BITS)
+                for value, row in zip(grid.bessel(unknowns.m), rows, strict=True)
+            ],
+        )
+
+
+#: How far a multiplier may exceed 1 at the best vertex.
+_MULTIPLIER_EXCESS = REAL.mpf(2) ** -100
+#: Most vertices for each point; a few for each unknown are usual.
+_MOST_VERTICES = 20
+
+
+def least_absolute(answers: Answers, weights: Sequence[Any]) -> list[Any]:
+    """Return the unknowns of the least sum of w |error|.
+
+    `weights` (n,): above 0.
+
+    >>> one = 1 << BITS
+    >>> [float(x) for x in least_absolute(Answers([[one] * 4], [one, 2 * one, 3 * one, 10 * one]), [2, 1, 1, 1])]
+    [2.0]
+    """
+    count, points = len(answers.columns), len(answers.right)
+    if points < count:
+        raise InputError(f"{points} lines do not determine {count} coefficients")
+    if not count:
+        return []
+    rows = [
+        [REAL.ldexp(REAL.mpf(value), -BITS) for value in row] for row in zip(*answers.columns, strict=True)
+    ]
+    right = [REAL.ldexp(REAL.mpf(value), -BITS) for value in answers.right]
+    active = [round(points * (k + 0.5) / count - 0.5) for k in range(count)]
+    for _ in range(_MOST_VERTICES * points):
+        square = [rows[k] for k in active]
+        (free,) = solve(square, [[right[k] for k in active]])
+        errors = [
+            value - REAL.fdot(zip(row, free, strict=True)) for row, value in zip(rows, right, strict=True)
+        ]
+        for k in active:
+            errors[k] = REAL.mpf(0)
+        multipliers = _multipliers(rows, errors, weights, active)
+        place = max(range(count), key=lambda k: abs(multipliers[k]))
+        if abs(multipliers[place]) <= 1 + _MULTIPLIER_EXCESS:
+            return free
+        unit = [REAL.mpf(0)] * count
+        unit[place] = REAL.mpf(-1 if multipliers[place] > 0 else 1)
+        (direction,) = solve(square, [unit])
+        slope = weights[active[place]] * (1 - abs(multipliers[place]))
+        active[place] = _next(rows, errors, weights, direction, slope, active)
+    raise InputError("the coefficients of the least sum of drifts are not reached; fewer samples are needed")
+
+
+def _multipliers(
+    rows: Sequence[Sequence[Any]], errors: Sequence[Any], weights: Sequence[Any], active: Sequence[int]
+) -> list[Any]:
+    """Return the slopes of |error| at the active points, by their weights, that would make the vertex the best one."""
+    count = len(active)
+    pull = [
+        -REAL.fsum(w * REAL.sign(e) * row[j] for w, e, row in zip(weights, errors, rows, strict=True))
+        for j in range(count)
+    ]
+    transposed = [[weights[k] * rows[k][j] for k in active] for j in range(count)]
+    (multipliers,) = solve(transposed, [pull])
+    return multipliers
+
+
+def _next(
+    rows: Sequence[Sequence[Any]],
+    errors: Sequence[Any],
+    weights: Sequence[Any],
+    direction: Sequence[Any],
+    slope: Any,
+    active: Sequence[int],
+) -> int:
+    """Return the point whose error becomes zero at the least sum along a direction, which begins with a slope."""
+    crossings = []
+    for k, (row, error) in enumerate(zip(rows, errors, strict=True)):
+        if k in active:
+            continue
+        change = REAL.fdot(zip(row, direction, strict=True))
+        if change and error / change > 0:
+            crossings.append((error / change, k, 2 * weights[k] * abs(change)))
+    for _, k, more in sorted(crossings):
+        slope += more
+        if slope >= 0:
+            return k
+    raise InputError("the lines do not determine the coefficients")

@@ -1,4 +1,8 @@
-"""Filters of least mean square error over a band, with the noise of the increments, under their conditions."""
+"""Filters of least mean square error over a band, under their conditions, and of the least largest one by iteration.
+
+Lawson's iteration changes the weights of least squares by the errors that these leave. It serves where errors are
+complex: with a gyro, or with unlike sides. It converges slowly; in the digits of `band_grid` it is the same everywhere.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,22 @@ from operator import mul
 from typing import Any
 
 from strapgen.catalogue.methods import window_conditions
-from strapgen.design.filters.band_grid import BITS, ONE, REAL, BandGrid, distance, mean_grid, real
-from strapgen.design.filters.unknowns import Shape
+from strapgen.design.filters.band_grid import (
+    BITS,
+    ONE,
+    REAL,
+    BandGrid,
+    distance,
+    integer,
+    magnitude,
+    mean_grid,
+    real,
+)
+from strapgen.design.filters.filter_taps import Shape
 from strapgen.ir.exceptions import InputError
 
 
-def design(
+def mean_square_filters(
     shape: Shape,
     degrees: Sequence[int],
     band: Fraction,
@@ -24,7 +38,7 @@ def design(
 
     `band`: highest angular frequency in rad a sample; the mean is over `band_grid.mean_points`.
 
-    >>> taps, = design(Shape(1, 1, 3), [1], Fraction(1), Fraction(0))
+    >>> taps, = mean_square_filters(Shape(1, 1, 3), [1], Fraction(1), Fraction(0))
     >>> [round(float(tap), 12) for tap in taps]
     [-0.25, 0.0, 0.25]
     """
@@ -106,3 +120,38 @@ def solve(matrix: Sequence[Sequence[Any]], rights: Sequence[Sequence[Any]]) -> l
             solution[line] = (table[line][number] - rest) / table[line][line]
         solutions.append(solution)
     return solutions
+
+
+#: Rounds of the iteration, and the least weight of a frequency, of weights that sum to 1.
+ROUNDS = 60
+_LEAST_WEIGHT = ONE // 10**12
+
+
+def lawson_filters(shape: Shape, degrees: Sequence[int], band: Fraction) -> list[list[Any]]:
+    """Return filters with the least largest errors over a band, of those that the iteration passes.
+
+    `band`: highest angular frequency in rad a sample; the errors are those at `band_grid.mean_points`.
+
+    >>> taps, = lawson_filters(Shape(1, 1, 3), [1], Fraction(1))
+    >>> [round(float(tap), 12) for tap in taps]
+    [-0.25, 0.0, 0.25]
+    """
+    return [_filter(shape, m, band) for m in degrees]
+
+
+def _filter(shape: Shape, m: int, band: Fraction) -> list[Any]:
+    grid = mean_grid(band, shape.samples - 1, shape.gyro, shape.increments)
+    weights = [ONE // len(grid.points)] * len(grid.points)
+    best: tuple[int, list[Any]] | None = None
+    for _ in range(ROUNDS):
+        (taps,) = least_squares(grid, shape, [m], weights)
+        errors = [magnitude(*e) for e in grid.errors(m, list(map(integer, taps)), shape.previous)]
+        if best is None or max(errors) < best[0]:
+            best = max(errors), taps
+        products = [w * e >> BITS for w, e in zip(weights, errors, strict=True)]
+        total = sum(products)
+        if not total:
+            break
+        weights = [(value << BITS) // total + _LEAST_WEIGHT for value in products]
+    assert best is not None
+    return best[1]

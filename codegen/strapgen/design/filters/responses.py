@@ -1,4 +1,4 @@
-"""What filters do: their errors over the band, their gain on noise, and what is amplified outside of the band."""
+"""What filters do over the band and outside of it, and the density of the rate there from a spectrum of vibration."""
 
 from __future__ import annotations
 
@@ -10,9 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.analysis.vibration.spectrum import Spectrum
 from strapgen.catalogue.methods.window import Window
-from strapgen.design.filters.band_grid import ONE, REAL, BandGrid, integer, magnitude, search_grid
-from strapgen.design.filters.unknowns import Shape, Unknowns
+from strapgen.design.filters.band_grid import (
+    BITS,
+    ONE,
+    REAL,
+    BandGrid,
+    integer,
+    magnitude,
+    mean_points,
+    search_grid,
+)
+from strapgen.design.filters.filter_taps import Shape, Unknowns
+from strapgen.ir.exceptions import InputError
 
 #: Frequencies up to half the sampling rate at which the gain of the filter of c_0 is searched.
 _GAIN_POINTS = 2000
@@ -97,3 +108,35 @@ def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
 
 def _integers(window: Window, m: int) -> list[int]:
     return [integer(tap) for tap in window.filters[m]]
+
+
+#: Binary digits of a density by its mean. Its last digits in double precision depend on the machine; these do not.
+_DIGITS = 30
+
+
+def weights(spectrum: Spectrum, band: Fraction, sample_hz: Fraction) -> tuple[int, ...]:
+    """Return the density of the rate at the frequencies of `band_grid.mean_points`, by its mean over these.
+
+    The rate about x and y together has the density (2 pi f)^2 P (|H_x|^2 + |H_y|^2), P the density of the input and H
+    its transfer functions to the angles.
+
+    `band`: highest angular frequency in rad a sample. `sample_hz`: sampling frequency in Hz.
+
+    >>> flat = Spectrum(lambda f: f**-2.0, {"angle_x": np.ones_like}, (1e-3, 100.0))
+    >>> {weight >> BITS for weight in weights(flat, Fraction(1), Fraction(100))}
+    {1}
+    """
+    hertz = np.array([float(b) for b in mean_points(band)]) * float(sample_hz) / (2 * np.pi)
+    channels = spectrum.amplitudes(hertz)
+    angles = [value for name, value in channels.items() if name.startswith("angle")]
+    if not angles:
+        raise InputError("the spectrum turns nothing; a column angle_x_rad or angle_y_rad is needed")
+    inside = (hertz >= spectrum.edges[0]) & (hertz <= spectrum.edges[-1])
+    power = sum(np.abs(value) ** 2 for value in angles)
+    density = np.where(inside, spectrum.densities(hertz) * hertz**2 * power, 0.0)
+    mean = density.mean()
+    if not 0 < mean < np.inf:
+        raise InputError(
+            f"the spectrum has no motion below {float(band):g} rad a sample; a wider band is needed"
+        )
+    return tuple(round(value * 2**_DIGITS) << (BITS - _DIGITS) for value in map(float, density / mean))

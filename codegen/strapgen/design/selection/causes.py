@@ -17,12 +17,11 @@ import mpmath
 
 from strapgen import pipeline
 from strapgen.analysis.vibration import assessment
-from strapgen.analysis.vibration.gyro import through_gyro
+from strapgen.analysis.vibration.assessment import through_gyro
 from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.rectification import Tone
 from strapgen.catalogue import Choice
-from strapgen.design.brief import DesignBrief, GyroBrief
-from strapgen.design.environment import LineEnvironment
+from strapgen.design.brief import DesignBrief, GyroBrief, LineEnvironment
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.quantization_noise import QuantizationNoise, quantization_noise

@@ -1,14 +1,18 @@
-"""Which algorithms meet a brief, as a result: causes of drift, what each costs, and what binds the others."""
+"""Which algorithms meet a brief, as a result: causes of drift, costs, what binds the others; and the firmware files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
 
+from strapgen import pipeline, registration
+from strapgen.catalogue.methods.shaped_coning import ShapedConing
+from strapgen.design import coning_design
 from strapgen.design.brief import DesignBrief
-from strapgen.design.selection.answer import verdicts
-from strapgen.design.selection.judgement import CAUSES, Judgement
+from strapgen.design.selection import causes
+from strapgen.design.selection.candidates import TUNED, Algorithm, AttitudeStep, DescribedAlgorithm
+from strapgen.design.selection.judgement import CAUSES, Judgement, verdicts
 from strapgen.design.selection.simulated import RANDOM_RUNS, RandomDrift, Simulated
 from strapgen.results.records import entry, keyed_table
 from strapgen.results.result import Result
@@ -34,7 +38,7 @@ class SelectionResult(Result):
     """Which algorithms meet a brief: every cause of drift, what each costs, and what binds the others."""
 
     row = JudgedAlgorithm
-    drawn_by = "strapgen.design.selection.selection_plot:selection_image"
+    drawn_by = "strapgen.design.design_plots:selection_image"
 
     brief: DesignBrief
     ordered: Sequence[Judgement]
@@ -151,3 +155,27 @@ def _run(drift: float | RandomDrift | None) -> str | None:
     if isinstance(drift, RandomDrift):
         return f"{drift.low:.2g}..{drift.high:.2g}"
     return None if drift is None else f"{drift:{_DRIFT}}"
+
+
+#: The report, the coefficients that a design has computed, and the description of two speeds.
+REPORT, COEFFICIENTS, SYSTEM = "design.txt", "coefficients.toml", "system.toml"
+
+
+def firmware_files(
+    brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, report: str, command: str
+) -> dict[str, str]:
+    """Return the files of a selected algorithm by their names."""
+    if not isinstance(algorithm, AttitudeStep):
+        described = cast(DescribedAlgorithm, algorithm)  # nothing else is selected
+        options = f"--target c-fixed --word {brief.processor.word}"
+        files = dict(described.sources(f"strapgen system {SYSTEM} {options}").step_files)
+        return files | {SYSTEM: described.file(), REPORT: report}
+    choice = algorithm.choice
+    settings = causes.settings(choice, brief, judgement.carry)
+    if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
+        choice = replace(choice, method=replace(choice.method, file=COEFFICIENTS))
+    files = dict(pipeline.compile(choice, "c-fixed", settings).step_files)
+    files |= registration.extension("generate.project", "--out").project_files(choice, "c-fixed", settings)
+    if judgement.method.startswith(TUNED) and isinstance(choice.method, ShapedConing):
+        files[COEFFICIENTS] = coning_design.written(choice.method, command)
+    return files | {REPORT: report}

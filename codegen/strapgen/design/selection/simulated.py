@@ -13,14 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.design.brief import DesignBrief, GyroBrief
-from strapgen.design.environment import Line
+from strapgen.design.brief import DesignBrief, GyroBrief, Line
 from strapgen.design.selection import causes
-from strapgen.design.selection.algorithm import Algorithm
-from strapgen.design.selection.answer import in_order
-from strapgen.design.selection.candidates import Contender
-from strapgen.design.selection.choosing import algorithm_of
-from strapgen.design.selection.judgement import Judgement, after_run
+from strapgen.design.selection.candidates import Algorithm, Contender, algorithm_of
+from strapgen.design.selection.judgement import Judgement, after_run, in_order
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.rate_profiles import KNOT, CosineSum, ReferenceAttitude
 from strapgen.lab.random_runs import Errors, MeanSquare, SteadyRuns, random_runs

@@ -16,7 +16,7 @@ from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.evidence.overflow.c_types import MODELS, Model
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
-from strapgen.targets.c_fixed.words import memory_type
+from strapgen.targets.c_numbers import memory_type
 
 _OPTIONS = (
     "-eva",

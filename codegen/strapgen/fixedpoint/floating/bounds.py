@@ -11,13 +11,17 @@ from fractions import Fraction
 from functools import lru_cache
 
 from strapgen.fixedpoint.floating import proved
-from strapgen.fixedpoint.floating.errors import added_errors
-from strapgen.fixedpoint.floating.expressions import Expressions, NoBoundError
-from strapgen.fixedpoint.floating.number_formats import NUMBERS
-from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
+from strapgen.fixedpoint.floating.errors import (
+    NUMBERS,
+    Expressions,
+    NoBoundError,
+    added_errors,
+    sensitivities,
+    slopes,
+)
+from strapgen.fixedpoint.format_plan import largest_magnitude
 from strapgen.fixedpoint.intervals import Interval, norm
-from strapgen.fixedpoint.limits import largest_magnitude
-from strapgen.fixedpoint.terms import up
+from strapgen.fixedpoint.quantities import up
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import TURNING, Settings
 from strapgen.ir.interfaces import Condition, RoundingAccumulation, RoundingBounds, StepRounding
@@ -215,7 +219,7 @@ def _accumulation(
     whole = max(norm(errors[k : k + width]) for k in rows)
     parts = max(norm(step.local[k : k + width]) for k in rows) + length * norm(step.transition)
     sizes = tuple(largest[signal.name] for signal in program.inputs[1:] for _ in signal.elements)
-    from strapgen.fixedpoint.runs.accumulation import transition_growth
+    from strapgen.fixedpoint.accumulation import transition_growth
 
     growth = transition_growth(program, transition, sizes, width, 1 + norm(step.away))
     return RoundingAccumulation(Fraction(0), up(min(whole, parts)), Fraction(0), growth)

@@ -6,18 +6,157 @@ rounding, and q, of second order, is what the derivative f' leaves out. Only r a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 
-from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions, NoBoundError
-from strapgen.fixedpoint.floating.number_formats import NumberFormat, exponent
-from strapgen.fixedpoint.floating.sensitivities import sinc_slope
 from strapgen.fixedpoint.intervals import GRID, Interval, maximum, root
-from strapgen.fixedpoint.quantities import is_power_of_two
-from strapgen.fixedpoint.terms import up
+from strapgen.fixedpoint.quantities import binary, is_power_of_two, up
+from strapgen.ir.program import RESOLUTION, Constant, Node, Program, Reference
 
 _ZERO = Fraction(0)
+
+
+INPUT, CONSTANT = "input", "constant"
+
+
+class NoBoundError(Exception):
+    """No bound of the rounding can be proved; the text says why."""
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A single operation, a literal or an element of an input."""
+
+    kind: str  # an operation of `strapgen.ir.program.OPERATIONS`, `INPUT` or `CONSTANT`
+    arguments: tuple[int, ...] = ()  # places of the operands
+    name: str = ""  # name of an element of an input
+    value: Fraction = Fraction(0)  # value of a literal
+
+
+@dataclass
+class Expressions:
+    """The operations of a program, each after its operands."""
+
+    items: list[Expression] = field(default_factory=list)
+    names: dict[str, int] = field(default_factory=dict)  # places of elements of inputs and of assignments
+    labels: dict[int, str] = field(default_factory=dict)  # assignments in which operations stand
+    results: dict[str, list[int]] = field(default_factory=dict)  # places of the elements of every result
+    _places: dict[Expression, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, program: Program) -> Expressions:
+        """Return the operations of a program."""
+        flat = cls()
+        for name in [*(name for signal in program.inputs for name in signal.elements), RESOLUTION]:
+            flat.names[name] = flat._place(Expression(INPUT, name=name), name)
+        for assignment in program.body:
+            flat.names[assignment.name] = flat.place_of(assignment.value, assignment.name)
+        for result in program.results:
+            name = result.signal.name
+            flat.results[name] = [flat.place_of(node, name) for node in result.nodes]
+        return flat
+
+    def place_of(self, node: Node, label: str = "") -> int:
+        """Return the place of a node, with its operations added where they are new."""
+        if isinstance(node, Reference):
+            return self.names[node.name]
+        if isinstance(node, Constant):
+            return self._place(Expression(CONSTANT, value=node.value), label)
+        arguments = tuple(self.place_of(argument, label) for argument in node.arguments)
+        return self._place(Expression(node.kind, arguments), label)
+
+    def squared(self, place: int) -> list[int]:
+        """Return the places of the numbers of whose squares an operation is the sum; none if it is no such sum."""
+        expression = self.items[place]
+        if expression.kind == "add":
+            parts = [self.squared(k) for k in expression.arguments]
+            return [k for part in parts for k in part] if all(parts) else []
+        is_square = expression.kind == "multiply" and len({*expression.arguments}) == 1
+        return [expression.arguments[0]] if is_square else []
+
+    def _place(self, expression: Expression, label: str) -> int:
+        place = self._places.setdefault(expression, len(self.items))
+        if place == len(self.items):
+            self.items.append(expression)
+            self.labels[place] = label
+        return place
+
+
+@dataclass(frozen=True)
+class NumberFormat:
+    """A binary floating-point format of IEEE 754.
+
+    >>> NUMBERS["float"].rounded(Fraction(1, 3)) * 2**25
+    Fraction(11184811, 1)
+    """
+
+    precision: int  # bits of the significand, the leading one included
+    smallest: int  # exponent of the smallest positive number: 2**smallest
+    overflow: int  # exponent of the power of two that all numbers are below
+
+    @property
+    def unit(self) -> Fraction:
+        """Half the distance from 1 to the next number: the largest relative error of a rounding."""
+        return Fraction(1, 1 << self.precision)
+
+    @property
+    def underflow(self) -> Fraction:
+        """Half the smallest number: the largest error of a rounding near zero."""
+        return power_of_two(self.smallest - 1)
+
+    def rounded(self, value: Fraction) -> Fraction:
+        """Return the nearest number, of two the even one, as a literal is read."""
+        if not value:
+            return value
+        place = max(exponent(abs(value)) - self.precision + 1, self.smallest)
+        steps = round(binary(value.numerator, place) / value.denominator)
+        return binary(steps, -place)
+
+    def half_ulp(self, largest: Fraction) -> Fraction:
+        """Return the largest error of rounding a number of at most this magnitude.
+
+        Just above a power of two no number is farther from the nearest one than from that power.
+
+        >>> NUMBERS["double"].half_ulp(Fraction(1)) * 2**54
+        Fraction(1, 1)
+        """
+        if not largest:
+            return Fraction(0)
+        power = exponent(largest)
+        above = largest - power_of_two(power)
+        half = power_of_two(power - self.precision)
+        return max(half / 2, min(half, above), self.underflow)
+
+    def ulp(self, largest: Fraction) -> Fraction:
+        """Return a unit in the last place of numbers of at most this magnitude: of a power of two, that below it."""
+        if not largest:
+            return Fraction(2) ** self.smallest
+        power = exponent(largest)
+        unit = Fraction(2) ** max(power - self.precision + 1, self.smallest)
+        return unit if largest > Fraction(2) ** power else max(unit / 2, 2 * self.underflow)
+
+
+#: The formats by the name of their type in C.
+NUMBERS = {"double": NumberFormat(53, -1074, 1024), "float": NumberFormat(24, -149, 128)}
+
+
+def exponent(value: Fraction) -> int:
+    """Return the exponent of the largest power of two that is not above a positive number.
+
+    >>> exponent(Fraction(5, 16)), exponent(Fraction(8))
+    (-2, 3)
+    """
+    top, bottom = value.numerator, value.denominator
+    power = top.bit_length() - bottom.bit_length()
+    return power if top << max(0, -power) >= bottom << max(0, power) else power - 1
+
+
+@lru_cache(maxsize=4096)
+def power_of_two(power: int) -> Fraction:
+    """Return a power of two."""
+    return binary(1, -power)
 
 
 @dataclass(frozen=True)
@@ -275,3 +414,77 @@ def _least_magnitude(interval: Interval) -> Fraction:
 def _root_share(share: Fraction) -> Fraction:
     """Return a bound of the relative error of a root, from that of its radicand, which is at most 1/2."""
     return share / 2 + share * share / 2 if share <= Fraction(1, 2) else share
+
+
+_NO_SLOPE = Interval(0, 0)
+_SLOPE_ONE = Interval.of(1)
+#: One of two operands moves a result, or a mean of both does.
+_SHARE = Interval.of(0, 1)
+
+
+def slopes(expressions: Expressions, ranges: Sequence[Interval]) -> list[tuple[Interval, ...]]:
+    """Return the derivatives of every operation by its operands, at the exact values.
+
+    A maximum and a selection move with one operand, or between both. A root that may be zero has the slope 0: its error
+    is bounded as a whole.
+    """
+    return [
+        _slopes(expression, [ranges[k] for k in expression.arguments], ranges[place])
+        for place, expression in enumerate(expressions.items)
+    ]
+
+
+def _slopes(expression: Expression, operands: Sequence[Interval], value: Interval) -> tuple[Interval, ...]:
+    match expression.kind:
+        case "add":
+            return _SLOPE_ONE, _SLOPE_ONE
+        case "subtract":
+            return _SLOPE_ONE, -_SLOPE_ONE
+        case "negate":
+            return (-_SLOPE_ONE,)
+        case "multiply":
+            return operands[1], operands[0]
+        case "divide":
+            inverse = operands[1].reciprocal()
+            return inverse, -(value * inverse)
+        case "sqrt":
+            return (value.scale(Fraction(2)).reciprocal() if value.low > 0 else _NO_SLOPE,)
+        case "maximum":
+            return _SHARE, _SHARE
+        case "select":
+            return _NO_SLOPE, _SHARE, _SHARE
+        case "sin":
+            return (Interval.of(-1, 1),)
+        case "cos":
+            return (Interval.symmetric(min(Fraction(1), operands[0].magnitude)),)
+        case "sinc":
+            return (Interval.symmetric(sinc_slope(operands[0].magnitude)),)
+    return tuple(_NO_SLOPE for _ in expression.arguments)
+
+
+def sinc_slope(magnitude: Fraction) -> Fraction:
+    """Return a bound of the derivative of sin(x)/x up to a magnitude of x: |x|/3, and 1/2 anywhere."""
+    return min(magnitude / 3, Fraction(1, 2))
+
+
+def sensitivities(
+    expressions: Expressions,
+    derivatives: Sequence[tuple[Interval, ...]],
+    place: int,
+    held: Collection[int] = (),
+) -> dict[int, Fraction]:
+    """Return bounds of the derivatives of one result by all operations that it is made from.
+
+    The chain rule is followed back from the result, so that what comes by several ways is added before its magnitude is
+    taken. It stops at the places that are `held`.
+    """
+    adjoints = {place: _SLOPE_ONE}
+    for k in range(place, -1, -1):
+        adjoint = adjoints.get(k)
+        if adjoint is None or k in held or expressions.items[k].kind in (INPUT, CONSTANT):
+            continue
+        for argument, slope in zip(expressions.items[k].arguments, derivatives[k], strict=True):
+            part = slope if adjoint is _SLOPE_ONE else adjoint * slope
+            known = adjoints.get(argument)
+            adjoints[argument] = part if known is None else known + part
+    return {k: adjoint.magnitude for k, adjoint in adjoints.items() if k not in held}

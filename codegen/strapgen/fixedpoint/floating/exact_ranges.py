@@ -11,9 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.fixedpoint.derivation_context import samples
-from strapgen.fixedpoint.floating.expressions import CONSTANT, INPUT, Expression, Expressions, NoBoundError
-from strapgen.fixedpoint.floating.number_formats import exponent
+from strapgen.fixedpoint.derived_sums import samples
+from strapgen.fixedpoint.floating.errors import (
+    CONSTANT,
+    INPUT,
+    Expression,
+    Expressions,
+    NoBoundError,
+    exponent,
+)
 from strapgen.fixedpoint.intervals import Interval, maximum
 from strapgen.fixedpoint.quantities import (
     Definition,

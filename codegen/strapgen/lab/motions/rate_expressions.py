@@ -140,7 +140,7 @@ class UnboundedError(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Jet:
+class _Jet:
     """A Taylor polynomial."""
 
     #: The value itself, or all values over the interval
@@ -157,18 +157,18 @@ class Jets:
         self.sign = 1 if bounds else -1
         self.context = iv if bounds else mp
 
-    def number(self, value: Any) -> Jet:
+    def number(self, value: Any) -> _Jet:
         """Return a constant."""
         number = iv.mpf([value - abs(value) * 2**-45, value + abs(value) * 2**-45]) if self.bounds else value
         return self.jet(number, [0] * self.order)
 
-    def time(self, value: Any) -> Jet:
+    def time(self, value: Any) -> _Jet:
         """Return the time, from its value at an instant or from its interval."""
         return self.jet(value, [1, *[0] * (self.order - 1)])
 
-    def jet(self, value: Any, rest: Sequence[Any]) -> Jet:
+    def jet(self, value: Any, rest: Sequence[Any]) -> _Jet:
         """Return a jet from its value and its further coefficients."""
-        return Jet(value, [_largest(value) if self.bounds else value, *rest])
+        return _Jet(value, [_largest(value) if self.bounds else value, *rest])
 
     def divisor(self, value: Any) -> Any:
         """Return what a quotient is divided by."""
@@ -181,18 +181,18 @@ class Jets:
             raise UnboundedError
         return least
 
-    def add(self, x: Jet, y: Jet) -> Jet:
+    def add(self, x: _Jet, y: _Jet) -> _Jet:
         """Return a sum."""
         rest = [a + b for a, b in zip(x.coefficients[1:], y.coefficients[1:], strict=True)]
         return self.jet(x.value + y.value, rest)
 
-    def multiply(self, x: Jet, y: Jet) -> Jet:
+    def multiply(self, x: _Jet, y: _Jet) -> _Jet:
         """Return a product."""
         a, b = x.coefficients, y.coefficients
         rest = [_convolved(a, b, k, 0, k) for k in range(1, self.order + 1)]
         return self.jet(x.value * y.value, rest)
 
-    def power(self, x: Jet, exponent: int) -> Jet:
+    def power(self, x: _Jet, exponent: int) -> _Jet:
         """Return a whole power."""
         if exponent < 0:
             return self.reciprocal(self.power(x, -exponent))
@@ -201,9 +201,9 @@ class Jets:
             result = self.multiply(result, result)
             if digit == "1":
                 result = self.multiply(result, x)
-        return Jet(x.value**exponent, result.coefficients) if exponent else result
+        return _Jet(x.value**exponent, result.coefficients) if exponent else result
 
-    def reciprocal(self, x: Jet) -> Jet:
+    def reciprocal(self, x: _Jet) -> _Jet:
         """Return 1/x."""
         inverse = 1 / self.divisor(x.value)
         result = [inverse]
@@ -211,7 +211,7 @@ class Jets:
             result.append(self.sign * inverse * _convolved(result, x.coefficients, k, 0, k - 1))
         return self.jet(1 / x.value, result[1:])
 
-    def root(self, x: Jet) -> Jet:
+    def root(self, x: _Jet) -> _Jet:
         """Return the square root."""
         self.require_positive(x.value)
         value = self.context.sqrt(x.value)
@@ -222,7 +222,7 @@ class Jets:
             result.append((x.coefficients[k] + self.sign * inner) * half)
         return self.jet(value, result[1:])
 
-    def exp(self, x: Jet) -> Jet:
+    def exp(self, x: _Jet) -> _Jet:
         """Return the exponential."""
         value = self.context.exp(x.value)
         result = [_largest(value) if self.bounds else value]
@@ -231,7 +231,7 @@ class Jets:
             result.append(_convolved(slope, result, k, 1, k) / k)
         return self.jet(value, result[1:])
 
-    def log(self, x: Jet) -> Jet:
+    def log(self, x: _Jet) -> _Jet:
         """Return the natural logarithm."""
         self.require_positive(x.value)
         inverse = 1 / self.divisor(x.value)
@@ -242,7 +242,7 @@ class Jets:
             result.append((x.coefficients[k] + self.sign * inner) * inverse)
         return self.jet(self.context.log(x.value), result[1:])
 
-    def sine_and_cosine(self, x: Jet) -> tuple[Jet, Jet]:
+    def sine_and_cosine(self, x: _Jet) -> tuple[_Jet, _Jet]:
         """Return the sine and the cosine."""
         values = self.context.sin(x.value), self.context.cos(x.value)
         sine, cosine = ([_largest(value) if self.bounds else value] for value in values)
@@ -257,9 +257,9 @@ class Jets:
         if (value.a if self.bounds else value) <= 0:
             raise UnboundedError
 
-    def evaluated(self, operations: Sequence[Operation], time: Any) -> list[Jet]:
+    def evaluated(self, operations: Sequence[Operation], time: Any) -> list[_Jet]:
         """Return the jets of all operations, each on those before it."""
-        jets: list[Jet] = []
+        jets: list[_Jet] = []
         for name, places, number in operations:
             arguments = [jets[place] for place in places]
             if name == "time":

@@ -83,7 +83,7 @@ class RateMotion(Motion):
         return self._at(time, lambda piece, t: piece.rate_at(t), (3,))
 
     def _at(
-        self, time: Any, function: Callable[[Piece, Any], Iterable[Any]], shape: tuple[int, ...]
+        self, time: Any, function: Callable[[_Piece, Any], Iterable[Any]], shape: tuple[int, ...]
     ) -> Array:
         """Return the values of a function of a piece and a time in it, at an array of times."""
         times = np.asarray(time, float)
@@ -95,7 +95,7 @@ class RateMotion(Motion):
         return np.array(rows, float).reshape(*times.shape, *shape)
 
 
-def _attitude_elements(piece: Piece, time: Any) -> list[Any]:
+def _attitude_elements(piece: _Piece, time: Any) -> list[Any]:
     """Return the attitude at a time in a piece, row by row; what is below the bound of its error is zero."""
     return [x if abs(x) > piece.error else mp.mpf(0) for row in piece.attitude_at(time) for x in row]
 
@@ -109,7 +109,7 @@ def _number(time: float) -> Any:
 
 
 @dataclass(frozen=True)
-class Piece:
+class _Piece:
     """An interval of time with the Taylor coefficients of what is integrated over it."""
 
     #: Middle and half the length, in s
@@ -155,10 +155,10 @@ class Integrated:
 
     def __init__(self, name: str, operations: list[Operation], places: list[int]) -> None:
         self._name, self._operations, self._places = name, operations, places
-        self._pieces: dict[int, list[Piece]] = {1: [], -1: []}
+        self._pieces: dict[int, list[_Piece]] = {1: [], -1: []}
         self._ends: dict[int, list[Any]] = {1: [], -1: []}
 
-    def piece(self, time: Any) -> Piece:
+    def piece(self, time: Any) -> _Piece:
         """Return the piece that holds a time; pieces up to it are added where they are missing."""
         direction = 1 if time >= 0 else -1
         pieces, ends = self._pieces[direction], self._ends[direction]
@@ -189,7 +189,7 @@ class Integrated:
             f"{self._name}: the rate has no bound, or no smooth course, near t = {float(direction * begin):.3f} s"
         )
 
-    def _piece(self, middle: Any, half: Any, direction: int, before: list[Piece]) -> Piece | None:
+    def _piece(self, middle: Any, half: Any, direction: int, before: list[_Piece]) -> _Piece | None:
         """Return a piece that continues those before it; None if its error is too large."""
         try:
             bounds = Jets(RATE_DEGREE + 1, True).evaluated(self._operations, _interval(middle, half))
@@ -220,7 +220,7 @@ class Integrated:
         may_grow = may_grow and series * 2 ** (ATTITUDE_DEGREE + 1) < ATTITUDE_TOLERANCE
         angle = [start - more for start, more in zip(angle, gained, strict=True)]
         inverse = [list(column) for column in zip(*turned, strict=True)]
-        return Piece(
+        return _Piece(
             middle,
             half,
             rate,

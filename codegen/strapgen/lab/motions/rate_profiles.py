@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol, runtime_checkable
 
@@ -81,14 +81,17 @@ class CosineSum:
     phases: Array
     #: See `RateProfile`
     substeps: int = _SUBSTEPS
+    #: What a gyro of limited bandwidth measures of it; None for one that passes on everything
+    measured: CosineSum | None = None
 
     def rate(self, time: Any) -> Array:
         """Return the sum at some times, (..., 3)."""
         return self._waves(time, np.cos, self.amplitudes)
 
     def angle(self, time: Any) -> Array:
-        """Return the integral of the sum up to some times, (..., 3); its mean is zero."""
-        return self._waves(time, np.sin, self.amplitudes / self.frequencies)
+        """Return the integral of what a gyro measures up to some times, (..., 3); its mean is zero."""
+        seen = self.measured or self
+        return seen._waves(time, np.sin, seen.amplitudes / seen.frequencies)
 
     def _waves(self, time: Any, wave: Callable[[Array], Array], amplitudes: Array) -> Array:
         times = np.asarray(time, float)[..., None]
@@ -104,6 +107,10 @@ class CosineSum:
         total[..., moving] = sums
         return total
 
+    def through_gyro(self, bandwidth: float) -> CosineSum:
+        """Return the sum with what a gyro of a bandwidth in Hz measures of it, a Butterworth filter of second order."""
+        return replace(self, measured=self.filtered(2 * math.pi * bandwidth))
+
     def filtered(self, cutoff: float) -> CosineSum:
         """Return the sum as a Butterworth filter of second order passes it on, long after it began.
 
@@ -118,29 +125,7 @@ class CosineSum:
 
 
 @dataclass(frozen=True)
-class ThroughGyro:
-    """A sum of cosines that a gyro of limited bandwidth measures."""
-
-    #: The body rate, and what the gyro passes on of it
-    motion: CosineSum
-    measured: CosineSum
-
-    @property
-    def substeps(self) -> int:
-        """See `RateProfile`."""
-        return self.motion.substeps
-
-    def rate(self, time: Any) -> Array:
-        """Return the body rate at some times, (..., 3)."""
-        return self.motion.rate(time)
-
-    def angle(self, time: Any) -> Array:
-        """Return the integral of the measured rate up to some times, (..., 3)."""
-        return self.measured.angle(time)
-
-
-@dataclass(frozen=True)
-class Slews:
+class _Slews:
     """Eight slews of 1.2 s about different axes, on top of a sum of cosines."""
 
     background: CosineSum
@@ -205,7 +190,7 @@ def random_sum(
     return CosineSum(amplitudes, 2 * np.pi * frequencies, 2 * np.pi * _fractions(phase_roots, number))
 
 
-def vibration_rate(angle: float, gyro: float) -> CosineSum | ThroughGyro:
+def vibration_rate(angle: float, gyro: float) -> CosineSum:
     """Return the rate of a vibration of forty lines from 2 Hz to 30 Hz, of which y is a quarter period behind x.
 
     `angle`: root mean square of the angle on each axis in rad, the same in every line. `gyro`: bandwidth of the
@@ -217,10 +202,10 @@ def vibration_rate(angle: float, gyro: float) -> CosineSum | ThroughGyro:
     phases = 2 * np.pi * _fractions(_PHASE_ROOTS, np.arange(1, _LINES.size + 1))
     phases[1] = phases[0] - np.pi / 2
     motion = CosineSum(frequencies * (angle * math.sqrt(2 / _LINES.size)), frequencies, phases)
-    return ThroughGyro(motion, motion.filtered(2 * math.pi * gyro)) if gyro < math.inf else motion
+    return motion.through_gyro(gyro) if gyro < math.inf else motion
 
 
-def slew(onset: float, rate: float) -> Slews:
+def slew(onset: float, rate: float) -> _Slews:
     """Return slews whose rate follows the hyperbolic tangent at both ends.
 
     `onset`: time in s in which the hyperbolic tangent goes from 0 to tanh 1. `rate`: in rad/s.
@@ -229,10 +214,10 @@ def slew(onset: float, rate: float) -> Slews:
     axes, sway = _directions(), _sway()
     substeps = max(_SUBSTEPS, math.ceil(_ONSET_SUBSTEPS * KNOT / onset))
     starts = _FIRST + _PERIOD * np.arange(_SLEWS, dtype=np.float64)
-    return Slews(sway, rate * axes, starts, onset, lambda x: (1 + np.tanh(x)) / 2, _soft_integral, substeps)
+    return _Slews(sway, rate * axes, starts, onset, lambda x: (1 + np.tanh(x)) / 2, _soft_integral, substeps)
 
 
-def ramps(onset: float, rate: float) -> Slews:
+def ramps(onset: float, rate: float) -> _Slews:
     """Return slews whose rate is linear at both ends.
 
     `onset`: duration of a ramp in s. `rate`: in rad/s.
@@ -246,7 +231,7 @@ def ramps(onset: float, rate: float) -> Slews:
         )
     axes, sway = _directions(), _sway()
     starts = _FIRST_RAMP + _PERIOD * np.arange(_SLEWS, dtype=np.float64)
-    return Slews(sway, rate * axes, starts, onset, lambda x: np.clip(x, 0, 1), _ramp_integral, _SUBSTEPS)
+    return _Slews(sway, rate * axes, starts, onset, lambda x: np.clip(x, 0, 1), _ramp_integral, _SUBSTEPS)
 
 
 def _check_onset(onset: float) -> None:

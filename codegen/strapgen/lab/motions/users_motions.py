@@ -165,7 +165,9 @@ def _read(name: str, source: bytes, duration: Fraction) -> UsersMotion | RateMot
     """Return the motion of a file with these contents, checked once."""
     functions = _functions(name)
     if EXPRESSION in functions:
-        motion_of_rate = RateMotion(name, {}, _rate_of(name, functions[EXPRESSION]))
+        with _guarded(name):
+            rate = rate_of(name, functions[EXPRESSION])
+        motion_of_rate = RateMotion(name, {}, rate)
         motion_of_rate.error_bound(float(duration))  # integrates it over the duration, or refuses it
         return motion_of_rate
     users = UsersMotion(name, functions=functions)
@@ -232,12 +234,6 @@ def rate_expressions(path: str | Path) -> tuple[Any, ...]:
     if not isinstance(users, RateMotion):
         raise InputError(f"{path} has no function {EXPRESSION}, from which series are derived")
     return users.elements
-
-
-def _rate_of(name: str, function: Callable[..., Any]) -> tuple[Any, ...]:
-    """Return the expressions of a file's function."""
-    with _guarded(name):
-        return rate_of(name, function)
 
 
 def _guarded(name: str) -> Any:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 
 from strapgen.ir import checks, units
 from strapgen.ir.exceptions import InputError
@@ -23,20 +24,6 @@ _OTHER = re.compile(
     r"(?:.*_)?(?:acc\w*|linear_?acc\w*|specific_?force|mag\w*|quat\w*|euler\w*)(?:_.*)?|a|m|b|e|q"
 )
 _SUFFIXES = ("ns", "us", "ms", "s", "sec", "rad_s", "rads", "deg_s", "dps", "mdps", "m_s2", "mss")
-
-
-@dataclass(frozen=True)
-class Stated:
-    """What a user states of a recording of rates, in place of its header."""
-
-    #: Units of rates and time, in the spelling of `units`
-    unit: str | None = None
-    #: Names or numbers of the columns with commas between: the time and three rates; with `sample_hz` the rates
-    #: alone
-    columns: str | None = None
-    time_unit: str | None = None
-    #: Sampling rate in Hz in place of a column of times
-    sample_hz: float | str | Fraction | None = None
 
 
 @dataclass(frozen=True)
@@ -62,12 +49,23 @@ class _HeaderCell:
     text: str
 
 
-def rates_layout(header: Sequence[str] | None, width: int, stated: Stated) -> ColumnLayout:
-    """Return where time and rates stand in a file of rates."""
+def rates_layout(
+    header: Sequence[str] | None,
+    width: int,
+    *,
+    unit: str | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    has_time: bool = True,
+) -> ColumnLayout:
+    """Return where time and rates stand in a file of rates.
+
+    `unit, columns, time_unit`: what the user states in place of the header: units of rates and time in the spelling of
+    `units`; names or numbers of the columns with commas between, the time and three rates, or the rates alone.
+    """
     cells = None if header is None else [_cell(text) for text in header]
-    has_time = stated.sample_hz is None
-    places = _stated_places(stated, cells, width) if stated.columns else _found_places(cells, width, has_time)
-    unit, time_unit = stated.unit, stated.time_unit
+    find = partial(_stated_places, columns) if columns else _found_places
+    places = find(cells, width, has_time)
     if cells is not None:
         of_rates = {*units.RATES}.intersection(cells[place].unit for place in places[has_time:])
         if len(of_rates) > 1:
@@ -163,13 +161,15 @@ def _is_other(cell: _HeaderCell) -> bool:
     return match is not None and _OTHER.fullmatch(match[1].strip("_")) is not None
 
 
-def _stated_places(stated: Stated, cells: Sequence[_HeaderCell] | None, width: int) -> tuple[int, ...]:
+def _stated_places(
+    columns: str, cells: Sequence[_HeaderCell] | None, width: int, has_time: bool
+) -> tuple[int, ...]:
     """Return the places of the columns that a user names."""
-    names = [name.strip() for name in (stated.columns or "").split(",")]
-    count = 4 if stated.sample_hz is None else 3
+    names = [name.strip() for name in columns.split(",")]
+    count = 4 if has_time else 3
     if len(names) != count or len({*names}) != count:
         what = "the time and three rates" if count == 4 else "three rates, since --sample-hz states the time"
-        raise InputError(f"--columns {stated.columns} names {len(names)} columns; {count} are needed: {what}")
+        raise InputError(f"--columns {columns} names {len(names)} columns; {count} are needed: {what}")
     places = []
     for name in names:
         exact = [k for k, cell in enumerate(cells or ()) if name.lower() in (cell.text.lower(), cell.name)]

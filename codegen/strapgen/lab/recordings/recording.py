@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.lab.recordings.recorded_header import (
     ColumnLayout,
-    Stated,
     known_unit,
     named_layout,
     rates_layout,
@@ -259,8 +259,9 @@ def read_rates(
         time_unit = known_unit("time unit", time_unit, units.TIMES)
     if bridge_gaps and resample_hz is None:
         raise InputError("bridge_gaps needs resample_hz, an even grid for the rate across a gap")
-    stated = Stated(unit, columns, time_unit, sample_hz)
-    rows, layout = read_rows(path, lambda header, width: rates_layout(header, width, stated), sample_hz)
+    has_time = sample_hz is None
+    find = partial(rates_layout, unit=unit, columns=columns, time_unit=time_unit, has_time=has_time)
+    rows, layout = read_rows(path, find, sample_hz)
     if layout.unit is None:
         raise InputError(
             f"{path} states no unit of the rates; --rate-unit is needed, {', '.join(RATE_UNITS)}"

@@ -7,7 +7,6 @@ The deterministic errors are kernels of the catalogue at the true values: ``imu-
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,7 +60,7 @@ class MeasurementUnit:
 
     def __init__(self, errors: InstrumentErrors, interval: float, run: int = 0) -> None:
         self._interval = interval
-        self._streams = Streams(errors.seed, run)
+        self._streams = _Streams(errors.seed, run)
         self.errors = _drawn(errors, self._streams) if errors.drawn else errors
         self._causes = {*self.errors.causes}
         gyro, accelerometer = self.errors.gyro, self.errors.accelerometer
@@ -159,15 +158,15 @@ class _Triad:
     """Three gyros or accelerometers: their response, their noise and their pulses."""
 
     def __init__(
-        self, triad: TriadErrors, errors: InstrumentErrors, name: str, interval: float, streams: Streams
+        self, triad: TriadErrors, errors: InstrumentErrors, name: str, interval: float, streams: _Streams
     ) -> None:
         self._triad, self._name, self._interval, self._streams = triad, name, interval, streams
         self._lag = (
-            Lag(triad.bandwidth_hz, triad.damping, interval)
+            _Lag(triad.bandwidth_hz, triad.damping, interval)
             if np.isfinite(triad.bandwidth_hz).any()
             else None
         )
-        self._times = SampleTimes(triad.delay, errors.sampling.jitter, interval)
+        self._times = _SampleTimes(triad.delay, errors.sampling.jitter, interval)
         self._drift = np.zeros((1, 3))
         self._angle: Array | None = None
         self._pulses = np.zeros((1, 3))
@@ -248,7 +247,7 @@ class _Heating:
 class _Loss:
     """Samples that do not arrive, gyros and accelerometers together."""
 
-    def __init__(self, errors: InstrumentErrors, streams: Streams) -> None:
+    def __init__(self, errors: InstrumentErrors, streams: _Streams) -> None:
         self._sampling, self._streams = errors.sampling, streams
         self._late = np.zeros(6)
         self._last: Array | None = None
@@ -279,7 +278,7 @@ class _Loss:
                 self._late = np.zeros(6)
 
 
-def _drawn(errors: InstrumentErrors, streams: Streams) -> InstrumentErrors:
+def _drawn(errors: InstrumentErrors, streams: _Streams) -> InstrumentErrors:
     """Return errors whose constants are drawn from the normal distributions that were stated."""
 
     def drawn(name: str, values: Array) -> Array:
@@ -297,7 +296,9 @@ def _drawn(errors: InstrumentErrors, streams: Streams) -> InstrumentErrors:
             scale_plus=drawn_plus,
             scale_minus=np.where(plus == minus, drawn_plus, other),
             misalignment=drawn(f"{name} misalignment", part.misalignment),
-            terms=_drawn_terms(part.terms, streams),
+            terms={
+                term: value * float(streams.normal(term, 1, 1)[0, 0]) for term, value in part.terms.items()
+            },
         )
 
     return replace(
@@ -308,12 +309,8 @@ def _drawn(errors: InstrumentErrors, streams: Streams) -> InstrumentErrors:
     )
 
 
-def _drawn_terms(terms: Mapping[str, float], streams: Streams) -> dict[str, Any]:
-    return {name: value * float(streams.normal(name, 1, 1)[0, 0]) for name, value in terms.items()}
-
-
 @dataclass(frozen=True)
-class LinearRecursion:
+class _LinearRecursion:
     """A recursion ``y = c s + d x``, ``s' = a s + b x`` on single numbers x and y."""
 
     #: (m, m)
@@ -348,7 +345,7 @@ class LinearRecursion:
         return result, state
 
 
-def second_order(frequency: float, damping: float, interval: float) -> LinearRecursion:
+def second_order(frequency: float, damping: float, interval: float) -> _LinearRecursion:
     """Return the response 1/(1 + 2 zeta s/w + s^2/w^2) as a recursion on increments.
 
     It is exact for a rate that is constant over each interval. The state is the rate that comes out, in increments
@@ -366,16 +363,16 @@ def second_order(frequency: float, damping: float, interval: float) -> LinearRec
     system[0, 1], system[2, 0] = turn, 1.0
     system[1] = [-turn, -2 * damping * turn, 0.0, turn]
     step = _exponential(system)
-    return LinearRecursion(step[:2, :2], step[:2, 3], step[2, :2], float(step[2, 3]))
+    return _LinearRecursion(step[:2, :2], step[:2, 3], step[2, :2], float(step[2, 3]))
 
 
-def bounded_noise(decay: float) -> LinearRecursion:
+def bounded_noise(decay: float) -> _LinearRecursion:
     """Return ``b[n] = A b[n-1] + (1 - A)(w[n] - w[n-1])`` as a recursion on w; the state is b and w of the time before.
 
     The variance for unit w is 2(1-A)^2/(1+A), that of the running sum (1-A)/(1+A).
     """
     gain = 1 - decay
-    return LinearRecursion(
+    return _LinearRecursion(
         np.array([[decay, -gain], [0.0, 0.0]]), np.array([gain, 1.0]), np.array([decay, -gain]), gain
     )
 
@@ -393,7 +390,7 @@ def _exponential(matrix: Array) -> Array:
     return result
 
 
-class Lag:
+class _Lag:
     """The response of three sensors, part by part; before the first increment its rate has held for ever."""
 
     def __init__(self, bandwidth_hz: Array, damping: Array, interval: float) -> None:
@@ -414,7 +411,7 @@ class Lag:
         return result
 
 
-class SampleTimes:
+class _SampleTimes:
     """Increments between instants that are late and unsteady, part by part.
 
     The angle between two exact instants is taken as linear; an instant after its time takes the rate of the interval
@@ -456,13 +453,13 @@ class SampleTimes:
         return np.where(exact, row, np.diff(there, axis=0))
 
 
-class Streams:
+class _Streams:
     """The random numbers of one run.
 
     A stream depends on the seed, the number of the run and its name alone: a cause that is switched off takes nothing
     from the others, and a run that is read in parts has the numbers of a whole one.
 
-    >>> one, other = Streams(1, 0), Streams(1, 0)
+    >>> one, other = _Streams(1, 0), _Streams(1, 0)
     >>> _ = one.normal("noise", 5)
     >>> bool((one.normal("walk", 4) == other.normal("walk", 4)).all())
     True

@@ -15,7 +15,7 @@ from strapgen.results import figures
 from strapgen.results.records import INTERNAL, plain_record
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
-from strapgen.targets.lines import fill
+from strapgen.targets.printer import fill
 
 _CONCLUSION = (
     "printed in 1984: the advantage of one form over the other is insignificant beside the whole system, and the "

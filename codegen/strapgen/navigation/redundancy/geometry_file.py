@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Annotated
 
 from strapgen.catalogue import toml_models
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.redundancy import failure_selection, parity_equations
@@ -20,7 +19,7 @@ from strapgen.navigation.redundancy.geometry import Axes, of_rows
 from strapgen.navigation.redundancy.parity_equations import KINDS, SensorSet
 
 _NAME = Key(
-    "What the names of kernels end with; by default that of the file",
+    "Ending of the names of kernels; by default that of the file",
     pattern="[a-z][a-z0-9]{0,7}",
     form="at most eight small letters and digits, a letter first,",
 )
@@ -32,7 +31,7 @@ class GeometryFile:
 
     axes: Axes
     name: Annotated[str, _NAME] = ""
-    sensor: Annotated[str, Key("What the sensors are", choices=tuple(KINDS))] = "gyro"
+    sensor: Annotated[str, Key("Kind of the sensors", choices=tuple(KINDS))] = "gyro"
     range: Annotated[
         Fraction | None,
         Key("Largest increment of a cycle; by default 1/8 rad or 4 m/s", "rad or m/s", above=0),

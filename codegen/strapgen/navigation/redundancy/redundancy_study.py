@@ -17,10 +17,10 @@ from strapgen.navigation.redundancy.failure_tables import FailureTable, failure_
 from strapgen.navigation.redundancy.geometry import SensorGeometry
 from strapgen.navigation.redundancy.parity_equations import SensorSet
 from strapgen.results.records import entry, properties
+from strapgen.run.backend_names import BACKENDS
 from strapgen.run.backends import of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.kernel_sources import sources_of_program
-from strapgen.run.registry import BACKENDS
 
 Array = NDArray[np.float64]
 _ARCSEC = float(np.radians(1 / 3600))

@@ -14,7 +14,7 @@ from strapgen.navigation.systems.fitting import Fitted
 from strapgen.navigation.systems.system_memory import SystemMemory
 from strapgen.navigation.systems.system_runner import SystemRunner
 from strapgen.run import compiler
-from strapgen.run.c import array_type, real_type
+from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array
 
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from strapgen.fixedpoint.floating.errors import Expression, Expressions, NoBoundError, sensitivities, slopes
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
-from strapgen.fixedpoint.floating.expressions import Expression, Expressions, NoBoundError
-from strapgen.fixedpoint.floating.sensitivities import sensitivities, slopes
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import Program

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from strapgen import pipeline, targets
-from strapgen.fixedpoint.limits import ranges_of_copies
+from strapgen.fixedpoint.format_plan import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings, rounded_limit
@@ -20,7 +20,7 @@ from strapgen.navigation.systems.sums import copies
 from strapgen.navigation.systems.system import Push, SystemStage
 from strapgen.navigation.systems.wiring import Description
 from strapgen.targets import TARGETS
-from strapgen.targets.c.emit import real_of
+from strapgen.targets.c import real_of
 from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
 
 

@@ -9,9 +9,9 @@ from strapgen.navigation.systems.fitting import Fitted, fitted
 from strapgen.navigation.systems.system_memory import SystemMemory, SystemRun
 from strapgen.navigation.systems.system_runner import SystemRunner
 from strapgen.navigation.systems.wiring import Description
+from strapgen.run.backend_names import BACKENDS
 from strapgen.run.backends import fitted as fitted_settings
 from strapgen.run.kernel_sources import sources_of_choice
-from strapgen.run.registry import BACKENDS
 from strapgen.targets import TARGETS
 
 __all__ = ["SystemMemory", "SystemRun", "SystemRunner", "system_runner"]

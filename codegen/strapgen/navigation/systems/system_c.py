@@ -12,7 +12,7 @@ from strapgen.ir.signals import FRAMES, Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, Rate, SystemStage
-from strapgen.targets.c.emit import real_of
+from strapgen.targets.c import real_of
 from strapgen.targets.contract import argument_text, range_text
 from strapgen.targets.rendering import render_c, runs_of
 

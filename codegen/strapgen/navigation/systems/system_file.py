@@ -9,8 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, parse, rational, refused
+from strapgen.catalogue.toml_models import Key, UserFile, parse, rational, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import CARRIES
@@ -166,7 +165,7 @@ class InputFile:
             form=f"one of {', '.join(FRAMES)}, an attitude such as b to n, or no frame",
         ),
     ] = ""
-    meaning: Annotated[str, Key("Words for the header; by default its name")] = ""
+    meaning: Annotated[str, Key("Description in the header; by default its name")] = ""
 
 
 @dataclass(frozen=True)
@@ -208,7 +207,7 @@ class StageFile:
         default_factory=dict
     )
     delay: Annotated[
-        Mapping[str, int], Key("Calls by which a wire lags that goes back, by input", "1", choices=(1,))
+        Mapping[str, int], Key("Delay of a wire that goes back, in calls, by input", "1", choices=(1,))
     ] = field(default_factory=dict)
     constants: Annotated[
         Mapping[str, Numbers], Key("Inputs with a fixed value, which is folded into the code")
@@ -243,14 +242,12 @@ class StageFile:
 
 @dataclass(frozen=True)
 class SystemFile:
-    """A described system: its samples, its stages from the fastest to the slowest, and what a run records."""
+    """A described system: its samples, its stages from the fastest to the slowest, and the recorded values."""
 
     sample_hz: Annotated[
         Fraction, Key("Cycles of the fastest rate in a second; --sample-hz replaces it", "Hz", above=0)
     ]
-    inputs: Annotated[
-        Mapping[Annotated[str, _NAME], InputFile], Key("What is measured in every cycle, by name")
-    ]
+    inputs: Annotated[Mapping[Annotated[str, _NAME], InputFile], Key("Measurements of every cycle, by name")]
     stage: Annotated[
         tuple[StageFile, ...],
         Key("Kernels at their rates, from the fastest to the slowest", least=1, most=MOST_STAGES),

@@ -19,9 +19,9 @@ from strapgen.navigation.systems.system import Push, Rate, SystemStage
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.system_memory import SystemMemory, SystemRun, rescaled
 from strapgen.run import compiler
+from strapgen.run.backend_names import BACKENDS, evaluator_class
 from strapgen.run.evaluators import Array, Evaluator, fresh_feedback, in_si, stored
 from strapgen.run.increments import pulses
-from strapgen.run.registry import BACKENDS, evaluator_class
 
 #: From this word length on, a word resolves what a double does, and samples are not rounded as sums.
 EXACT_BITS = 53

@@ -12,7 +12,7 @@ from strapgen.navigation.systems.system_study import NavigationErrors, SystemStu
 from strapgen.results.records import INTERNAL, entry, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
-from strapgen.targets.lines import fill
+from strapgen.targets.printer import fill
 
 _ARCSEC = math.degrees(1) * 3600
 _SPEC = ".3g"

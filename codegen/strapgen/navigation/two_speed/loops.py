@@ -17,7 +17,7 @@ from strapgen.navigation.systems.system_runner import EXACT_BITS, carried
 from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.two_speed_c import LOOPS, wiring
 from strapgen.run import compiler
-from strapgen.run.c import array_type, real_type
+from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array, Evaluator, in_si, stored
 from strapgen.run.kernel_sources import sources_of_choice
 from strapgen.targets import BUILT_IN

@@ -13,9 +13,8 @@ from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
 from strapgen.navigation.systems.system import DescribedSystem
-from strapgen.targets.c.emit import real_of
-from strapgen.targets.c.number_text import types_of
-from strapgen.targets.c_fixed.words import WORDS
+from strapgen.targets.c import real_of
+from strapgen.targets.c_numbers import WORDS, types_of
 from strapgen.targets.rendering import render_c, runs_of
 
 #: Names of the loops, from the fastest.

@@ -16,9 +16,9 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
 from strapgen.navigation.two_speed.loops import Cycles, Loops, LoopsInC, LoopSources, loop_sources
+from strapgen.run.backend_names import BACKENDS, evaluator_class
 from strapgen.run.backends import fitted
 from strapgen.run.evaluators import Array, Evaluator
-from strapgen.run.registry import BACKENDS, evaluator_class
 
 
 class TwoSpeedRun(NamedTuple):

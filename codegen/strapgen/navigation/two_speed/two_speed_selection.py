@@ -20,14 +20,19 @@ import sympy as sp
 
 from strapgen import pipeline
 from strapgen.analysis.vibration import assessment
-from strapgen.analysis.vibration.rectification import Rectification, Sampling, of_transition
-from strapgen.analysis.vibration.resonances import DEGREE, Oscillations
+from strapgen.analysis.vibration.rectification import (
+    DEGREE,
+    Oscillations,
+    Rectification,
+    Sampling,
+    of_transition,
+)
 from strapgen.catalogue import Choice
 from strapgen.design.brief import DesignBrief
 from strapgen.design.selection import causes
-from strapgen.design.selection.algorithm import FREE, ProcessorCost, reference
+from strapgen.design.selection.candidates import FREE, ProcessorCost, reference
 from strapgen.design.selection.causes import Rounding
-from strapgen.fixedpoint.runs.angle_accumulation import turning_of_matrices
+from strapgen.fixedpoint.angle_accumulation import turning_of_matrices
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.program import Program
@@ -292,7 +297,7 @@ class TwoSpeedLoops:
         return self
 
     def runner(self) -> TwoSpeedLoops:
-        """Return what has `propagate` and `matrices`, see `random_runs.SteadyAlgorithm`."""
+        """Return what has `propagate` and `matrices`, see `random_runs.SteadyRuns`."""
         return self
 
     def propagate(self, increments: Any, record_every: int = 1, initial: Any = None) -> Any:

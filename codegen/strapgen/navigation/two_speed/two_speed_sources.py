@@ -13,7 +13,7 @@ from functools import cache
 
 from strapgen import pipeline, targets
 from strapgen.catalogue import Choice
-from strapgen.fixedpoint.limits import ranges_of_copies
+from strapgen.fixedpoint.format_plan import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import Choice
-from strapgen.design.frontier import frontier
-from strapgen.design.frontier.frontier import STATE, Candidate
+from strapgen.design import frontier
+from strapgen.design.frontier import STATE, Candidate
 from strapgen.ir import checks
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.motions.motions import Motion

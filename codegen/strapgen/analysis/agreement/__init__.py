@@ -1,1 +1,0 @@
-"""Agreement of predicted and simulated drift."""

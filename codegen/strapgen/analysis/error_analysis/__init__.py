@@ -1,1 +1,0 @@
-"""The whole analysis of a step: series, growth, agreement with runs, ratios to other methods."""

@@ -1,1 +1,0 @@
-"""Growth of the length of the state, and stability."""

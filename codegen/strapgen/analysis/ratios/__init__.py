@@ -1,1 +1,0 @@
-"""Ratios of errors between methods."""

@@ -1,1 +1,0 @@
-"""Tableaux: coefficients, order conditions, families."""

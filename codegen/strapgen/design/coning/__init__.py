@@ -1,1 +1,0 @@
-"""Coning coefficients for a band of frequencies."""

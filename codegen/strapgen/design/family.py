@@ -1,0 +1,268 @@
+"""Designs a family of filters, those that commit an attitude and one-sided ones for the same samples, and writes it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from strapgen.catalogue.methods.coefficient_files import slug
+from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, sibling_name, sibling_title
+from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, stored_sizes
+from strapgen.design.filters import exchange, mean_square, responses
+from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.notebook_display import short_repr
+
+#: Default of the noise for which one-sided filters are designed.
+ONE_SIDED_NOISE = Fraction(3, 10000)
+
+
+@dataclass(frozen=True)
+class FamilyBrief:
+    """What a family of filters is to do.
+
+    Parameters
+    ----------
+    previous, ahead : int
+        Samples before the step, and ahead of it for the attitude that is committed.
+    band : Fraction
+        Highest angular frequency of the rate in rad a sample.
+    conditions : int
+        The filters are exact for polynomial rates of a degree below this.
+    degree : int
+        Highest Legendre coefficient of the rate that is estimated.
+    gyro : GyroResponse, optional
+        By default the increments are integrals of the rate.
+    noise, one_sided_noise, start_noise : Fraction, optional
+        Standard deviation of the noise of an increment, by that of the rate times the sampling interval, for the
+        committed filters, for the one-sided ones and for those of the first intervals of a recording.
+    spectrum : tuple of int, optional
+        Density of the rate, see `spectra.weights`; by default it is flat over the band.
+    rotation : str, optional
+    terms : int, optional
+        As in `Window`.
+    title : str, optional
+        By default it says the samples and the band.
+    increments : int, optional
+        Samples of a step (N); several take the exact rotation.
+
+    Raises
+    ------
+    InputError
+        If the rotation of a step of several samples is not exact.
+    """
+
+    previous: int
+    ahead: int
+    band: Fraction
+    conditions: int = 4
+    degree: int = 4
+    gyro: GyroResponse | None = None
+    noise: Fraction = Fraction(0)
+    one_sided_noise: Fraction = ONE_SIDED_NOISE
+    spectrum: tuple[int, ...] | None = None
+    rotation: str = "fourth"
+    terms: int = 16
+    title: str = ""
+    start_noise: Fraction = Fraction(0)
+    increments: int = 1
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Refuse a rotation that is not good enough for steps of several samples."""
+        if self.increments > 1 and self.rotation != "exact":
+            raise InputError(
+                f"rotation is {self.rotation!r}; steps of {self.increments} samples take the exact one"
+            )
+
+    @property
+    def objective(self) -> str:
+        """Whether the committed filters are the best ones at the worst frequency, or in the mean."""
+        return "mean square" if self.noise or self.spectrum is not None else "minimax"
+
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        """The samples before and ahead of the step of all filters that are designed, the committed ones first."""
+        return [(self.previous, self.ahead), *stored_sizes(self.previous, self.ahead, self.gyro is None)]
+
+    @property
+    def full_title(self) -> str:
+        """The title, by default from the samples, the band, the gyro and the noise."""
+        parts = [f"Window {self.increments}+{self.previous}+{self.ahead} to {float(self.band):g} rad"]
+        if self.gyro is not None:
+            parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
+        if self.noise:
+            parts.append(f"noise {float(self.noise):g}")
+        if self.spectrum is not None:
+            parts.append("for a spectrum")
+        return self.title or ", ".join(parts)
+
+
+def design(
+    brief: FamilyBrief, track: Callable[[Sequence[tuple[int, int]]], Iterator[tuple[int, int]]] = iter
+) -> Window:
+    """Return the family of filters for a brief.
+
+    Parameters
+    ----------
+    brief : FamilyBrief
+    track : callable, optional
+        Passes on the sizes of the filters one by one, and may show how far the design has come.
+
+    Returns
+    -------
+    Window
+
+    Raises
+    ------
+    MissingExtraError
+        If SciPy is not installed, which symmetric filters of the least largest error need.
+    InputError
+        If the filters are not determined, or their design does not converge.
+
+    Examples
+    --------
+    >>> window = design(FamilyBrief(2, 2, Fraction(1), degree=2))
+    >>> window.name, window.parity, [round(float(tap), 9) for tap in window.filters[1][3:]]
+    ('window-1-2-2-to-1-rad', True, [0.341666667, -0.045833333])
+    >>> [one.name for one in window.one_sided]
+    ['window-1-2-2-to-1-rad-3-1', 'window-1-2-2-to-1-rad-4-0', 'window-1-2-2-to-1-rad-0-4', 'window-1-2-2-to-1-rad-1-3']
+    """
+    designed = {size: _filters(brief, size, brief.one_sided_noise) for size in track(brief.sizes)}
+    committed = Window(
+        slug(brief.full_title),
+        brief.full_title,
+        _source(brief),
+        brief.increments,
+        brief.previous,
+        brief.ahead,
+        brief.conditions,
+        brief.band,
+        brief.objective,
+        designed[brief.previous, brief.ahead],
+        brief.gyro,
+        brief.noise,
+        brief.rotation,
+        brief.terms,
+    )
+    windows = {}
+    for size in one_sided_sizes(brief.previous, brief.ahead):
+        if size in designed:
+            windows[size] = _sibling(committed, size, designed[size], brief.one_sided_noise)
+        else:
+            windows[size] = windows[size[::-1]].mirrored()
+    start = tuple(
+        _sibling(committed, size, _filters(brief, size, brief.start_noise), brief.start_noise)
+        for size in start_sizes(brief.previous, brief.ahead)
+    )
+    return replace(committed, one_sided=tuple(windows.values()), start=start)
+
+
+def _source(brief: FamilyBrief) -> str:
+    methods = {
+        "mean square": "least mean square error over the band",
+        "minimax": "least largest error over the band, by exchange"
+        if Shape(brief.previous, brief.ahead, brief.conditions, brief.gyro).symmetric
+        else "least largest error over the band, by Lawson's iteration",
+    }
+    return f"strapgen window design; {methods[brief.objective]}; one-sided filters of least mean square error"
+
+
+def _sibling(committed: Window, size: tuple[int, int], filters: tuple[Taps, ...], noise: Fraction) -> Window:
+    previous, ahead = size
+    return replace(
+        committed,
+        sibling=True,
+        name=sibling_name(committed.name, committed.previous, committed.ahead, previous, ahead),
+        title=sibling_title(committed.title, previous, ahead),
+        previous=previous,
+        ahead=ahead,
+        objective="mean square",
+        noise=noise,
+        filters=filters,
+    )
+
+
+def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fraction) -> tuple[Taps, ...]:
+    """Return the filters with some samples before and ahead of the step, as rationals."""
+    shape = Shape(*size, brief.conditions, brief.gyro, brief.increments)
+    degrees = range(0 if brief.gyro else 1, brief.degree + 1)
+    unknowns = [Unknowns(shape, m) for m in degrees]
+    one_sided = size != (brief.previous, brief.ahead)
+    taps: Sequence[Sequence[Any]]
+    if one_sided or brief.objective == "mean square":
+        noise = one_sided_noise if one_sided else brief.noise
+        taps = mean_square.mean_square_filters(shape, degrees, brief.band, noise, brief.spectrum)
+    elif shape.symmetric:
+        taps = [exchange.minimax_filter(each, brief.band).taps for each in unknowns]
+    else:
+        taps = mean_square.lawson_filters(shape, degrees, brief.band)
+    rows = tuple(rounded(each, row) for each, row in zip(unknowns, taps, strict=True))
+    if brief.gyro is not None:
+        return rows
+    step = range(shape.previous, shape.previous + shape.increments)
+    return (tuple(Fraction(place in step) for place in range(shape.samples)), *rows)
+
+
+def written(family: Window, command: str) -> str:
+    """Return a family as a TOML file that says which command designed it."""
+    levels = ", ".join(
+        f"{responses.level(family, m):.6e}" for m in range(0 if family.gyro else 1, family.degree + 1)
+    )
+    lines = [
+        f"# Designed by: {command}",
+        f"# Levels of F_{0 if family.gyro else 1} to F_{family.degree}: {levels}",
+        *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in _file_head(family).items()),
+    ]
+    lines += _filter_lines(family.filters)
+    if family.gyro is not None:
+        lines += ["", "[gyro]"]
+        lines += [f'{key} = "{number(value)}"' for key, value in vars(family.gyro).items()]
+    sizes = stored_sizes(family.previous, family.ahead, family.gyro is None)
+    tables = [("one_sided", family.one_sided_with(ahead)) for _, ahead in sizes]
+    for key, one in tables + [("start", one) for one in family.start]:
+        lines += ["", f"[[{key}]]", f"previous = {one.previous}", f"ahead = {one.ahead}"]
+        lines += [f'objective = "{one.objective}"', f'noise = "{number(one.noise)}"']
+        lines += [f'band = "{number(one.band)}"'] if one.band != family.band else []
+        lines += _filter_lines(one.filters)
+    return "\n".join(lines) + "\n"
+
+
+def _file_head(family: Window) -> dict[str, str | int]:
+    head: dict[str, str | int] = {
+        "name": family.title,
+        "source": family.source,
+        "previous": family.previous,
+        "ahead": family.ahead,
+        "increments": family.increments,
+        "conditions": family.conditions,
+        "band": number(family.band),
+        "objective": family.objective,
+        "noise": number(family.noise),
+        "rotation": family.rotation,
+    }
+    return head | ({"terms": family.terms} if family.rotation == "exact" else {})
+
+
+def _filter_lines(rows: tuple[Taps, ...]) -> Iterator[str]:
+    yield "filters = ["
+    for row in rows:
+        yield f"  [{', '.join(chr(34) + str(tap) + chr(34) for tap in row)}],"
+    yield "]"
+
+
+def number(value: Fraction) -> str:
+    """Return a number as a decimal if it is one, otherwise as a fraction.
+
+    >>> number(Fraction(13, 10)), number(Fraction(3, 10000)), number(Fraction(1, 3)), number(Fraction(-40))
+    ('1.3', '0.0003', '1/3', '-40')
+    """
+    digits = next((n for n in range(13) if (value * 10**n).denominator == 1), None)
+    if digits is None:
+        return str(value)
+    return format(Decimal((value * 10**digits).numerator).scaleb(-digits), "f")

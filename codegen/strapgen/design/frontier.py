@@ -1,0 +1,436 @@
+"""Compares attitude algorithms by their drift on many motions and by what they cost, at one sampling rate.
+
+Every algorithm takes the same samples. One that takes several in a step moves on by as many; its cost is counted from
+its program, for each sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapgen import catalogue, pipeline
+from strapgen.catalogue import Choice
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.version import VERSION
+from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.motions.motions import Motion
+from strapgen.lab.motions.users_motions import any_motion
+from strapgen.lab.parallel_cases import Bundle, Cluster, moved, resume, side_by_side
+from strapgen.lab.runs import measured_drift
+from strapgen.results.records import INTERNAL, entry, plain_record, properties, reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import ANGLE, Column, TextTable
+from strapgen.storage import cache as disk_cache
+
+#: Motions by their labels: a name, or a user's file, and its settings.
+Motions = Mapping[str, tuple[str, Mapping[str, str]]]
+#: Half-angles in deg and frequencies in Hz of the cones.
+CONES = ("0.1", "1", "5", "15"), ("2", "5", "10", "20")
+#: The motions that are compared by default. The spins are those of a body on a cone, in deg/s.
+MOTIONS: Motions = {
+    **{
+        f"cone {angle}/{frequency}": ("cone", {"half_angle_deg": angle, "frequency_hz": frequency})
+        for angle in CONES[0]
+        for frequency in CONES[1]
+    },
+    **{
+        f"spin {spin} on {angle}/{frequency}": (
+            "cone",
+            {"half_angle_deg": angle, "frequency_hz": frequency, "spin_deg_s": spin},
+        )
+        for spin, angle, frequency in (("100", "1", "10"), ("300", "5", "5"))
+    },
+    **{f"random {rate}": ("random", {"rate_deg_s": rate}) for rate in ("60", "200")},
+    **{f"slew {ms} ms": ("slew", {"onset_s": f"0.0{ms}"}) for ms in ("50", "10")},
+    "ramps 50 ms": ("ramps", {"onset_s": "0.05"}),
+}
+#: The state that all algorithms integrate.
+STATE = "euler"
+#: What stands for the candidates of all methods.
+EVERY = "all"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An algorithm that is compared."""
+
+    #: A method, or the Python file of a user's algorithm
+    method: str
+    #: Samples of a step, and samples from before it and from after it
+    increments: int
+    previous: int = 0
+    ahead: int = 0
+
+    @property
+    def name(self) -> str:
+        """The method and its samples, as "coning-combined:3+3" or "window-7-7:1+7+7"."""
+        beside = (
+            f"+{self.previous}+{self.ahead}" if self.ahead else f"+{self.previous}" if self.previous else ""
+        )
+        return f"{self.method}:{self.increments}{beside}"
+
+    @property
+    def choice(self) -> Choice:
+        """The choice of the step; raises `InputError` if there is none."""
+        if self.method.endswith(".py"):
+            return catalogue.choose_step(
+                self.method, None, self.increments, previous=self.previous, ahead=self.ahead
+            )
+        return catalogue.choose_step(
+            STATE, self.method, self.increments, previous=self.previous, ahead=self.ahead
+        )
+
+
+#: The algorithms by the names of their methods, each with its samples.
+CANDIDATES = tuple(
+    Candidate(method, *samples)
+    for method, several in {
+        "rk4": ((2,), (4,), (1, 3)),
+        "taylor4": ((2,),),
+        "taylor6": ((4,),),
+        "munthe-kaas4": ((2,),),
+        "magnus4": ((2,), (3,), (1, 3)),
+        "magnus6": ((3,), (4,), (3, 3)),
+        "coning-uncompressed": ((3,), (4,)),
+        "coning-compressed": ((1, 1), (2,), (3,), (4,), (1, 3)),
+        "coning-combined": ((2, 1), (3,), (3, 3), (5, 3)),
+        "crouch-grossman3": ((2,), (3,)),
+        "coning-least-squares": ((4,), (3, 3), (1, 8)),
+        "coning-shaped-8": ((1, 8),),
+        "fit-exact": ((1, 1), (2,), (3,), (4,), (3, 3)),
+        "window-3-3": ((1, 3, 3),),
+        "window-5-5": ((1, 5, 5),),
+        "window-7-7": ((1, 7, 7),),
+        "window-9-9": ((1, 9, 9),),
+    }.items()
+    for samples in several
+)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What an algorithm costs, and how it drifts."""
+
+    #: Of the candidate, of its kernel, and where the algorithm comes from
+    name: str
+    title: str
+    source: str
+    #: Samples of a step
+    increments: int
+    #: Multiplications, additions and subtractions, and all other operations of a step: divisions, roots, sines
+    #: and cosines, choices
+    multiply: int
+    add: int
+    other: int
+    #: The drift on each motion in deg/h; None where the attitude leaves the range of its numbers
+    drifts: Mapping[str, float | None]
+
+    def per_second(self, sample_hz: float) -> float:
+        """Return the multiplications a second at a sampling rate in Hz."""
+        return self.multiply / self.increments * sample_hz
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a process needs to run a candidate on all motions."""
+
+    candidate: Candidate
+    #: Sampling rate in Hz, and length of the runs in s
+    sample_hz: str
+    duration: str
+    #: By their labels
+    motions: Motions = field(default_factory=lambda: MOTIONS)
+
+    def moved(self, begin: Path, end: Path) -> Trial:
+        """Return the trial with the files of the user in another folder, see `parallel_cases.Bundle`."""
+        one, motions = self.candidate, dict(self.motions)
+        if one.method.endswith(".py"):
+            one = replace(one, method=moved(one.method, begin, end))
+        for label, (name, settings) in motions.items():
+            motions[label] = (moved(name, begin, end) if is_file(name) else name, settings)
+        return replace(self, candidate=one, motions=motions)
+
+
+def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
+    """Return the algorithms that are asked for, checked.
+
+    >>> [candidate.name for candidate in candidates(["magnus6", "rk2:1+1"])]
+    ['magnus6:3', 'magnus6:4', 'magnus6:3+3', 'rk2:1+1']
+    """
+    if names is None:
+        return list(CANDIDATES)
+    chosen: dict[Candidate, None] = {}
+    for name in names:
+        method, colon, samples = name.rpartition(":")
+        if name == EVERY:
+            every = (one for method in catalogue.METHODS for one in _of_method(method))
+            chosen |= dict.fromkeys([*CANDIDATES, *every])
+            continue
+        if not colon:
+            chosen |= dict.fromkeys(_of_method(name))
+            continue
+        counts = [checks.whole(f"number of samples in {name}", part) for part in samples.split("+")]
+        if len(counts) > 3:
+            raise InputError(f"{name} has {len(counts)} numbers of samples; METHOD:N+P+L has at most three")
+        candidate = Candidate(method, *counts)
+        _ = candidate.choice  # refuses what is not known
+        chosen[candidate] = None
+    return list(chosen)
+
+
+def _of_method(method: str) -> list[Candidate]:
+    """Return the candidates of a method; one of its own samples if there are none."""
+    several = [candidate for candidate in CANDIDATES if candidate.method == method]
+    if several:
+        return several
+    if method.endswith(".py"):
+        choice = catalogue.choose_step(method)
+    else:
+        checks.choice("method", method, catalogue.METHODS)
+        choice = catalogue.choose_step(STATE, method, None)
+    assert choice.increments is not None, "a step of increments is chosen"
+    return [Candidate(method, choice.increments, choice.previous, choice.ahead)]
+
+
+def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS) -> dict[str, Any]:
+    """Return what the results of a study belong to: the code, the sampling, and the motions."""
+    return {
+        "study": "frontier",
+        "version": VERSION,
+        "code": disk_cache.generator_digest(),
+        "sample_hz": str(Fraction(sample_hz)),
+        "duration_s": str(Fraction(duration)),
+        "motions": {label: [name, dict(settings)] for label, (name, settings) in motions.items()},
+    }
+
+
+def frontier(
+    several: Sequence[Candidate],
+    sample_hz: str = "100",
+    duration: str = "60",
+    results: str | Path | None = None,
+    jobs: int | None = None,
+    cluster: Cluster | None = None,
+    motions: Motions = MOTIONS,
+) -> Iterator[Standing]:
+    """Run algorithms on motions, and yield what each costs and how it drifts when its runs end.
+
+    `sample_hz, duration`: sampling rate in Hz, and length of the runs in s.
+    """
+    rate, length = require_steps(several, sample_hz, duration)
+    for name, settings in motions.values():
+        any_motion(name, str(length), settings)  # refuses what is not known
+    cases = {one.name: Trial(one, str(rate), str(length), motions) for one in several}
+    users = [one.method for one in several if one.method.endswith(".py")]
+    users += [name for name, _ in motions.values() if is_file(name)]
+    files = None if cluster is None else Bundle.of(users)
+    if results is None:
+        finished = side_by_side(run_trial, cases, jobs, cluster, files)
+    else:
+        about = identity(str(rate), str(length), motions)
+        finished = resume(run_trial, cases, results, about, jobs, cluster, files)
+    for _, data in finished:
+        yield Standing(**data)
+
+
+def require_steps(several: Sequence[Candidate], sample_hz: str, duration: str) -> tuple[Fraction, Fraction]:
+    """Return the sampling rate and the duration as numbers, in which every algorithm has a whole step."""
+    rate = checks.number("sample_hz", sample_hz, positive=True)
+    length = checks.number("duration", duration, positive=True)
+    for candidate in several:
+        if length * rate < candidate.increments:
+            raise InputError(
+                f"duration {float(length):g} s is shorter than a step of {candidate.name} at {float(rate):g} Hz"
+            )
+    checks.multiple("duration", length, "sampling interval", 1 / rate)
+    return rate, length
+
+
+def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> list[Standing]:
+    """Return standings in the order of their candidates."""
+    by_name = {standing.name: standing for standing in standings}
+    return [by_name[candidate.name] for candidate in several]
+
+
+def run_trial(trial: Trial) -> dict[str, Any]:
+    """Run a candidate on the motions of its trial; return its standing as plain JSON data."""
+    choice = trial.candidate.choice
+    program = pipeline.program(choice)
+    operations = program.operations
+    return asdict(
+        Standing(
+            trial.candidate.name,
+            program.title,
+            program.source,
+            trial.candidate.increments,
+            operations["multiply"],
+            operations["add"],
+            sum(number for kind, number in operations.items() if kind not in ("multiply", "add", "negate")),
+            {label: _drift(choice, label, trial) for label in trial.motions},
+        )
+    )
+
+
+def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
+    """Return the drift on a motion over as many whole steps as the duration holds, in deg/h."""
+    rate, duration = Fraction(trial.sample_hz), Fraction(trial.duration)
+    step = trial.candidate.increments / rate
+    name, settings = trial.motions[label]
+    with np.errstate(all="ignore"):
+        try:
+            profile = _motion(name, tuple(settings.items()), trial.duration)
+            value = measured_drift(choice, profile, step, duration // step)
+        except InputError:  # the attitude is not finite
+            return None
+    return value if np.isfinite(value) else None
+
+
+@cache
+def _motion(name: str, settings: tuple[tuple[str, str], ...], duration: str) -> Motion:
+    """Return a motion, which has checked the settings of a user's file once for all candidates of a process."""
+    return any_motion(name, duration, dict(settings))
+
+
+def pareto(points: Mapping[str, tuple[float, float]], gain: float = 0.0) -> list[str]:
+    """Return the names of the points that gain in the second number on all that have a smaller first one.
+
+    >>> pareto({"cheap": (1, 9), "worse": (2, 9), "little": (3, 8.9), "good": (4, 1)}, gain=0.1)
+    ['cheap', 'good']
+    """
+    front: list[str] = []
+    for name in sorted(points, key=lambda name: points[name]):
+        if not front or points[name][1] < (1 - gain) * points[front[-1]][1]:
+            front.append(name)
+    return front
+
+
+#: Format of a drift, and of a count for each sample.
+_DRIFT, _COUNT = ANGLE, ".5g"
+
+
+@dataclass(frozen=True)
+class AlgorithmCost:
+    """What an algorithm costs for each sample, and how it drifts."""
+
+    algorithm: str = field(metadata=entry("algorithm", align="<"))
+    title: str
+    #: Where it comes from
+    source: str
+    #: Samples of a step
+    increments: int
+    multiply_per_sample: float = field(metadata=entry("multiply", _COUNT))
+    add_per_sample: float = field(metadata=entry("add", _COUNT))
+    #: Divisions, roots, sines and cosines, choices
+    other_per_sample: float = field(metadata=entry("other", _COUNT))
+    multiply_per_s: float = field(metadata=entry("multiply/s", _COUNT))
+    #: The drift on each motion; None where the attitude leaves the range of its numbers
+    drift_deg_h: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class FrontierResult(Result):
+    """What attitude algorithms cost, and how they drift on every motion."""
+
+    computed = properties(motions=entry(), algorithms=entry())
+    drawn_by = "strapgen.design.design_plots:frontier_image"
+
+    standings: Sequence[Standing] = field(metadata=INTERNAL)
+    #: Sampling rate
+    sample_hz: float
+    #: Length of the runs
+    duration_s: float
+    described: Motions = field(default_factory=lambda: MOTIONS, metadata=INTERNAL)
+
+    @property
+    def motions(self) -> dict[str, dict[str, str]]:
+        """The motions by their labels: the name of each, and its parameters."""
+        return {label: {"motion": name, **settings} for label, (name, settings) in self.described.items()}
+
+    @property
+    def algorithms(self) -> list[AlgorithmCost]:
+        """The algorithms, with their costs for each sample."""
+        return [
+            AlgorithmCost(
+                algorithm=one.name,
+                title=one.title,
+                source=one.source,
+                increments=one.increments,
+                multiply_per_sample=one.multiply / one.increments,
+                add_per_sample=one.add / one.increments,
+                other_per_sample=one.other / one.increments,
+                multiply_per_s=one.per_second(self.sample_hz),
+                drift_deg_h=one.drifts,
+            )
+            for one in self.standings
+        ]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return all figures, a row for each algorithm."""
+        rows = []
+        for one in self.algorithms:
+            row = plain_record(one)
+            drifts = row.pop("drift_deg_h")
+            rows.append(row | {f"{label} deg/h": drift for label, drift in drifts.items()})
+        return rows
+
+    def reader(self) -> TextTable:
+        """Return costs and drifts."""
+        costs = reader_table(self.algorithms, AlgorithmCost)
+        columns = [*costs.columns, *(Column(label, spec=_DRIFT) for label in self.described)]
+        rows = zip(costs.rows, self.standings, strict=True)
+        return TextTable(columns, [[*row, *one.drifts.values()] for row, one in rows])
+
+    def text(self) -> str:
+        """Return a table of costs, and one for each kind of motion."""
+        lines = [
+            f"largest angle from the true attitude over {self.duration_s:g} s, divided by that time, in deg/h,",
+            f"with exact increments at {self.sample_hz:g} Hz; every figure is measured here,",
+            "what rounding could hide again in 40 digits; random rates and slews, integrated to 5e-13 rad, cannot be",
+            "",
+            "operations for each sample, counted from the program; other: divisions, roots, sines, cosines, choices",
+            "N+P+L: samples of a step, from before it, from after it",
+            "",
+            *reader_table(self.algorithms, AlgorithmCost).lines(),
+        ]
+        for title, columns in _tables() if self.described == MOTIONS else _table_of(self.described):
+            rows = [[one.name, *(one.drifts[label] for label in columns)] for one in self.standings]
+            table = TextTable([Column("", "<"), *columns.values()], rows)
+            lines += ["", title, "", *table.lines()]
+        lines += ["", "sources", ""]
+        sources: dict[str, list[str]] = {}
+        for one in self.standings:
+            sources.setdefault(one.source, []).append(one.name)
+        return "\n".join([*lines, *(f"{', '.join(names)}: {source}" for source, names in sources.items())])
+
+
+def _tables() -> list[tuple[str, dict[str, Column]]]:
+    """Return the tables of drifts: a title, and the column of each motion by its label."""
+    angles, frequencies = CONES
+    tables = []
+    for pair in (angles[:2], angles[2:]):
+        columns = {
+            f"cone {angle}/{frequency}": Column(f"{frequency} Hz", spec=_DRIFT, group=f"cone of {angle} deg")
+            for angle in pair
+            for frequency in frequencies
+        }
+        tables.append((f"drift on cones, half-angle {' and '.join(pair)} deg", columns))
+    rest = [label for label in MOTIONS if not label.startswith("cone ")]
+    title = "drift on cones of a body that spins, at deg/s on half-angle/Hz; random rates, at deg/s; slews"
+    return [*tables, (title, {label: Column(label, spec=_DRIFT) for label in rest})]
+
+
+def _table_of(motions: Motions) -> list[tuple[str, dict[str, Column]]]:
+    """Return the table of drifts on motions that a user states."""
+    words = "; ".join(
+        ", ".join([name, *(f"{key}={value}" for key, value in settings.items())])
+        for name, settings in motions.values()
+    )
+    return [(f"drift on {words}", {label: Column(label, spec=_DRIFT) for label in motions})]

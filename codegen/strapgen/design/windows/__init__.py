@@ -1,1 +1,0 @@
-"""Windows for a band of frequencies and a sensor."""

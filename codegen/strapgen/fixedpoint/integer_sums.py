@@ -1,0 +1,451 @@
+"""Rounds sums of products to integers, which `Quantization` collects with their ranges and error bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from strapgen.fixedpoint.filters import Factor, filter_words, nearest_word
+from strapgen.fixedpoint.format_plan import FormatPlan, carried_input
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.fixedpoint.quantities import (
+    Aligned,
+    InputElement,
+    Monomial,
+    Placed,
+    Quantities,
+    Quantity,
+    Sum,
+    aligned,
+    binary,
+    exponent,
+    is_dyadic,
+    is_power_of_two,
+    largest_wide,
+    nearest,
+    up,
+    used_by,
+)
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.formats import ROUNDINGS, Format, finest, from_digits, signed_digits
+from strapgen.ir.integer_program import Coefficient, IntegerOperation, IntegerSum, Term, Value
+from strapgen.ir.interfaces import ErrorFeedback
+from strapgen.ir.program import Program
+
+#: Part of the smaller end of a checked range that an error may take, so that proper input passes the check.
+_LARGEST_PART = Fraction(1, 2)
+
+
+@dataclass
+class Quantization:
+    """The state of a walk over the exact quantities of a program."""
+
+    program: Program
+    settings: Settings
+    quantities: Quantities
+    plan: FormatPlan
+    most: Mapping[str, int]  # most fraction bits of quantities that need not be finer
+    feedback_names: Mapping[str, str]  # error feedbacks by the quantity whose rounding error they hand on
+    word: int = field(init=False)  # bits
+    rounding_error: Fraction = field(init=False)  # largest error of a rounding, in units of the last place
+    values: dict[str, Value] = field(init=False)  # the integers so far, those of the inputs included
+    body: list[Value] = field(default_factory=list)  # the integers so far, in the order of the code
+    resets: set[str] = field(default_factory=set)  # quantities whose computed value is exact from there on
+    #: Largest magnitudes in calls that pass the checks.
+    checked: dict[str, Fraction] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.word, self.rounding_error = self.settings.word, ROUNDINGS[self.settings.rounding]
+        self.values = dict(self.plan.values)
+        self._proved: dict[str, Fraction] = {}
+
+    def largest(self, fraction: int) -> int:
+        """Return the largest integer that a word of so many fraction bits holds."""
+        return Format(self.word, fraction).largest
+
+    def size(self, name: str) -> Fraction:
+        """Return the largest magnitude of a quantity in calls that pass the checks so far."""
+        proved = self._proved.get(name)
+        if proved is None:
+            proved = self._proved[name] = self.quantities.items[name].range.magnitude
+        return min(proved, self.checked.get(name, proved))
+
+    def too_short(self, name: str) -> InputError:
+        """Return the error that says that a word does not hold a quantity."""
+        return InputError(f"{self.program.kernel}: words of {self.word} bits are too short for {name}")
+
+    def add(self, value: Value) -> None:
+        """Add a value to the code."""
+        self.values[value.name] = value
+        self.body.append(value)
+
+
+def integer_value(
+    context: Quantization,
+    quantity: Quantity,
+    definition: IntegerSum | IntegerOperation,
+    fraction: int,
+    error: Fraction,
+    peak: int,
+    wide: bool = False,
+    followed: Fraction = Fraction(0),
+) -> Value:
+    """Return a value with the range of its integer: that of the quantity, widened by the error.
+
+    `error` is due to rounding and to operands, `followed` to quantities that were taken as exact on the way; `peak`
+    bounds every partial sum.
+    """
+    unit = Fraction(2) ** fraction
+    local = up(error + quantity.approximation_error)
+    total = local + followed
+    low, high = quantity.range.lowest, quantity.range.highest
+    if quantity.range_checked and total > min(abs(low), abs(high)) * _LARGEST_PART:
+        _reset(context, quantity)
+        total, limits = Fraction(0), (math.ceil(low * unit), math.floor(high * unit))
+    elif quantity.range_checked:
+        # What passes the check is so far inside that the exact value is in the range too.
+        limits = (math.ceil((low + total) * unit), math.floor((high - total) * unit))
+    else:
+        # What was taken as exact lies in its range too, so that its error does not lead out of this one.
+        limits = (math.floor((low - local) * unit), math.ceil((high + local) * unit))
+    return Value(
+        quantity.name,
+        definition,
+        fraction,
+        wide,
+        *limits,
+        quantity.offset,
+        total,
+        peak,
+        quantity.range_checked,
+        quantity.meaning,
+    )
+
+
+def _reset(context: Quantization, quantity: Quantity) -> None:
+    """Take the computed value as exact from here on, because nothing is known of its distance from the exact one.
+
+    What comes after is bounded as a function of the computed value, so that it stays inside its formats; an output
+    that depends on it is certified by the range of its signal alone.
+    """
+    items = context.quantities.items
+    only_checked = all(quantity.name not in used_by(item) for item in items.values())
+    # Every output has a range by what it is: an attitude.
+    limited = all(r.signal.constraint and r.signal.bound is not None for r in context.program.outputs)
+    if only_checked or not limited or _is_polynomial(context.quantities, quantity.name):
+        raise InputError(
+            f"{context.program.kernel}: words of {context.word} bits are too short for {quantity.name}, its error may "
+            "be as large as itself"
+        )
+    context.resets.add(quantity.name)
+
+
+def _is_polynomial(quantities: Quantities, name: str) -> bool:
+    """Tell whether a quantity is a polynomial of the inputs, on which ranges of later ones may rest."""
+    pending, seen = [name], set[str]()
+    while pending:
+        definition = quantities.items[pending.pop()].definition
+        if isinstance(definition, Sum):
+            factors = {factor for monomial, _ in definition.terms for factor in monomial}
+            pending += factors - seen
+            seen |= factors
+        elif not isinstance(definition, InputElement):
+            return False
+    return True
+
+
+def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:
+    """Lower a sum of products to a word, or to a wide number where no word is needed."""
+    value = _lowered(context, quantity, definition)
+    if (
+        quantity.range_checked
+        and quantity.name not in context.resets
+        and _note_squares(context, quantity, definition)
+    ):
+        # In calls that pass, errors are smaller; the limits of the check are those of any call.
+        again = _lowered(context, quantity, definition)
+        if again.fraction == value.fraction:
+            value = replace(value, error=min(value.error, again.error))
+    context.add(value)
+
+
+def _lowered(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
+    """Return the integer of a sum."""
+    terms = _integer_terms(context, definition)
+    followed = _followed_error(context, quantity)
+    if quantity.name not in context.plan.words:
+        return _wide(context, quantity, terms, followed)
+    natural = finest(quantity.range.magnitude, context.word)
+    places = [item.place for item in terms]
+    useful = natural if _counts_alone(context, terms) else max(places, default=natural)
+    fraction = min(natural, useful, context.most.get(quantity.name, natural))
+    fraction = context.plan.forced.get(quantity.name, fraction)
+    value = _rounded(context, quantity, terms, fraction, followed)
+    while value.magnitude > context.largest(value.fraction):
+        if quantity.name in context.plan.forced:
+            return _limited(context, quantity, value)
+        value = _rounded(context, quantity, terms, value.fraction - 1, followed)
+    return value
+
+
+def _note_squares(context: Quantization, quantity: Quantity, definition: Sum) -> bool:
+    """Note bounds of quantities where the sum of their squares has passed its check; False of other sums."""
+    terms = dict(definition.terms)
+    room = quantity.range.highest + quantity.approximation_error - terms.pop((), Fraction(0))
+    if not terms or any(len({*m}) != 1 or len(m) != 2 or c <= 0 for m, c in terms.items()):
+        return False
+    for (name, _), coefficient in terms.items():
+        context.checked[name] = min(context.size(name), Interval.of(room / coefficient).sqrt().highest)
+    return True
+
+
+def word_of(context: Quantization, name: str) -> str:
+    """Return the name of a value as a word, which is rounded from the wide one if it is needed."""
+    wide = context.values[name]
+    if not wide.wide:
+        return name
+    rounded = f"{name}_word"
+    if rounded not in context.values:
+        exact = context.quantities.items[name]
+        quantity = replace(
+            exact,
+            name=rounded,
+            meaning="",
+            range_checked=False,
+            approximation_error=Fraction(0),
+            inherited_error=None,
+        )
+        terms = [Placed(Term((name,), 1), wide.fraction, wide.error)]
+        fraction = min(finest(exact.range.magnitude, context.word), wide.fraction)
+        value = _rounded(context, quantity, terms, fraction)
+        while value.magnitude > context.largest(value.fraction):
+            value = _rounded(context, quantity, terms, value.fraction - 1)
+        context.add(value)
+    return rounded
+
+
+# Terms
+
+
+def _counts_alone(context: Quantization, terms: Sequence[Placed]) -> bool:
+    """Tell whether a sum is one of a gyro's counts; it fills its word, so that its products need fewer shifts."""
+    counts = {n for a in context.plan.inputs if a.sensor is not None for n in a.signal.elements}
+    return all(len(item.term.names) == 1 and counts.issuperset(item.term.names) for item in terms) and bool(
+        counts
+    )
+
+
+def _integer_terms(context: Quantization, definition: Sum) -> list[Placed]:
+    """Return the terms of a sum as integers, each with its fraction bits and its error."""
+    words = filter_words(context.quantities, context.program.inputs, definition, context.word)
+    terms = [
+        _product_term(context, monomial, coefficient, words.get(monomial))
+        for monomial, coefficient in definition.terms
+        if monomial
+    ]
+    constant = next((coefficient for monomial, coefficient in definition.terms if not monomial), Fraction(0))
+    if constant:
+        terms.append(_constant_term(constant, [item.place for item in terms], context.word))
+    return terms
+
+
+def _product_term(
+    context: Quantization, monomial: Monomial, coefficient: Fraction, rounded: Factor | None = None
+) -> Placed:
+    """Return a multiple of one or two values as an integer term, of the nearest coefficient or of a stated one."""
+    shifts = is_power_of_two(coefficient)
+    names = tuple(word_of(context, n) if len(monomial) == 2 or not shifts else n for n in monomial)
+    values = [context.values[name] for name in names]
+    error = _product_error(context, values, monomial) * abs(coefficient)
+    places = sum(value.fraction for value in values)
+    if shifts:
+        sign = 1 if coefficient > 0 else -1
+        return Placed(Term(names, sign), places - exponent(coefficient), up(error))
+    factor, bits = rounded or nearest_word(coefficient, context.word)
+    if context.settings.digits and rounded is None:
+        factor = from_digits(signed_digits(factor, context.settings.digits))
+    wrong = abs(binary(factor, bits) - coefficient)
+    stored = binary(values[0].magnitude, values[0].fraction)
+    term = Term(names, factor, coefficient=Coefficient(coefficient, bits))
+    return Placed(term, places + bits, up(error + wrong * stored))
+
+
+def _product_error(context: Quantization, values: Sequence[Value], monomial: Monomial) -> Fraction:
+    """Return the error of an exact product of inexact values."""
+    if len(values) == 1:
+        return values[0].error
+    a, b = values
+    size_a, size_b = map(context.size, monomial)
+    return size_a * b.error + size_b * a.error + a.error * b.error
+
+
+def _constant_term(constant: Fraction, places: Sequence[int], word: int) -> Placed:
+    """Return a constant as an integer term: exact if it is dyadic, else as fine as the other terms or finer."""
+    longest = 2 * word - 3
+    if is_dyadic(constant):
+        place = constant.denominator.bit_length() - 1
+    else:
+        place = max([*places, finest(abs(constant), longest)])
+    place = min(place, longest - math.ceil(abs(constant)).bit_length())
+    integer = nearest(constant * Fraction(2) ** place)
+    wrong = abs(integer / Fraction(2) ** place - constant)
+    return Placed(Term((), integer, coefficient=Coefficient(constant, place)), place, up(wrong))
+
+
+# Rounding
+
+
+@dataclass(frozen=True)
+class _FineTerms:
+    """The terms of a sum that are rounded, as they are added up."""
+
+    aligned: Aligned
+    shift: int  # places that the rounding drops
+    added: int  # bound of what is added before it: half a unit, or the error feedback
+    feedback: ErrorFeedback | None
+    error: Fraction  # bound of the error before rounding
+
+    @property
+    def peak(self) -> int:
+        """Bound of the magnitude of every partial sum."""
+        return self.aligned.peak + self.added
+
+
+def _wide(context: Quantization, quantity: Quantity, terms: Sequence[Placed], followed: Fraction) -> Value:
+    """Return a sum at full precision: it is only added, compared or drawn a root from."""
+    fraction = max((item.place for item in terms), default=context.word - 1)
+    while True:
+        total = aligned(terms, fraction, context.word, context.values)
+        if total.fits(context.word, context.values):
+            break
+        fraction -= 1
+    definition = IntegerSum(total.terms)
+    return integer_value(context, quantity, definition, fraction, total.error, total.peak, True, followed)
+
+
+def _rounded(
+    context: Quantization,
+    quantity: Quantity,
+    terms: Sequence[Placed],
+    fraction: int,
+    followed: Fraction = Fraction(0),
+) -> Value:
+    """Return a sum as a word of so many fraction bits."""
+    word, values = context.word, context.values
+    fine_terms = [item for item in terms if item.place > fraction]
+    coarse = aligned([item for item in terms if item.place <= fraction], fraction, word, values)
+    if not coarse.fits(word, values):
+        raise context.too_short(quantity.name)
+    largest_word = context.largest(fraction)
+    if not fine_terms:
+        definition = IntegerSum(coarse.terms, in_words=coarse.peak <= largest_word)
+        return integer_value(
+            context, quantity, definition, fraction, coarse.error, coarse.peak, followed=followed
+        )
+    fine = _fine(context, quantity.name, fine_terms, fraction)
+    rounded_peak = (fine.peak >> fine.shift) + 1
+    if not coarse.fits(word, values, rounded_peak) or fine.peak > largest_wide(word):
+        raise context.too_short(quantity.name)
+    feedback = fine.feedback
+    drop = max(0, fraction + fine.shift - feedback.fraction) if feedback is not None else 0
+    # With error feedback, the result is off by what was left before and what is left now.
+    roundings = 2 if feedback is not None else 1
+    error = fine.error + coarse.error + roundings * context.rounding_error / Fraction(2) ** fraction
+    value = integer_value(
+        context,
+        quantity,
+        IntegerSum(
+            fine.aligned.terms,
+            fine.shift - drop,
+            coarse.terms,
+            feedback,
+            drop,
+            in_words=coarse.peak + rounded_peak <= largest_word,
+        ),
+        fraction,
+        error,
+        max(fine.peak, coarse.peak + rounded_peak),
+        followed=followed,
+    )
+    if feedback is not None:  # whatever integer a caller hands over as a residual
+        value = replace(value, low=value.low - 1, high=value.high + 1)
+    return value
+
+
+def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: int) -> _FineTerms:
+    """Return the terms that are rounded at the finest place at which they have room."""
+    word, values = context.word, context.values
+    rounds_to_nearest = context.settings.rounding == "nearest"
+    feedback_name = context.feedback_names.get(name)
+    for place in range(max(item.place for item in terms), fraction, -1):
+        shift = place - fraction
+        total = aligned(terms, place, word, values)
+        error, feedback = total.error, None
+        added = 1 << (shift - 1) if rounds_to_nearest else 0
+        if feedback_name is not None:
+            below = fraction + word  # fraction bits of the feedback
+            fresh = 1 << (word - 1) if rounds_to_nearest else 0
+            feedback = ErrorFeedback(feedback_name, below, min(0, place - below), fresh)
+            added = 1 << shift
+            error += Fraction(2) ** -min(below, place)
+        if shift < 2 * word - 1 and total.fits(word, values, added):
+            return _FineTerms(total, shift, added, feedback, error)
+    raise context.too_short(name)
+
+
+def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
+    """Return a value in a fixed format that does not hold its range: it is checked if its range is otherwise known."""
+    largest = context.largest(value.fraction)
+    if context.settings.state and _is_attitude(context, quantity.name):
+        return replace(value, low=max(value.low, -largest - 1), high=min(value.high, largest), saturated=True)
+    known = _known_limit(context, quantity.name)
+    inside = quantity.range + Interval.of(quantity.offset) if known is None else Interval.symmetric(known)
+    limit = None if known is None else math.floor(known * Fraction(2) ** value.fraction)
+    if limit is None or limit > largest:
+        if not _is_stated(context, quantity.name):  # chosen from the range, and errors go beyond it
+            raise context.too_short(quantity.name)
+        raise InputError(
+            f"format {Format(context.word, value.fraction)} of {quantity.name} does not hold its range "
+            f"{inside.text()}{', less ' + str(quantity.offset) if quantity.offset else ''}"
+        )
+    return replace(value, low=max(value.low, -limit), high=min(value.high, limit), range_checked=True)
+
+
+def _is_attitude(context: Quantization, name: str) -> bool:
+    """Tell whether a quantity is an element of an output that is an attitude."""
+    results = context.quantities.results
+    return any(r.signal.constraint and name in results[r.signal.name] for r in context.program.outputs)
+
+
+def _is_stated(context: Quantization, name: str) -> bool:
+    """Tell whether the user states the format of a quantity, or of an output or the transition that it belongs to."""
+    signals = {signal for signal, names in context.quantities.results.items() if name in names}
+    return bool({name, "state", *signals} & context.settings.formats.keys())
+
+
+def _known_limit(context: Quantization, name: str) -> Fraction | None:
+    """Return the largest magnitude of an output whose range is known but not proved."""
+    program, inputs = context.program, context.plan.inputs
+    for result in program.outputs:
+        if name in context.quantities.results[result.signal.name]:
+            if result.signal.constraint:
+                return Fraction(1) + context.settings.allowance
+            following = carried_input(program, inputs, result.signal)
+            if following is None and program.attitude_step is not None:  # the state of the next step
+                following = inputs[0]
+            if following is not None:
+                return following.high * following.format.unit
+    return None
+
+
+def _followed_error(context: Quantization, quantity: Quantity) -> Fraction:
+    """Return the error inherited from quantities that were taken as exact on the way to this one."""
+    if quantity.inherited_error is None:
+        return Fraction(0)
+    errors = {
+        name: context.values[word_of(context, name)].error for name, _ in quantity.inherited_error.slopes
+    }
+    return up(quantity.inherited_error.bound(errors))

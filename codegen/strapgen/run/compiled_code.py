@@ -1,0 +1,185 @@
+"""Compiles generated C, C++ and Rust, and calls it through cffi; all loops are in that language."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.sources import Sources
+from strapgen.run import compiler
+from strapgen.run.evaluators import Array, Evaluator, Loop
+from strapgen.targets import TARGETS
+
+#: The types of floating-point targets in numpy.
+_TYPES: dict[str, np.dtype[Any]] = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
+#: Runs that generated loops take side by side, in any type.
+_GROUP = 16
+
+
+def real_type(target: str) -> np.dtype[Any]:
+    """Return the type of the numbers that go in and out of the code of a target: doubles in fixed point."""
+    return _TYPES.get(TARGETS[target].number, np.dtype(np.float64))
+
+
+@cache
+def array_type(kind: np.dtype[Any]) -> str:
+    """Return the C type of an array, whose name takes numpy longer to find than a short step takes."""
+    if kind.kind in "iu":
+        return f"{kind.name}_t[]"
+    return next(f"{name}[]" for name, other in _TYPES.items() if other == kind)
+
+
+class CEvaluator(Evaluator):
+    """A generated function in C, C++ or Rust, in floating or fixed point."""
+
+    def __init__(self, sources: Sources) -> None:
+        fixed = sources.fixed
+        super().__init__(sources, real_type(sources.target))
+        #: Types of the inputs, of all outputs and of error feedback in C.
+        self.input_types, self.word_type = [self.dtype] * len(self.function.inputs), self.dtype
+        self.feedback_type = self.dtype
+        if fixed is not None:
+            word = fixed.settings.word
+            self.input_types = [np.dtype(f"int{argument.format.word}") for argument in fixed.inputs]
+            self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
+        self.module = compiler.load(sources)
+        self._array = getattr(self.module.lib, f"{self.function.name}_array")
+
+    @property
+    def name(self) -> str:
+        """Name of the back end."""
+        fixed = self.sources.fixed
+        return self.sources.target if fixed is None else f"{self.sources.target}{fixed.settings.word}"
+
+    def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
+        """Call the function on rows, see `Evaluator.call`."""
+        count = len(feedback)
+        words = [
+            np.ascontiguousarray(rows, kind) for rows, kind in zip(inputs, self.input_types, strict=True)
+        ]
+        outputs = [np.empty((count, signal.size), self.word_type) for signal in self.function.outputs]
+        if self.sources.fixed is None:
+            self._array(count, *map(self.pointer, (*words, *outputs)))
+            return outputs, feedback
+        feedback = np.array(feedback, self.feedback_type)
+        status = self.module.ffi.new("int *")
+        carried = [feedback] if self.sources.fixed.residuals else []
+        done = self._array(count, status, *map(self.pointer, (*words, *carried, *outputs)))
+        if status[0]:
+            raise self.refused(status[0], f" (sample {done})" if count > 1 else where)
+        return outputs, feedback
+
+    def refused(self, status: int, where: str = "") -> InputError:
+        """Return the error of a user's input that a status of the generated code stands for."""
+        if status == 1:
+            limits = ", ".join(
+                f"{a.signal.name} up to {float(a.high * a.unit):.6g}" for a in self.interface.inputs
+            )
+            return InputError(
+                f"{self.kernel} refuses its input{where}: its formats were chosen for {limits}; orthonormalize more "
+                "often, or allow for a larger drift or rate"
+            )
+        return InputError(f"{self.kernel} refuses its input{where}: it is too far from a proper one")
+
+    def pointer(self, array: Array) -> Any:
+        """Return the C pointer to a contiguous array's first element."""
+        return self.module.ffi.from_buffer(array_type(array.dtype), array)
+
+    def address(self) -> int:
+        """Return the address of the function on one sample."""
+        ffi = self.module.ffi
+        return int(ffi.cast("uintptr_t", ffi.addressof(self.module.lib, self.function.name)))
+
+    def loop(self, samples: Array, loop: Loop) -> tuple[Array, Array]:
+        """Run the loop in C, see `Evaluator.loop`; threads share independent runs in floating point."""
+        ffi, name, fixed = self.module.ffi, self.function.name, self.sources.fixed
+        propagate = getattr(self.module.lib, f"{name}_propagate")
+        runs, steps = samples.shape[:2]
+        state, rows = (
+            np.ascontiguousarray(array, kind)
+            for array, kind in zip((loop.state, samples), self.input_types, strict=True)
+        )
+        feedback = np.array(loop.feedback, self.feedback_type)
+        history = np.empty((runs, 1 + steps // loop.record_every, state.shape[1]), self.word_type)
+        restore = ffi.NULL
+        if isinstance(loop.restore, CEvaluator):
+            restore = ffi.cast(f"{name}_orthonormalizer", loop.restore.address())
+        stopped = ffi.new("size_t[2]")
+        carried = [feedback] if fixed is not None and fixed.residuals else []
+
+        def work(part: slice) -> int:
+            arrays = [self.pointer(array[part]) for array in (state, rows, *carried, history)]
+            last = [] if fixed is None else [stopped]
+            count = len(range(runs)[part])
+            status: int = propagate(
+                count, steps, loop.record_every, loop.restore_every, restore, *arrays, *last
+            )
+            return status
+
+        # Error feedback and the place of a refusal are those of one call.
+        parts = _parts(runs, loop.jobs if fixed is None else 1)
+        if len(parts) == 1:
+            statuses = [work(parts[0])]
+        else:
+            with ThreadPoolExecutor(len(parts)) as pool:  # cffi calls C without the interpreter's lock
+                statuses = list(pool.map(work, parts))
+        if any(statuses) and fixed is None:
+            raise RuntimeError(
+                f"{self.kernel}: the generated loop refused its arguments with status {max(statuses)}"
+            )
+        if any(statuses):
+            of_run = f" of run {stopped[0] + 1}" if runs > 1 else ""
+            raise self.refused(statuses[0], f" in step {loop.first + stopped[1] + 1}{of_run}")
+        return history, feedback.astype(loop.feedback.dtype)
+
+
+def _parts(runs: int, jobs: int) -> list[slice]:
+    """Return contiguous parts of some runs for so many threads, all but the last of whole groups."""
+    groups = -(-runs // _GROUP)
+    jobs = min(jobs, groups)
+    edges = [min(runs, groups * job // jobs * _GROUP) for job in range(jobs + 1)]
+    return [slice(first, stop) for first, stop in pairwise(edges) if first < stop]
+
+
+class ModelEvaluator(Evaluator):
+    """A generated Python function on integers that checks the range of every value."""
+
+    def __init__(self, sources: Sources) -> None:
+        super().__init__(sources, np.float64)
+        self._carries = bool(self.interface.residuals)
+        module = compiler.load(sources)
+        self.generated: Callable[..., Any] = getattr(module, self.function.name)
+        self.out_of_range: type[Exception] = module.OutOfRange
+
+    def pack(self, rows: Array) -> Any:
+        """Return the elements of rows; those of one row are Python's own integers, which are faster."""
+        return rows[0].tolist() if len(rows) == 1 else [*rows.astype(self.number, copy=False).T]
+
+    def unpack(self, packed: Any, count: int) -> Array:
+        """Return elements as rows, see `Evaluator.unpack`."""
+        if count == 1:
+            return np.array([packed], self.number)
+        rows = np.empty((count, len(packed)), self.number)
+        for place, element in enumerate(packed):
+            rows[:, place] = element
+        return rows
+
+    def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
+        """Call the function on the elements of rows, see `Evaluator.call`."""
+        if not self._carries:
+            return self.step(*inputs, where=where), feedback
+        *outputs, after = self.step(*inputs, feedback, where=where)
+        return outputs, after
+
+    def step(self, *arguments: Any, where: str = "") -> Any:
+        """Call the generated function; a value out of range is raised as the error of a user's input."""
+        try:
+            return self.generated(*arguments)
+        except self.out_of_range as error:
+            raise InputError(f"{self.kernel} refuses its input{where}: {error}") from None

@@ -1,7 +1,0 @@
-"""What the folder brings."""
-
-from __future__ import annotations
-
-from strapgen.registration import Registration
-
-REGISTRATION = Registration("C in floating point", targets=(f"{__package__}:TARGETS",))
