@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from derived import programs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_programs import EXACT, TYPES, computed, exactly, node, program
 
 from strapgen.fixedpoint.floating import bounds, rounding_bounds
-from strapgen.fixedpoint.floating.errors import NUMBERS, NumberFormat, _ComputedNumbers
-from strapgen.ir.program import Program
+from strapgen.fixedpoint.floating.errors import NUMBERS, Expressions, NumberFormat, _ComputedNumbers
+from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
+from strapgen.fixedpoint.intervals import Interval
+from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Program
+from strapgen.targets.c import DOUBLE, FLOAT, CPrinter
 
 THIRD = Fraction(1, 3)
 ABOVE_ONE = node("add", node("multiply", "a", "a"), 1)
@@ -252,3 +257,98 @@ def test_no_program_rounds_by_more_than_its_bound_in_four_bits(made, parts):
         values = {"a": FOUR_BITS.rounded(Fraction(a, 64)), "b": FOUR_BITS.rounded(Fraction(b, 64))}
         if not told.reason:
             assert measured_coarsely(code, values) <= told.errors["out"][0]
+
+
+REALS = {"double": (np.float64, DOUBLE), "float": (np.float32, FLOAT)}
+RATIONALS = st.fractions(min_value=-8, max_value=8, max_denominator=10**9)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+@given(value=RATIONALS)
+def test_a_literal_is_rounded_as_it_is_printed(number, value):
+    type_, real = REALS[number]
+    text = CPrinter(real).constant(value).removesuffix("f")
+    assert NUMBERS[number].rounded(value) == Fraction(float(type_(text)))
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_the_smallest_numbers_are_those_of_the_type(number):
+    type_, _ = REALS[number]
+    format_, information = NUMBERS[number], np.finfo(type_)
+    assert Fraction(float(information.smallest_subnormal)) == Fraction(2) ** format_.smallest
+    assert Fraction(float(information.eps)) == 2 * format_.unit
+    assert format_.rounded(format_.underflow) == 0 != format_.rounded(3 * format_.underflow)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+@given(largest=RATIONALS.map(abs), part=st.fractions(min_value=0, max_value=1, max_denominator=10**6))
+def test_no_number_up_to_the_largest_is_rounded_by_more_than_half_an_ulp(number, largest, part):
+    format_ = NUMBERS[number]
+    value = largest * part
+    for near in (value, value + format_.unit * value / 2, largest):
+        if near <= largest:
+            assert abs(format_.rounded(near) - near) <= format_.half_ulp(largest)
+
+
+def test_half_an_ulp_is_attained_below_above_and_just_above_a_power_of_two():
+    format_ = NUMBERS["float"]
+    unit = format_.unit
+    for largest, worst in [
+        (Fraction(1), 1 - unit / 2),
+        (Fraction(3, 2), 1 + unit),
+        (1 + unit * 3 / 4, 1 + unit * 3 / 4),
+    ]:
+        assert worst <= largest
+        assert abs(format_.rounded(worst) - worst) == format_.half_ulp(largest)
+
+
+def ranges(code: Program) -> ExactRanges:
+    box = {s.name: Interval.symmetric(s.bound) for s in code.inputs if s.bound is not None}
+    return ExactRanges(code, Expressions.of(code), box)
+
+
+@pytest.mark.parametrize(
+    ("value", "limits", "spare"),
+    [
+        # The range of cosine is that of its first two terms.
+        (node("cos", "a"), {"a": Fraction(1)}, Fraction(1, 24)),
+        (node("sinc", "a"), {"a": Fraction(1)}, Fraction(1, 120)),
+        (node("cos", "a"), {"a": Fraction(4)}, Fraction(1, 1000)),
+        (node("sinc", "a"), {"a": Fraction(5)}, Fraction(4, 5)),
+        (node("sin", "a"), {"a": Fraction(1, 8)}, Fraction(1, 3000)),
+        (node("select", node("at_least", "a", 0), "a", "b"), {"a": 1, "b": 2}, Fraction(0)),
+        (node("select", node("at_least", "a", 0), "b", "a"), {"a": 1, "b": 2}, Fraction(0)),
+        (node("maximum", "a", node("maximum", "b", -2)), {"a": 1, "b": 3}, Fraction(0)),
+    ],
+)
+def test_a_range_holds_all_values_and_its_ends_are_near_some(value, limits, spare):
+    code = program({"y": value}, limits)
+    known = ranges(code).ranges[-1]
+    grid = [[Fraction(k, 16) * limit for k in range(-16, 17)] for limit in limits.values()]
+    values = [
+        code.run(dict(zip(limits, point, strict=True)), operations=EXACT)["out"][0]
+        for point in itertools.product(*grid)
+    ]
+    # 1/100: the grid does not meet the turning points of the functions.
+    assert known.lowest <= min(values) <= known.lowest + spare + Fraction(1, 100)
+    assert known.highest - Fraction(1, 100) - spare <= max(values) <= known.highest
+
+
+def test_the_resolution_is_that_of_either_type():
+    code = program({"y": node("multiply", RESOLUTION, "a")}, {"a": 1})
+    proofs = ranges(code)
+    place = proofs.expressions.names[RESOLUTION]
+    known = proofs.ranges[place]
+    assert (known.lowest, known.highest) == (DOUBLE_RESOLUTION, Fraction(1, 1 << 23))
+
+
+def test_what_is_squared_is_limited_by_the_root_of_the_limit():
+    code = programs()["euler-normalize"]
+    expressions = Expressions.of(code)
+    (state,) = code.inputs
+    proofs = ExactRanges(code, expressions, dict.fromkeys(state.elements, Interval.symmetric(Fraction(2))))
+    (condition,) = proofs.conditions
+    for name in state.elements:
+        known = proofs.ranges[expressions.names[name]]
+        assert 0 <= known.highest**2 - condition.high < Fraction(1, 1 << 150)
+        assert 0 <= known.lowest**2 - condition.high < Fraction(1, 1 << 150)

@@ -10,10 +10,15 @@ from itertools import product
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from small_integers import GRID, Known, at_corners, computed, context, quantity, with_feedback, worst
 
 from strapgen.fixedpoint.integer_sums import _is_attitude, lower_sum, word_of
-from strapgen.fixedpoint.quantities import ErrorPropagation, Sum
+from strapgen.fixedpoint.quantities import ErrorPropagation, Placed, Sum, aligned, largest_wide, nearest, up
+from strapgen.fixedpoint.quantization import aligning
+from strapgen.ir.integer_program import IntegerOperation, IntegerSum, Scaled, Term, Value
+from strapgen.ir.interfaces import ErrorFeedback
 
 EXACT = Known(4, -7, 7)
 OFF = Known(4, -9, 9, Fraction(1, 40))
@@ -309,3 +314,83 @@ def test_a_check_whose_value_is_taken_as_exact_says_nothing_of_its_parts(monkeyp
     )
     lower_sum(walk, check, check.definition)
     assert walk.size("a") > 3
+
+
+numbers = st.fractions(min_value=-100, max_value=100, max_denominator=10**4)
+SETTINGS = settings(derandomize=True, database=None, deadline=None, max_examples=25)
+
+
+@SETTINGS
+@given(numbers)
+def test_the_nearest_integer_is_at_most_half_a_unit_away_and_halves_go_up(value):
+    assert -Fraction(1, 2) < nearest(value) - value <= Fraction(1, 2)
+    assert [nearest(Fraction(n, 2)) for n in (-3, -1, 1, 3)] == [-1, 0, 1, 2]
+
+
+@SETTINGS
+@given(numbers)
+def test_a_bound_is_rounded_up_by_less_than_what_a_word_can_tell(value):
+    assert value <= up(value) < value + Fraction(1, 2**100)
+
+
+@SETTINGS
+@given(st.integers(-(10**4), 10**4), st.integers(0, 20), st.integers(0, 20))
+def test_a_constant_at_a_coarser_place_is_rounded_and_its_error_is_told(factor, place, dropped):
+    exact = Fraction(factor, 2 ** (place + dropped))
+    total = aligned([Placed(Term((), factor), place + dropped, Fraction(1, 8))], place, 32, {})
+    written = sum(term.factor * Fraction(2) ** (term.shift - place) for term in total.terms)
+    assert (
+        abs(written - exact)
+        <= total.error - Fraction(1, 8)
+        <= Fraction(1, 2 ** (place + 1)) + Fraction(1, 2**100)
+    )
+    assert total.peak == sum(abs(term.factor) for term in total.terms)
+
+
+def test_a_wide_number_holds_two_words():
+    assert [largest_wide(word) for word in (8, 16, 32)] == [2**15 - 1, 2**31 - 1, 2**63 - 1]
+
+
+ZERO = Fraction(0)
+
+
+def value(name: str, definition, fraction: int, magnitude: int) -> Value:
+    return Value(name, definition, fraction, False, -magnitude, magnitude, ZERO, ZERO, magnitude)
+
+
+def names_and_bits(*body: Value, fixed: tuple[str, ...] = ()) -> dict[str, int]:
+    """Return by how many bits values may be coarser; the input s has 4 fraction bits and stays below 1."""
+    inputs = value("s", None, 4, 16)
+    values = {item.name: item for item in (inputs, *body)}
+    return {name: values[name].fraction - most for name, most in aligning(body, values, fixed).items()}
+
+
+@pytest.mark.parametrize("drop", [0, 3, 8])
+def test_error_feedback_that_is_coarser_than_a_sum_changes_no_place(drop):
+    """The places below the feedback are dropped first, and belong to the sum all the same."""
+    # a s ends at place 28, c at place 16, which is 8 bits below the result: of these 12 bits, an error of a that
+    # s is multiplied with may add a sixteenth of a unit of the feedback, which is 4 bits finer than the result.
+    a = value("a", IntegerSum((Term(("s",), 1),), 4), 24, 1 << 24)
+    c = value("c", None, 16, 1 << 10)
+    feedback = ErrorFeedback("r", 0, 20, 0)
+    total = IntegerSum((Term(("a", "s"), 1), Term(("c",), 1, 12)), 20 - drop, (), feedback, drop)
+    assert names_and_bits(a, c, value("y", total, 8, 1 << 8)) == {"a": 8}
+
+
+def test_values_of_which_every_bit_counts_stay_as_they_are():
+    a = value("a", IntegerSum((Term(("s",), 1),), 4), 24, 1 << 24)
+    c = value("c", None, 16, 1 << 10)
+    total = IntegerSum((Term(("a", "s"), 1), Term(("c",), 1, 12)), 20)
+    y = value("y", total, 8, 1 << 8)
+    assert names_and_bits(a, c, y) == {"a": 12}
+    assert names_and_bits(a, c, y, fixed=("a",)) == {}
+    larger = IntegerOperation("maximum", (Scaled("a"), Scaled("a", 1)))
+    assert names_and_bits(a, c, y, value("z", larger, 24, 1 << 25)) == {}
+
+
+def test_a_factor_of_what_is_always_zero_has_any_format():
+    a = value("a", IntegerSum((Term(("s",), 1),), 4), 24, 1 << 24)
+    c, nothing = value("c", None, 16, 1 << 10), value("n", None, 4, 0)
+    total = IntegerSum((Term(("a", "n"), 1), Term(("c",), 1, 12)), 20)
+    # A sum is computed down to 8 bits below its last place, and a n ends 12 bits below those.
+    assert names_and_bits(a, c, nothing, value("y", total, 8, 1 << 8)) == {"a": 12}
