@@ -10,7 +10,7 @@ import jsonschema
 import pytest
 from commands import run
 
-from strapgen.catalogue.toml_schemas import schemas
+from strapgen.catalogue.toml_models import schemas
 from strapgen.ir.exceptions import InputError
 from strapgen.storage.resources import PACKAGE
 from strapgen.variants import build

@@ -155,13 +155,13 @@ def _output(words: Sequence[str]) -> tuple[int, str]:
 
 def _same_vectors(variant: Variant, words: list[str]) -> Step:
     """Compare the vectors in the folder with new ones."""
-    from strapgen.run import generated_files
+    from strapgen.run import standard_tree
 
     with temporary_folder() as folder:
         command = ["vectors", *words, *_count(variant)]
         status, output = _output([*command, "--out", str(folder)])
         new = {path.name: path.read_text() for path in sorted(folder.iterdir())}
-    difference = generated_files.difference(Path(_folder(variant)), new)
+    difference = standard_tree.difference(Path(_folder(variant)), new)
     shown = f"files of {shlex.join(['strapgen', *command])}"
     return Step(variant.name, shown, not (status or difference), output if status else difference)
 

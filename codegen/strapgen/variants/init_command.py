@@ -134,11 +134,11 @@ def _of_brief(file: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the keys of the cheapest algorithm that meets a brief, and the files that it needs."""
     from strapgen.cli.progress import track
     from strapgen.design.brief import read_brief
-    from strapgen.design.selection.answer import in_order, judgements
     from strapgen.design.selection.candidates import contenders
-    from strapgen.design.selection.firmware import COEFFICIENTS, REPORT, firmware_files
+    from strapgen.design.selection.judgement import in_order, judgements
+    from strapgen.design.selection.selection_report import COEFFICIENTS, REPORT, firmware_files
     from strapgen.design.selection.simulated import algorithm_named, confirmed
-    from strapgen.run.generated_files import command_of
+    from strapgen.run.standard_tree import command_of
 
     brief = read_brief(file)
     several = contenders(brief, None)

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from strapgen.catalogue import toml_models
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.cli import generate_command, program
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import CommandOptions, Option
@@ -206,7 +205,7 @@ def _words(
 
 def _is_fixed(variant: Variant, options: CommandOptions, arguments: Sequence[str]) -> bool:
     """Tell whether the options of fixed point go with the target or the back ends of a command line."""
-    from strapgen.run.registry import BACKENDS
+    from strapgen.run.backend_names import BACKENDS
     from strapgen.targets import TARGETS
 
     if "backend" in {_key(option) for option in options.options.values()}:
@@ -229,7 +228,7 @@ def _target(variant: Variant, arguments: Sequence[str]) -> str:
 
 def _backend(variant: Variant) -> str:
     """Return the back end of the variant's first target, with its word."""
-    from strapgen.run.registry import BACKENDS
+    from strapgen.run.backend_names import BACKENDS
 
     target, word = variant.targets[0], variant.words[0] or 32
     fitting = [name for name, entry in BACKENDS.items() if entry.target == target]
