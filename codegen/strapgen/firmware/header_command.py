@@ -43,7 +43,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
     *("algorithm", "file", "window", "target", "targets"),
-    *("sculling", "sample_hz", "cpu", "name", "prefix"),
+    *("sculling", "sample_hz", "cpu", "name", "prefix", "variant"),
     *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 
