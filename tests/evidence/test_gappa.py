@@ -1,4 +1,4 @@
-"""Gappa proves the error bounds that headers state, and proves them of no program that rounds otherwise."""
+"""Gappa proves the error bounds that headers state, of no program that rounds otherwise; Coq checks its proof."""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Certifies in ball arithmetic how far single calls and runs in fixed point are from exact arithmetic.
 
-The integer model computes what the C computes; the exact program is evaluated in balls on the same integers.
+The integer model computes what the C computes; the exact program is evaluated on the same integers in balls, numbers
+with a radius in which the exact value is certain to lie. Radii grow with every operation. Products of transitions are
+multiplied in pairs, then in pairs of pairs, so that radii grow with the number of levels, not with that of the steps.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""What clang-tidy and clang find in generated C, where every check is on but those that are named here."""
+"""What clang finds in generated C: warnings, findings of clang-tidy, and calls that its fuzzer breaks under sanitizers.
+
+Every check and warning is on but those that are named here. The fuzzer runs a driver that checks every call against the
+contract: ranges of inputs and outputs, range checks, error feedback, and the loops over samples and runs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Has Gappa prove the error bounds of a call: how far the outputs are from exact arithmetic on the same inputs."""
+"""Has Gappa prove the error bounds of a call, and Coq check its proof, so that nobody has to trust Gappa.
+
+A bound says how far the outputs are from exact arithmetic on the same inputs. Gappa takes the rules of a script as
+hypotheses of the theorem that it writes for Coq. Here they are lemmas, which Coq proves as identities of polynomials:
+what is left of hypotheses are the ranges of the inputs.
+"""
 
 from __future__ import annotations
 

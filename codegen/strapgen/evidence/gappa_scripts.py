@@ -1,7 +1,9 @@
 """Scripts for Gappa: what a program computes with roundings, beside the same program in exact numbers.
 
-In a script ``c_x`` is the computed value of x and ``x_x`` the exact one. Gappa follows sums, products, quotients and
-square roots; it checks that the rules by which a script rewrites one expression as another are identities.
+Gappa follows sums, products, quotients and square roots; it checks that the rules by which a script rewrites one
+expression as another are identities. In fixed point ``c_x`` is the number that the integer in the C stands for, ``e_x``
+the same sum in exact arithmetic, and ``x_x`` the value of the exact program. In floating point the operations are
+numbered in the order of the C: ``c_3`` is the computed value of the third and ``e_3`` its exact one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Runs generated C on processors, and compares every integer that it returns with the model in Python integers."""
+"""Runs generated C on emulated processors, and compares what it returns with the model and with ball arithmetic.
+
+Every integer of a run must be that of the model in Python integers. A million steps with error feedback must end near
+the exact states of the same integers.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walks through the C of a kernel and lists what could overflow or leave its range and cannot be proved."""
+"""Walks through the C of a kernel and lists what could overflow or leave its range and is not proved."""
 
 from __future__ import annotations
 
