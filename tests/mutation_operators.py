@@ -22,7 +22,7 @@ FOLDERS = (
 #: Modules in them that compute nothing: names, texts, and how other people's code is run.
 WITHOUT_NUMBERS = (
     *("catalogue/names.py", "catalogue/user/", "targets/names.py", "targets/renaming.py", "targets/lines.py"),
-    *("targets/contract.py", "targets/rendering.py", "analysis/series/notation.py", "lowering/names.py"),
+    *("targets/contract.py", "targets/rendering.py", "analysis/series/notation.py"),
 )
 _SWAPPED = {
     ast.Add: ("+", "-"),

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen import registration
-from strapgen.catalogue import toml_models, toml_schemas
+from strapgen.catalogue import toml_models
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 
@@ -25,7 +25,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import user_files  # noqa: E402
 
-SCHEMAS = {kind: schema() for kind, schema in toml_schemas.schemas().items()}
+SCHEMAS = {kind: schema() for kind, schema in toml_models.schemas().items()}
 MODELS = {
     kind: registration.load(place).model
     for one in registration.built_in().values()
@@ -42,7 +42,7 @@ def test_schemas_and_page_are_those_of_the_models():
         if not path.is_file() or path.read_text("utf-8") != text
     ]
     assert wrong == []
-    assert {path.stem for path in toml_schemas.FOLDER.iterdir()} == set(SCHEMAS)
+    assert {path.stem for path in toml_models.FOLDER.iterdir()} == set(SCHEMAS)
 
 
 def test_every_file_that_users_copy_names_the_schema_of_its_kind():
@@ -57,7 +57,7 @@ def test_every_file_that_users_copy_names_the_schema_of_its_kind():
     assert copied == set(EXAMPLES) and set(EXAMPLES.values()) == set(SCHEMAS)
     for path, kind in EXAMPLES.items():
         named = path.parent / path.read_text("utf-8").partition("\n")[0].removeprefix("#:schema ")
-        assert named.resolve() == toml_schemas.FOLDER / f"{kind}.json"
+        assert named.resolve() == toml_models.FOLDER / f"{kind}.json"
 
 
 def test_every_example_is_valid():

@@ -25,12 +25,12 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods import runge_kutta as runge_kutta
     from strapgen.catalogue.methods import tableaux as tableaux
     from strapgen.catalogue.methods import windows as windows
-    from strapgen.catalogue.methods.samples import Samples as Samples
-    from strapgen.catalogue.methods.samples import increments_signal as increments_signal
-    from strapgen.catalogue.methods.samples import turns_signal as turns_signal
-    from strapgen.catalogue.methods.samples import velocities_signal as velocities_signal
-    from strapgen.catalogue.methods.tableau import Tableau as Tableau
+    from strapgen.catalogue.methods.method import Samples as Samples
+    from strapgen.catalogue.methods.method import increments_signal as increments_signal
+    from strapgen.catalogue.methods.method import turns_signal as turns_signal
+    from strapgen.catalogue.methods.method import velocities_signal as velocities_signal
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
+    from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
     from strapgen.design import family as _family
@@ -143,14 +143,16 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
-    "catalogue.methods.samples": (
+    "catalogue.methods.method": (
         "Samples",
         "increments_signal",
         "turns_signal",
         "velocities_signal",
     ),
-    "catalogue.methods.tableau": ("Tableau",),
-    "catalogue.methods.tableaux": ("TABLEAUX",),
+    "catalogue.methods.tableaux": (
+        "Tableau",
+        "TABLEAUX",
+    ),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
     "analysis.algorithm": (

@@ -122,12 +122,6 @@ def test_companions_are_in_the_catalogue_and_fit(choice):
         assert attitude.outputs[0].signal.shape == (3, 3)
 
 
-@pytest.mark.long
-@EVERY
-def test_deriving_twice_gives_the_same(choice):
-    assert catalogue.derive(choice) == derived(choice)
-
-
 def test_names_are_listed_without_computer_algebra():
     code = (
         "import sys; from strapgen import catalogue; catalogue.standard(); catalogue.choose('euler');"

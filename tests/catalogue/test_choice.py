@@ -92,15 +92,6 @@ def test_choices_differ_in_the_kernels_that_a_step_brings(chosen):
 
 
 @pytest.mark.long
-def test_each_runs_as_its_own_method(chosen, rng):
-    d = rng.normal(scale=0.05, size=(30, 2, 3))
-    for name in ("numpy", "c"):
-        for method, choice in chosen.items():
-            wanted = strapgen.backend("euler", method, backend=name).propagate(d)
-            np.testing.assert_array_equal(backend(choice, backend=name).propagate(d), wanted)
-
-
-@pytest.mark.long
 def test_each_has_the_companions_that_it_brings(chosen, rng):
     state = np.array([0.1, 0.2, 0.3, 1.0])
     d = rng.normal(scale=0.02, size=(30, 2, 3))
@@ -124,23 +115,6 @@ def test_an_evaluator_takes_a_choice_of_a_user_s_kernel(chosen, rng):
         np.testing.assert_array_equal(strapgen.evaluator(choice)(state, d), wanted)
     with pytest.raises(InputError, match="kernel 'mend' is not known"):
         strapgen.evaluator("mend")
-
-
-@pytest.mark.long
-def test_the_stages_by_hand_find_what_a_kernel_brings():
-    for target in ("numpy", "c"):
-        sources = strapgen.generate(strapgen.lower(strapgen.derive(FILE, "rk2")), target)
-        run = strapgen.simulate(
-            strapgen.build(sources), strapgen.motion("coning", **GENERAL), "1/16", 1, orthonormalize="1/4"
-        )
-        wanted = strapgen.simulate(
-            strapgen.backend("euler", "rk2", backend=target),
-            strapgen.motion("coning", **GENERAL),
-            "1/16",
-            1,
-            orthonormalize="1/4",
-        )
-        np.testing.assert_array_equal(run.computed, wanted.computed)
 
 
 def test_each_has_its_own_errors_in_many_digits(chosen):
@@ -170,20 +144,6 @@ def test_each_is_compared_and_checked_for_itself(chosen, rng):
         assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
     findings = {finding.name: finding for finding in conformance.check(chosen["rk2"])}
     assert findings["order"].measured == pytest.approx(2, abs=0.15)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("command", "columns"),
-    [
-        ("converge {} --method rk1,rk2 --steps 1/8,1/16 --duration 1 --format json", "rungs"),
-        ("stability {} --method rk1,rk3 --format json", "contractive"),
-    ],
-)
-def test_a_command_that_takes_methods_shows_each_in_its_own_column(says, command, columns):
-    ours = says(command.format("euler") + (" --increments 2" if command.startswith("converge") else ""))
-    assert [one[columns] for one in says(command.format(shlex.quote(FILE)))] == [one[columns] for one in ours]
-    assert ours[0][columns] != ours[1][columns]
 
 
 def test_an_algorithm_is_held_against_itself_by_another_method(says):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.catalogue.constants import number_text, options, read
+from strapgen.catalogue.choice import constant_options, number_text, read_constants
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 
@@ -20,13 +20,13 @@ from strapgen.ir.exceptions import InputError, InputTypeError
     "value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"]
 )
 def test_a_number_is_exact_in_every_spelling(value):
-    assert read({"cycle": value}) == (("cycle", (Fraction(1, 50),)),)
+    assert read_constants({"cycle": value}) == (("cycle", (Fraction(1, 50),)),)
 
 
 def test_rows_follow_each_other_and_names_are_sorted():
     rows = (("a", (Fraction(7),)), ("b", tuple(map(Fraction, range(4)))))
-    assert read({"b": [[0, 1], [2, 3]], "a": 7}) == rows
-    assert read({"a": [7], "b": np.arange(4.0).reshape(2, 2)}) == rows
+    assert read_constants({"b": [[0, 1], [2, 3]], "a": 7}) == rows
+    assert read_constants({"a": [7], "b": np.arange(4.0).reshape(2, 2)}) == rows
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_rows_follow_each_other_and_names_are_sorted():
 )
 def test_what_is_no_number_is_refused(constants, error, words):
     with pytest.raises(error) as caught:
-        read(constants)
+        read_constants(constants)
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -53,7 +53,7 @@ def test_the_text_of_a_number_is_read_as_that_number(number):
 
 
 def test_a_long_option_has_spaces_inside_quotes_for_lines_to_break():
-    constants = read({"cycle": 0.02, "rate_scale": [Fraction(10**16 // 3, 10**25)] * 9})
-    short, long = shlex.split(options(constants))[1::2]
+    constants = read_constants({"cycle": 0.02, "rate_scale": [Fraction(10**16 // 3, 10**25)] * 9})
+    short, long = shlex.split(constant_options(constants))[1::2]
     assert short == "cycle=0.02"
     assert long.startswith("rate_scale=3.333333333333333e-10, 3.3") and long.count(", ") == 8

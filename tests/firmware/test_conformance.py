@@ -66,7 +66,7 @@ STEP = """
 import sympy as sp
 from strapgen import algebra
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods.samples import increments_signal
+from strapgen.catalogue.methods.method import increments_signal
 from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.ir.kernel_info import Order

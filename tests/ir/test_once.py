@@ -21,13 +21,6 @@ def test_a_value_is_worked_out_once_for_each_object():
     assert first.times == second.times == 1
 
 
-def test_a_value_that_is_dropped_is_worked_out_anew():
-    counted = Counted()
-    assert counted.value == 1
-    del counted.__dict__["value"]
-    assert counted.value == 2
-
-
 def test_the_class_has_the_property_with_its_docstring():
     assert isinstance(Counted.value, once)
     assert Counted.value.__doc__ == "The number of the time at which it was worked out."

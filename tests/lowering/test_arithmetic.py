@@ -9,16 +9,12 @@ from hypothesis import strategies as st
 
 from strapgen.ir.program import OPERATIONS, Constant, Node, Operation, Reference, walk
 from strapgen.kernel.polynomials import Polynomial
-from strapgen.lowering.arithmetic import (
-    chain,
+from strapgen.lowering.trees import (
     expanded,
     gathered,
     horner,
     operation_count,
     plain,
-    scaled,
-    signed_sum,
-    with_constant,
 )
 
 SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
@@ -47,36 +43,6 @@ def value(node: Node, point: dict[str, Fraction]) -> Fraction:
     return OPERATIONS[node.kind](*(value(argument, point) for argument in node.arguments))
 
 
-def test_a_chain_goes_from_left_to_right():
-    assert chain("add", [x, y, z]) == operation("add", operation("add", x, y), z)
-    assert chain("multiply", [x]) == x
-
-
-def test_a_sum_begins_with_something_positive():
-    assert signed_sum([(True, x), (False, y)]) == (True, operation("subtract", x, y))
-    assert signed_sum([(False, x), (True, y), (True, z)]) == (
-        True,
-        operation("add", operation("subtract", y, x), z),
-    )
-
-
-def test_the_sign_of_a_negative_sum_is_told():
-    assert signed_sum([(False, x), (False, y)]) == (False, operation("add", x, y))
-    assert signed_sum([(False, x)]) == (False, x)
-
-
-def test_a_sign_is_an_operation_unless_it_is_a_numbers():
-    assert plain((True, x)) == x
-    assert plain((False, x)) == operation("negate", x)
-    assert plain((False, constant(2, 3))) == constant(-2, 3)
-
-
-def test_a_coefficient_of_one_is_not_multiplied_by():
-    assert scaled(Fraction(1), x) == (True, x)
-    assert scaled(Fraction(-1), x) == (False, x)
-    assert scaled(Fraction(-2, 3), x) == (False, operation("multiply", constant(2, 3), x))
-
-
 def test_equal_coefficients_are_applied_once():
     third, terms = Fraction(1, 3), [(Fraction(1, 3), x), (Fraction(2), y), (Fraction(-1, 3), z)]
     assert gathered(terms) == [
@@ -86,14 +52,6 @@ def test_equal_coefficients_are_applied_once():
     assert gathered([(-third, x), (-third, y)]) == [
         (False, operation("multiply", constant(1, 3), operation("add", x, y)))
     ]
-
-
-def test_the_number_comes_last():
-    assert with_constant([(True, x)], Fraction(-1, 2)) == (True, operation("subtract", x, constant(1, 2)))
-    assert with_constant([(False, x)], Fraction(1)) == (True, operation("subtract", constant(1), x))
-    assert with_constant([(True, x)], Fraction(0)) == (True, x)
-    assert with_constant([], Fraction(0)) == (True, constant(0))
-    assert with_constant([], Fraction(-3)) == (False, constant(3))
 
 
 @pytest.mark.parametrize("write", [expanded, horner])
@@ -158,8 +116,3 @@ def test_the_atoms_may_be_of_any_kind():
     nodes = {(0, 1): x, (1, 1): y}
     tree = horner({((0, 1), (1, 1)): Fraction(1), ((0, 1),): Fraction(-1)}, nodes.__getitem__)
     assert tree == (True, operation("multiply", x, operation("subtract", y, constant(1))))
-
-
-def test_operations_are_counted_with_their_arguments():
-    assert operation_count(x) == operation_count(constant(3)) == 0
-    assert operation_count(operation("add", operation("negate", x), operation("multiply", x, x))) == 3

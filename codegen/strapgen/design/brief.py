@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.spectrum import Spectrum, random_rates, read_spectrum
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.processors import PROCESSORS
 from strapgen.lab.recordings.recording import read_increments

@@ -12,11 +12,8 @@ import sympy as sp
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS
-from strapgen.catalogue.methods.rate_fit import step_order
-from strapgen.catalogue.methods.runge_kutta import method
-from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX, read
+from strapgen.catalogue.methods.method import increments_signal, label, labels, turns_signal
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read
 from strapgen.ir.kernel_info import Order
 from strapgen.kernel.kernel import Kernel
 
@@ -141,19 +138,6 @@ def test_an_order_in_words(order, text, limited):
 )
 def test_orders_of_steps(method, count, previous, expected):
     assert derive("euler", method, count, previous=previous).order == expected
-
-
-def test_the_order_of_a_step_is_that_of_the_weaker_part():
-    for count in range(1, MOST_INCREMENTS + 1):
-        for previous, ahead in ((0, 0), (0, 1), (1, 0), (1, 1), (3, 0)):
-            order = method(TABLEAUX["rk3"]).step_order(count, previous, ahead)
-            assert order.step == min(3, step_order(count, previous, ahead))
-
-
-def test_a_sixth_order_method_on_three_increments_is_told_to_be_of_fourth():
-    assert str(derive("euler", "butcher6", 3).order) == (
-        "method order 6, rate extraction order 3: the step is of order 4"
-    )
 
 
 @pytest.mark.long
@@ -281,32 +265,3 @@ def test_with_previous_increments_a_step_is_that_of_the_rates_they_fit(algorithm
     assert from_rates.inputs[1].shape[0] == len(nodes)
     found = step.expand(values_of(step, state, increments))["next"]
     assert found == from_rates.expand(values_of(from_rates, state, turns))["next"]
-
-
-@pytest.mark.long
-@ALGORITHM
-def test_previous_increments_are_of_use_only_where_the_rate_changes(algorithm):
-    # On a rate of degree K - 1 the step without them is the same step.
-    rate = [[1, -2, 3], [2, 5, -1]]
-    ring, h = sp.ring("h", sp.QQ)
-
-    def increments(previous: int, ahead: int) -> list:
-        times = [sp.Rational(k, 2) for k in range(-previous, 3 + ahead)]
-        return [
-            sum(
-                (
-                    ring(sp.Rational(c[axis], k + 1) * (end ** (k + 1) - begin ** (k + 1))) * h ** (k + 1)
-                    for k, c in enumerate(rate)
-                ),
-                ring(0),
-            )
-            for begin, end in pairwise(times)
-            for axis in range(3)
-        ]
-
-    results = []
-    for previous, ahead in ((0, 0), (1, 0), (0, 1), (2, 2)):
-        step = derive(algorithm, "rk4", 2, previous=previous, ahead=ahead)
-        state = [ring(k + 1) for k in range(step.inputs[0].size)]
-        results.append(step.expand(values_of(step, state, increments(previous, ahead)))["next"])
-    assert all(result == results[0] for result in results)

@@ -102,11 +102,6 @@ def test_both_sculling_integrals_give_one_velocity():
     assert first["next_sculling"] == [s + c / 2 for s, c in zip(second["next_sculling"], added, strict=True)]
 
 
-def test_the_slow_loop_adds_both_sums():
-    made = given(derive("coning-slow"), angle_sum=B0, coning=ETA0)
-    assert made["rotation_vector"] == [b + c for b, c in zip(B0, ETA0, strict=True)]
-
-
 @pytest.mark.parametrize("name", ["coning-fast", "sculling-fast-1", "sculling-fast-2"])
 def test_states_are_handed_on(name):
     kernel = derive(name)

@@ -18,10 +18,6 @@ def parts(computed: sp.Matrix, truth: sp.Matrix) -> dict[str, sp.Matrix]:
     return {name: sp.Matrix(3, len(values) // 3, values) for name, values in result.items()}
 
 
-def test_the_inputs_are_the_computed_and_the_true_matrix():
-    assert [signal.name for signal in derive("error-matrix").inputs] == ["computed", "truth"]
-
-
 def test_the_split_is_the_printed_one():
     random = Random(11)
     computed, truth = (sp.Matrix(3, 3, lambda i, j: sp.Rational(random.randint(-99, 99), 7)) for _ in "12")
@@ -32,10 +28,6 @@ def test_the_split_is_the_printed_one():
     # skew_k = (E_ij + E_ji)/2 with (k, i, j) = (1, 2, 3), (2, 1, 3), (3, 1, 2)
     assert result["skew"] == sp.Matrix([E[1, 2] + E[2, 1], E[0, 2] + E[2, 0], E[0, 1] + E[1, 0]]) / 2
     assert result["drift"] == sp.Matrix([E[1, 2] - E[2, 1], E[2, 0] - E[0, 2], E[0, 1] - E[1, 0]]) / 2
-
-
-def test_no_error_no_parts():
-    assert all(part.is_zero_matrix for part in parts(TURNED, TURNED).values())
 
 
 def test_a_small_rotation_is_drift_alone():
@@ -58,11 +50,3 @@ def test_a_frame_that_lags_has_positive_drift():
     drift = parts(about_z(1 - lost), about_z(1))["drift"]
     assert drift[:2, :].applyfunc(sp.simplify) == sp.zeros(2, 1)
     assert float(drift[2]) == pytest.approx(float(sp.sin(lost)), rel=1e-14)
-
-
-def test_the_parts_put_the_error_together_again():
-    x = sp.Matrix(3, 3, sp.symbols("x1:10"))
-    result = parts(x, sp.eye(3))
-    (s1, s2, s3), (k1, k2, k3), (d1, d2, d3) = result["scale"], result["skew"], result["drift"]
-    together = sp.Matrix([[s1, k3 + d3, k2 - d2], [k3 - d3, s2, k1 + d1], [k2 + d2, k1 - d1, s3]])
-    assert (together - result["error"]).expand() == sp.zeros(3, 3)

@@ -105,18 +105,3 @@ def test_zero_counts_as_plus():
         made = strapgen.evaluator(name)(quarter, np.zeros(4))
         np.testing.assert_allclose(np.abs(made), [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=EPS)
         assert made[3] > 0 or made[2] > 0
-
-
-@pytest.mark.long
-def test_a_slow_turn_keeps_its_sign_over_two_turns(backend_name):
-    angles = np.linspace(0, 4 * np.pi, 200)
-    axis = np.array([2, -1, 2]) / 3
-    for name in RULES:
-        convert = strapgen.evaluator(name, backend_name)
-        before = np.array([0.0, 0, 0, 1])
-        for angle in angles:
-            matrix = Rotation.from_rotvec(angle * axis).as_matrix()
-            before = np.asarray(convert(matrix, before), float)
-            wanted = np.array([*(np.sin(angle / 2) * axis), np.cos(angle / 2)])
-            assert np.abs(before - wanted).max() <= 1e-3
-        assert before[3] == pytest.approx(1, abs=1e-3)

@@ -28,22 +28,6 @@ def test_filters_before_it_give_the_step_of_each_window_of_a_family(name, previo
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_without_the_highest_coefficients_it_is_that_of_a_lower_degree(degree):
-    rows = np.random.default_rng(degree).uniform(-0.1, 0.1, (degree + 1, 3))
-    state = np.array([0.5, -0.5, 0.5, 0.5])
-    zeros = np.zeros((4 - degree, 3))
-    # From degree 1 to 2, terms of the order of those that are left out of the rotation vector come with c_2.
-    allowed = 1e-6 if degree == 1 else 1e-15
-    np.testing.assert_allclose(
-        strapgen.evaluator(f"euler-legendre-{degree}")(state, *rows),
-        strapgen.evaluator("euler-legendre-4")(state, *rows, *zeros),
-        rtol=0,
-        atol=allowed,
-    )
-
-
-@pytest.mark.long
 def test_the_exact_rotation_is_that_of_the_window():
     family = WINDOWS["window-9-9"]
     backend = strapgen.backend("euler", family.name)

@@ -19,7 +19,6 @@ from strapgen.run.backends import BACKENDS
 ORDERS = [1, 2, 3, 4, 5, 7, pytest.param(12, marks=pytest.mark.long)]
 PRECISE = mpmath.mp.clone()
 PRECISE.dps = 50
-EPS = 2.0**-52
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -45,15 +44,6 @@ def test_fifth_order_stops_where_the_source_says():
     assert (q[:3, :] - v * (1 - A / 24) / 2).expand() == sp.zeros(3, 1)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 6])
-def test_both_series_begin_as_the_functions(order):
-    x = sp.Symbol("x", positive=True)
-    for first, function in ((1, sp.sin(x) / x), (2, (1 - sp.cos(x)) / x**2), (0, sp.cos(x))):
-        if first <= order:
-            whole = sp.series(function, x, 0, order - first + 1).removeO()
-            assert sp.expand(algebra.wave_series(x**2, first, order) - whole) == 0
-
-
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_navigation_frame_is_the_sources(order):
     # (6): B = I - (theta x) + (theta x)^2 / 2. (15): r = (-theta/2, 1 - (theta/2)^2 / 2). First order has no squares.
@@ -68,26 +58,6 @@ def test_the_navigation_frame_is_the_sources(order):
     r = sp.Matrix([*(-theta / 2), 1 - (order - 1) * algebra.dot(theta, theta) / 8])
     wanted = algebra.quaternion_product(r, q)
     assert (sp.Matrix(made.expand()["next"]) - wanted).expand() == sp.zeros(4, 1)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("order", ["", "-1", "-2"])
-def test_a_turn_of_both_frames_leaves_the_attitude(algorithm, order, rng):
-    # A body at the reference attitude that turns with the navigation frame stays there, but for what is cut off:
-    # (I + K)(I - K) = I - K^2 and (I + K + K^2/2)(I - K + K^2/2) = I + K^4/4, K^2 = theta theta' - |theta|^2 and
-    # K^4 = -|theta|^2 K^2; with quaternions theta/2 stands for K, and its square is -|theta|^2/4.
-    identity = np.array(KINEMATICS[algorithm].identity, float).squeeze()
-    theta = rng.uniform(-1e-3, 1e-3, (20, 3))
-    turned = strapgen.evaluator(f"{algorithm}-update{order}")(identity, theta)
-    back = strapgen.evaluator(f"{algorithm}-navigation-update{order}")(turned, theta)
-    square = (theta**2).sum(axis=-1)
-    if algorithm == "dcm":
-        squares = theta[:, :, None] * theta[:, None, :] - square[:, None, None] * identity
-        left = {"": 0 * squares, "-1": -squares, "-2": -square[:, None, None] * squares / 4}[order]
-    else:
-        left = {"": 0 * square, "-1": square / 4, "-2": square**2 / 64}[order][:, None] * identity
-    # Transitions next to the identity are rounded once each, their product once for each of two terms near 1 or less.
-    assert np.abs(back - identity - left).max() <= 2 * EPS
 
 
 def exact_transition(algorithm: str, phi: np.ndarray) -> list[mpmath.mpf]:
@@ -187,88 +157,4 @@ def test_the_rotation_of_the_navigation_frame_is_exact_for_a_rate_that_is_linear
     assert result["next_previous_turn"] == [turns["turn"]] * 3
 
 
-def test_orders_are_told():
-    assert "up to degree 5" in derive("dcm-update-5").notes[0]
-    assert derive("dcm-update-5").name == "dcm-update-5"
-    assert derive("dcm-update").inputs[1].bound == Fraction(1)
-
-
 # What the source says of the size of the rotation, and of orthonormalization
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("order", range(1, 6))
-@pytest.mark.parametrize("name", ["dcm", "euler"])
-def test_what_is_cut_off_at_a_tenth_of_a_radian(name, order):
-    # The leading term from the series of sine and cosine beside what the kernel leaves. Of each further term of the
-    # series elements are no larger than the power over the factorial: of angle^(order + 2) and less, together.
-    x = sp.Symbol("x", positive=True)
-    axis = sp.Matrix([2, -1, 2]) / 3
-    update = derive(f"{name}-update-{order}")
-    identity = list(KINEMATICS[name].identity)
-    values = dict(zip(update.inputs[0].elements, identity, strict=True))
-    values |= dict(zip(update.inputs[1].elements, x * axis, strict=True))
-    made = [sp.expand(c) for c in update.expand(values)["next"]]
-    if name == "dcm":
-        K = algebra.skew(axis)
-        whole = list(sp.eye(3) + sp.sin(x) * K + (1 - sp.cos(x)) * K * K)
-    else:
-        whole = [*(sp.sin(x / 2) * axis), sp.cos(x / 2)]
-    left = [sp.series(c, x, 0, order + 2).removeO() - m for c, m in zip(whole, made, strict=True)]
-    leading = [sp.expand(c).coeff(x, order + 1) for c in left]
-    assert [sp.expand(c - y * x ** (order + 1)) for c, y in zip(left, leading, strict=True)] == [0] * len(
-        left
-    )
-    half = 1 if name == "dcm" else 2
-    size = sp.Rational(1, half ** (order + 1) * sp.factorial(order + 1))
-    assert 0 < max(abs(c) for c in leading) <= size
-    angle = 0.1
-    phi = angle * np.array([2, -1, 2]) / 3
-    found = strapgen.evaluator(update.name)(
-        np.array(identity, float).reshape(update.inputs[0].shape), phi
-    ).ravel()
-    error = np.array(
-        [float(y - PRECISE.mpf(float(c))) for y, c in zip(exact_transition(name, phi), found, strict=True)]
-    )
-    rest = 1.1 * (angle / half) ** (order + 2) / float(sp.factorial(order + 2))
-    assert np.abs(error - np.array(leading, float) * angle ** (order + 1)).max() <= rest + 2 * EPS
-    # What order three leaves of a tenth of a radian is below 5e-6, fifth order below 2e-9: the limit of the source.
-    assert np.abs(error).max() <= {1: 5e-3, 2: 2e-4, 3: 5e-6, 4: 1e-7, 5: 2e-9}[order]
-
-
-def stepped(update, state: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """Return a state after many calls of the generated C, one after the other."""
-    given, interface = [state, phi], getattr(update, "interface", None)
-    if interface is not None:
-        arguments = zip(interface.inputs, given, strict=True)
-        given = [update.integers(*pair).astype(update.word_type) for pair in arguments]
-    before, vectors = map(np.ascontiguousarray, given)
-    buffers = [update.pointer(array) for array in (before, np.empty_like(before))]
-    function, first = getattr(update.module.lib, update.function.name), update.pointer(vectors)
-    for k in range(len(phi)):
-        assert not function(buffers[k % 2], first + 3 * k, buffers[1 - k % 2])
-    assert len(phi) % 2 == 0
-    return before if interface is None else update.numbers(interface.outputs[0], before)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("backend", ["c", "c-fixed32"])
-@pytest.mark.parametrize("name", ["dcm", "euler"])
-def test_exact_updates_need_no_orthonormalization(name, backend, rng):
-    # C'C - I, or the square of the length less 1, is turned by a step and not stretched: what steps add is summed.
-    # A step moves an element by what is certified, or by 8 units of round-off; C'C - I takes three elements of a
-    # column times those of another twice, the square of the length four elements, whose sum is at most 2, twice.
-    steps = 100_000
-    update = strapgen.evaluator(f"{name}-update", backend)
-    state = np.array(KINEMATICS[name].identity, float).squeeze()
-    state = stepped(update, state, rng.uniform(-0.1, 0.1, (steps, 3)))
-    left = np.abs(state.T @ state - (np.eye(3) if name == "dcm" else 1)).max()
-    interface = getattr(update, "interface", None)
-    error = 8 * EPS if interface is None else max(map(float, interface.outputs[0].errors))
-    a_step = 2 * (3 if name == "dcm" else 2) * error
-    assert left <= a_step * steps
-    # Rounding to the nearest has no preferred side, so what is left grows with the root of the steps: five times the
-    # deviation of such a walk, which is less than a quarter of the bound of a step.
-    assert left <= 5 * a_step / 4 * np.sqrt(steps)
-    # And it does turn: the attitude is far from where it began.
-    assert np.abs(state - np.array(KINEMATICS[name].identity, float).squeeze()).max() > 0.1

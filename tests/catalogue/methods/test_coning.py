@@ -13,20 +13,15 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import program as lowered
-from peano_baker import generic_rate, local_error
-from tolerances import one_call
 
 import strapgen
 from strapgen import derive
-from strapgen.catalogue import MOST_INCREMENTS, Choice, choose
+from strapgen.catalogue import MOST_INCREMENTS, Choice
 from strapgen.catalogue.methods import coning_coefficients
-from strapgen.catalogue.methods import rotation_series as series
-from strapgen.catalogue.methods.coning import method, sample_terms
+from strapgen.catalogue.methods.coning import by_form, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
-from strapgen.ir.fixed_settings import Settings
 from strapgen.kernel.algebra import cross_elements
 from strapgen.run import exact
-from strapgen.run.backends import BACKENDS, evaluator
 
 #: Every number of samples, and of those kept.
 ALL = [(n, p) for n in range(1, MOST_INCREMENTS + 1) for p in range(4)]
@@ -112,26 +107,6 @@ def test_the_residual_is_that_of_coning(samples, previous, form):
     assert sp.expand((stated - computed + true).rewrite(sp.exp)).expand() == 0
 
 
-@pytest.mark.parametrize(
-    ("samples", "previous"), [pytest.param(n, p, marks=pytest.mark.long if n + p > 3 else ()) for n, p in FEW]
-)
-def test_the_series_is_that_of_the_expression(samples, previous):
-    residual = design(samples, previous, "uncompressed").residual()
-    omega, T, alpha = sp.symbols("omega T alpha")
-    power, c = residual.leading
-
-    def sine(x: sp.Expr) -> sp.Expr:
-        """Return the series of a sine beyond the power that is looked at."""
-        return sp.Add(*((-1) ** k * x ** (2 * k + 1) / sp.factorial(2 * k + 1) for k in range(power)))
-
-    expansion = sp.expand(sp.sympify(residual.expression).subs(omega, 1).replace(sp.sin, sine))
-    leading = sp.sympify(residual.leading_expression)
-    assert sp.Add(*(expansion.coeff(T, k) * T**k for k in range(-1, power))) == leading.subs(omega, 1)
-    assert leading == sp.Rational(c.numerator, c.denominator * samples) * alpha**2 * omega**power * T ** (
-        power - 1
-    )
-
-
 def polynomials(count: int) -> list[list[Fraction]]:
     random = Random(1984)
     return [[Fraction(random.randint(-9, 9), random.randint(1, 5)) for _ in range(count)] for _ in range(3)]
@@ -201,35 +176,19 @@ def test_combined_coefficients_are_the_nearest_to_uncompressed_ones(samples, pre
 
 @MANY
 def test_orders_of_the_forms(many):
-    assert [method("compressed").step_order(n, 0).step for n in range(1, 9)] == [
+    assert [by_form("compressed").step_order(n, 0).step for n in range(1, 9)] == [
         2,
         4,
         *[3] * 6,
     ]
-    assert [method("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
-    combined = method("combined")
+    assert [by_form("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
+    combined = by_form("combined")
     alone = [n for n, previous in many if previous == 0]
     assert [combined.step_order(n, 0).step for n in alone] == [2, 4, 4, *[6] * (len(alone) - 3)]
     assert [combined.step_order(1, p).step for p in range(4)] == [2, 3, 4, 5]
-    polynomial = method("polynomial")
+    polynomial = by_form("polynomial")
     for samples, previous in many:
         assert polynomial.step_order(samples, previous) == combined.step_order(samples, previous)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("form", "count", "previous"),
-    [
-        *(("compressed", n, p) for n, p in FEW),
-        *(("uncompressed", n, p) for n, p in FEW),
-        *(("combined", n, p) for n, p in [*FEW, (1, 3), (6, 0), (7, 0)]),
-        *(("polynomial", n, p) for n, p in [(3, 0), (4, 0), (7, 0)]),
-    ],
-)
-def test_the_local_error_is_one_order_above_the_stated_one(form, count, previous):
-    kernel = derive("euler", f"coning-{form}", count, previous=previous)
-    order = kernel.order.step
-    assert local_error(kernel, generic_rate(count + previous + 1), order + 2) == order + 1
 
 
 # Kernels
@@ -263,33 +222,6 @@ def test_a_kernel_is_its_design(form, count, previous):
         second = [x + c * y for x, y in zip(second, cross_elements(d[a], d[b]), strict=True)]
     assert coefficient(phi, 2) == second
     assert max(x.degree() for x in phi) == (4 if form == "combined" else 2)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("method", "count", "previous"),
-    [("combined", 2, 0), ("combined", 4, 0), ("combined", 2, 2), ("polynomial", 3, 0), ("polynomial", 1, 2)]
-    + [pytest.param("polynomial", n, 0, marks=pytest.mark.long) for n in (5, 6)],
-)
-def test_terms_are_those_of_the_polynomial_through_the_samples(method, count, previous):
-    d, phi = scaled(method, count, previous)
-    fit = strapgen.catalogue.methods.rate_fit.from_increments(count, previous)
-    rate = [
-        [
-            sum(series.fraction(w) * v[axis] for w, v in zip(fit.taylor(power), d, strict=True))
-            for axis in range(3)
-        ]
-        for power in range(count + previous)
-    ]
-    for order, words in enumerate(series.terms(count + previous, 4), 1):
-        if order > 2 or method == "polynomial":
-            total = [Fraction(0)] * 3
-            for word, c in words.items():
-                nested = rate[word[-1]]
-                for letter in reversed(word[:-1]):
-                    nested = cross_elements(rate[letter], nested)
-                total = [x + c * y for x, y in zip(total, nested, strict=True)]
-            assert coefficient(phi, order) == total
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -328,19 +260,6 @@ def test_sculling_is_the_dual_of_coning(form, count, previous):
     assert [ring(x) for x in found] == [ring(x.coeff(e)) for x in total]
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (3, 0), (2, 2)])
-@pytest.mark.parametrize("method", [*FORMS, "polynomial"])
-def test_about_one_axis_the_rotation_vector_is_the_sum_of_the_increments(method, count, previous):
-    # Whatever the sizes are, those before the step too: no product of second, third or fourth order is left.
-    kernel = derive("rotation-vector", f"coning-{method}", count, previous=previous)
-    ring, *axis = sp.ring("x y z", sp.QQ)
-    random = Random(19)
-    sizes = [sp.QQ(random.randint(-9, 9), random.randint(1, 5)) for _ in range(count + previous)]
-    turns = [size * x for size in sizes for x in axis]
-    (phi,) = kernel.expand(dict(zip(kernel.inputs[0].elements, turns, strict=True))).values()
-    assert [ring(x) for x in phi] == [sum(sizes[previous:]) * x for x in axis]
-
-
 def test_a_method_without_rotation_vector_is_refused():
     from strapgen.catalogue.kernels.attitude_step import rotation_vector
     from strapgen.catalogue.methods.runge_kutta import method
@@ -348,39 +267,6 @@ def test_a_method_without_rotation_vector_is_refused():
 
     with pytest.raises(ValueError, match="rk4 has no rotation vector"):
         rotation_vector(method(TABLEAUX["rk4"]), 2)
-
-
-KERNELS = [
-    ("rotation-vector", "coning-compressed", 4, 0),
-    ("rotation-vector", "coning-uncompressed", 2, 1),
-    ("sculling", "coning-compressed", 3, 0),
-    pytest.param("rotation-vector", "coning-polynomial", 6, 0, marks=pytest.mark.long),
-    ("rotation-vector", "coning-combined", 3, 0),
-    pytest.param("rotation-vector", "coning-combined", 5, 0, marks=pytest.mark.long),
-    pytest.param("sculling", "coning-combined", 3, 1, marks=pytest.mark.long),
-    pytest.param("rotation-vector", "magnus4", 2, 0, marks=pytest.mark.long),
-]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "method", "count", "previous"), KERNELS)
-def test_vectors_of_a_step_on_every_back_end(backend_name, name, method, count, previous, rng):
-    choice = choose(name, method, count, previous=previous)
-    settings = None
-    if BACKENDS[backend_name].fixed:
-        settings = Settings(ranges={"velocity_increments": Fraction(1, 8)} if name == "sculling" else {})
-    run = evaluator(choice, backend_name, settings)
-    made = lowered(choice)
-    inputs = [rng.uniform(-0.12, 0.12, (20, *signal.shape)) for signal in made.inputs]
-    found = np.array(run(*inputs))
-    with mpmath.workdps(exact.DIGITS):
-        step = exact.Interpreter(made)
-        wanted = [
-            [float(x) for x in step(*([mpmath.mpf(float(x)) for x in part[k].flat] for part in inputs))]
-            for k in range(20)
-        ]
-    # Sums of up to 8 increments of 0.12 rad: 4 units of 1 each in double; velocities, which count as angles.
-    assert np.abs(found - wanted).max() <= one_call(run, 8)
 
 
 # Drift on coning
@@ -408,25 +294,6 @@ def measured(
 def stated(form: str, samples: int, previous: int, alpha, omega, T):
     residual = sp.sympify(design(samples, previous, form).residual().expression)
     return residual.subs({"alpha": alpha, "omega": omega, "T": T})
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("form", "samples", "previous"),
-    [
-        *(("compressed", n, p) for n, p in [(1, 0), (1, 1), (4, 0), (2, 2)]),
-        *(("uncompressed", n, p) for n, p in [(3, 0), (1, 2)]),
-        *(("combined", n, p) for n, p in [(3, 0), (1, 2)]),
-        *(pytest.param("combined", n, p, marks=pytest.mark.long) for n, p in [(4, 0), (5, 0), (2, 2)]),
-    ],
-)
-def test_measured_drift_in_double_is_the_residual(form, samples, previous):
-    # At 1/100 degree what is of fourth order in the cone is below a hundredth.
-    alpha = math.radians(0.01)
-    duration = 60 if 60 * 100 % samples == 0 else 59.85
-    found = measured(form, samples, previous, alpha, duration)[-1]
-    wanted = float(stated(form, samples, previous, alpha, 20 * sp.pi, sp.Rational(1, 100)))
-    assert found == pytest.approx(wanted, rel=0.01)
 
 
 @pytest.mark.long
@@ -509,21 +376,3 @@ def test_with_the_terms_a_cone_of_one_degree_leaves_the_residual(samples):
     wanted = abs(float(residual)) * math.degrees(1) * 3600
     assert largest("combined", samples) == pytest.approx(wanted, rel=0.01)
     assert largest("compressed", samples) > 1.5 * wanted
-
-
-@pytest.mark.long
-def test_more_samples_leave_less():
-    assert largest("combined", 5) < 0.01
-    assert largest("combined", 6) < 0.001
-
-
-def test_a_cone_of_one_degree_on_every_back_end(backend_name):
-    alpha, omega = math.radians(1), 20 * math.pi
-    profile = strapgen.motion("coning", **{f"{k}_rad_s": v for k, v in cone(alpha, omega).items()})
-    settings = Settings(largest_angle=Fraction(1, 64)) if BACKENDS[backend_name].fixed else None
-    ready = strapgen.backend("euler", "coning-compressed", 4, backend_name, settings=settings)
-    reference = strapgen.backend("euler", "coning-compressed", 4)
-    increments = profile.increments(Fraction(1, 25), 25, 4)
-    bound = ready.rounding_bound(25, rounded_inputs=True)
-    allowed = 16 * 25 * ready.unit if bound is None else bound
-    assert np.abs(ready.propagate(increments) - reference.propagate(increments)).max() <= allowed + ready.unit

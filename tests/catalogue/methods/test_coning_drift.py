@@ -101,12 +101,3 @@ def response_of(gyro, b):
         / (2 * pi * mpmath.mpf(gyro.bandwidth_hz.numerator) / gyro.bandwidth_hz.denominator)
     )
     return 1 / (1 + 2 * mpmath.mpf(gyro.damping.numerator) / gyro.damping.denominator * s + s**2)
-
-
-@pytest.mark.long
-def test_the_largest_drift_is_sought_between_the_points_of_its_grid():
-    shape, coefficients = ConingShape(1, 2), [Fraction(127237734, 10**9), Fraction(-23056512, 10**9)]
-    dense = coning_drift.errors(shape, coefficients, np.linspace(0.0, 1.0, 20001)[1:])
-    assert coning_drift.largest(shape, coefficients, Fraction(1)) == pytest.approx(
-        max(abs(float(value)) for value in dense), rel=1e-7
-    )

@@ -92,23 +92,6 @@ def test_small_samples_are_crossed_with_the_combined_coefficients():
     assert (turned[0, 2] - turned[1, 2]) / 2 == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.long
-def test_the_rest_consists_of_products_of_high_degree():
-    """Both forms are exact for products of powers to the same total degree, three samples and two before them to 4."""
-    kernel = derive(CHOICE)
-    (rest,) = (stage for stage in kernel.stages if stage.signal.name == "rest")
-    names = sorted({symbol.name for expression in rest.expressions for symbol in expression.free_symbols})
-    # legendre_k x legendre_m with k + m = 5 and more.
-    assert all(name.startswith("legendre_") for name in names)
-    numbers = {int(name.split("_")[1]) for name in names}
-    assert min(numbers) >= 1
-
-
-def test_with_one_sample_there_is_no_rest():
-    kernel = derive(choose("dcm", "coning-exact-rest", 1))
-    assert "rest" not in {stage.signal.name for stage in kernel.stages}
-
-
 def test_the_order_is_that_of_the_polynomial():
     assert derive(choose("euler", "coning-exact-rest", 3)).order.step == 4
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
-import mpmath
 import numpy as np
 import pytest
 
 import strapgen
 from strapgen.catalogue.methods import coning_coefficients
-from strapgen.catalogue.methods.coning_drift import ConingShape, terms
-from strapgen.catalogue.methods.frequency_shaping import BAND, weights
-from strapgen.lab.runs import drift
+from strapgen.catalogue.methods.coning import BAND, weights
 
 SAMPLES = pytest.mark.parametrize(("increments", "previous"), [(1, 1), (1, 4), (1, 8), (3, 3), (4, 0)])
 
@@ -49,33 +44,8 @@ def test_the_mean_square_is_below_that_of_coefficients_for_low_frequencies(incre
     assert sizes[0] < 0.7 * sizes[1]
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("increments", "previous", "frequency", "degrees"),
-    [(1, 1, 10, 0.05), (4, 0, 20, 0.001), (1, 4, 20, 0.05)],
-)
-def test_the_drift_of_a_small_cone_is_what_the_weights_leave(increments, previous, frequency, degrees):
-    """For the half-angle a it is a^2 E(b) for each step; what swings is of third order in a."""
-    angle = math.radians(degrees)
-    b = np.array(2 * math.pi * frequency / 100)
-    left = columns(increments, previous, b) @ [float(w) for w in weights(increments, previous)]
-    left = float(left - target(increments, b)) * angle**2 / (increments / 100)
-    cone = strapgen.motion("cone", half_angle_rad=angle, frequency_hz=frequency)
-    backend = strapgen.backend("euler", "coning-least-squares", increments, previous=previous)
-    run = strapgen.simulate(backend, cone, f"{increments}/100", 6)
-    assert drift(run) == pytest.approx(abs(math.degrees(left)) * 3600, rel=0.01)
-
-
 def test_one_sample_has_nothing_to_be_crossed_with():
     assert weights(1) == ()
     turn = np.array([[[0.1, 0.2, 0.3]]])
     single, plain = (strapgen.backend("euler", m, 1) for m in ("coning-least-squares", "coning-compressed"))
     np.testing.assert_array_equal(single.propagate(turn), plain.propagate(turn))
-
-
-def test_the_drift_that_is_made_small_is_the_one_that_all_designs_use():
-    shape = ConingShape(3, 2)
-    b = mpmath.mpf("0.7")
-    unit, constant = terms(shape, b, mpmath)
-    np.testing.assert_allclose(np.array(unit, float), columns(3, 2, np.array(0.7)), rtol=1e-14)
-    assert float(constant) == pytest.approx(target(3, np.array(0.7)), rel=1e-14)

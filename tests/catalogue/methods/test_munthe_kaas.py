@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
-from peano_baker import evaluated, generic_rate, local_error, lowest_difference, true_rotation, turns
 
-from strapgen import derive
-from strapgen.catalogue import ALGORITHMS
-from strapgen.catalogue.methods import munthe_kaas
-from strapgen.catalogue.methods.munthe_kaas import bortz
-from strapgen.kernel.kernel import evaluate_stages
+from strapgen.catalogue.methods.runge_kutta import bortz
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long
 
-ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 X = sp.Symbol("x", positive=True)
 
 
@@ -64,44 +58,3 @@ def test_the_series_solves_the_equation_of_rotation(products):
     lowest = min(min(m[0] for m in sp.Poly(e, t).monoms()) for e in left if e != 0)
     # Of p t + q t^2 the first product with its own derivative is t^2 p x q, every further one brings a power.
     assert lowest == products + 2 if products < 2 else lowest >= 5
-
-
-@pytest.mark.parametrize(("count", "previous"), [(2, 0), (3, 0), (4, 0), (1, 2), (2, 3)])
-@ALGORITHM
-def test_the_local_error_is_of_fifth_order(algorithm, count, previous):
-    kernel = derive(algorithm, "munthe-kaas4", count, previous=previous)
-    assert kernel.order.step == 4
-    assert local_error(kernel, generic_rate(count + previous + 1), 6) == 5
-
-
-@ALGORITHM
-def test_rates_at_the_nodes_give_the_order_too(algorithm):
-    kernel = derive(algorithm, "munthe-kaas4", rates=True)
-    rate = generic_rate(5)
-    nodes = munthe_kaas.method(4).nodes
-    values = dict(zip(kernel.inputs[1].elements, turns(rate, nodes, 6), strict=True))
-    found = evaluated(kernel, values, kernel.transition)
-    assert lowest_difference(found, true_rotation(algorithm, rate, 6)) == 5
-
-
-@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
-def test_products_of_the_other_sign_lose_the_order(algorithm, monkeypatch):
-    monkeypatch.setattr(munthe_kaas, "cross", lambda u, v: -v.cross(u) * -1)
-    kernel = derive(algorithm, "munthe-kaas4", 3)
-    assert local_error(kernel, generic_rate(3), 6) == 3
-
-
-@pytest.mark.parametrize("products", [0, 1])
-def test_a_series_that_is_cut_too_early_loses_the_order(products, monkeypatch):
-    monkeypatch.setattr(munthe_kaas, "bortz", lambda phi, turn, most: bortz(phi, turn, products))
-    kernel = derive("euler", "munthe-kaas4", 3)
-    assert local_error(kernel, generic_rate(3), 6) < 5
-
-
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (3, 0), (8, 0), (2, 2)])
-def test_at_a_constant_rate_the_rotation_vector_is_the_sum_of_the_increments(count, previous):
-    kernel = derive("dcm", "munthe-kaas4", count, previous=previous)
-    ring, *w = sp.ring("x y z", sp.QQ)
-    values = [x * sp.QQ(1, count) for x in w] * (count + previous)
-    known = evaluate_stages(kernel.stages[:-1], dict(zip(kernel.inputs[1].elements, values, strict=True)))
-    assert [ring(known[f"phi_{axis}"]) for axis in "xyz"] == w

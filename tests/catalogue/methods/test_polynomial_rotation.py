@@ -71,18 +71,6 @@ def test_all_parameters_are_of_the_same_rotation():
     np.testing.assert_allclose(np.array(matrix, float), transition(DCM, 8).reshape(3, 3), atol=1e-15)
 
 
-@pytest.mark.long
-def test_what_is_cut_off_falls_with_the_order_and_with_the_parts():
-    """A part of half the length has terms of order n that are 2^n times smaller."""
-    exact = transition(EULER, 30)
-    errors = {
-        (order, parts): np.abs(transition(EULER, order, parts) - exact).max()
-        for order, parts in ((4, 1), (8, 1), (4, 2))
-    }
-    assert errors[8, 1] < 1e-2 * errors[4, 1]
-    assert errors[4, 2] < errors[4, 1] / 2**4
-
-
 def test_a_constant_rate_about_an_axis_is_an_exponential():
     build = KernelBuilder()
     turn = sp.Matrix([0, 0, sp.Rational(1, 2)])
@@ -108,14 +96,3 @@ def test_the_exact_rotation_of_a_fit_is_the_limit_of_the_methods_that_use_it(inc
 def test_the_exact_rotation_of_a_fit_takes_increments():
     with pytest.raises(strapgen.InputError, match="method fit-exact takes increments"):
         strapgen.choose("euler", "fit-exact", rates=True)
-
-
-@pytest.mark.parametrize(
-    ("increments", "previous", "order"), [(1, 1, 3), pytest.param(2, 0, 4, marks=pytest.mark.long)]
-)
-def test_the_order_of_an_exact_rotation_is_that_of_the_fit(increments, previous, order):
-    motion = strapgen.motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
-    choice = strapgen.choose("euler", "fit-exact", increments, previous=previous)
-    found = strapgen.converge(choice, motion, ["1/8", "1/16", "1/32"], 1)
-    assert found.predicted == order
-    assert found.observed == pytest.approx(order, abs=0.1)

@@ -59,9 +59,9 @@ def test_reversed_in_time_a_term_changes_its_sign():
     # something left, and in the second order only of neighbours.
     _, second, third, fourth = legendre_terms(5, 4)
     assert {j - i for i, j in rotation_series.pairs(second)} == {1}
-    for k, row in rotation_series.third(third).items():
+    for k, row in rotation_series.third_order(third).items():
         assert all((k + i + j) % 2 == 0 for i, j in row)
-    for (k, m), row in rotation_series.fourth(fourth).items():
+    for (k, m), row in rotation_series.fourth_order(fourth).items():
         assert all((k + m + i + j) % 2 for i, j in row)
 
 
@@ -73,7 +73,7 @@ def test_words_multiply_as_cross_products():
             for some in ([[0, 1, 2][:n], [3, 1, 0][:n]] for n in lengths)
         )
         wanted = cross_elements(value(left, among), value(right, among))
-        assert list(value(rotation_series.cross(left, right), among)) == wanted
+        assert list(value(rotation_series.cross_words(left, right), among)) == wanted
 
 
 @pytest.mark.parametrize("count", [2, 5])
@@ -89,7 +89,7 @@ def test_scalar_products_give_the_same_terms(count):
 
     pairs = rotation_series.pairs(second)
     assert list(sum(c * crossed(*pair) for pair, c in pairs.items())) == list(value(second, among))
-    rows = rotation_series.third(third)
+    rows = rotation_series.third_order(third)
     assert list(sum(weight(row) * np.array(among[k]) for k, row in rows.items())) == list(value(third, among))
-    rows = rotation_series.fourth(fourth)
+    rows = rotation_series.fourth_order(fourth)
     assert list(sum(weight(row) * crossed(*pair) for pair, row in rows.items())) == list(value(fourth, among))

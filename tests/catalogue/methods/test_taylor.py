@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from peano_baker import evaluated, generic_rate, increments, local_error, true_rotation
+from peano_baker import evaluated, generic_rate, increments, true_rotation
 
 from strapgen import derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS
@@ -16,26 +16,6 @@ from strapgen.ir.exceptions import InputError
 pytestmark = pytest.mark.long
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
-
-
-@pytest.mark.parametrize("order", range(1, 9))
-@ALGORITHM
-def test_the_local_error_is_one_order_above_the_series(algorithm, order):
-    # As many increments as the order are exact on the rate, so that the series alone errs.
-    # From three increments on it is taken from the middle of the step, and odd orders gain one.
-    kernel = derive(algorithm, f"taylor{order}", order)
-    reached = order if order < 3 else order + order % 2
-    assert kernel.order.step == reached
-    assert local_error(kernel, generic_rate(order - 1), reached + 2) == reached + 1
-
-
-@pytest.mark.parametrize(("count", "previous"), [(2, 0), (3, 0), (4, 0), (1, 1), (2, 1), (1, 2), (1, 3)])
-@ALGORITHM
-def test_samples_limit_the_order_where_the_series_does_not(algorithm, count, previous):
-    kernel = derive(algorithm, "taylor8", count, previous=previous)
-    assert kernel.order.limited
-    order = kernel.order.step
-    assert local_error(kernel, generic_rate(count + previous + 1), order + 2) == order + 1
 
 
 @pytest.mark.parametrize("order", [1, 4, 7])

@@ -10,7 +10,6 @@ import pytest
 import sympy as sp
 
 from strapgen import InputError, backend, choose, derive, motion, simulate
-from strapgen.catalogue import ALGORITHMS
 from strapgen.catalogue.methods import rate_fit
 from strapgen.kernel.kernel import Kernel, evaluate_stages
 from strapgen.lab.motions.motions import Motion
@@ -73,31 +72,6 @@ def test_the_series_from_the_middle_converges_where_that_from_the_beginning_does
         backend("euler", f"taylor{order}", count), cone(frequency_hz), f"{count}/100", "1.2", record="1.2"
     )
     assert np.degrees(run.mean_drift) < most_deg
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("algorithm", "order", "count", "previous"),
-    [
-        *((name, *step) for name in ALGORITHMS for step in ((1, 3, 0), (4, 4, 0), (4, 2, 2), (20, 8, 3))),
-        # Every order meets every count of samples that it keeps once, on one state or the other.
-        *(
-            (("dcm", "euler")[(row + column) % 2], order, count, 0)
-            for row, order in enumerate((2, 5, 8))
-            for column, count in enumerate((3, 5, 8))
-            if count < 4 or order >= count
-        ),
-    ],
-)
-def test_a_transition_is_a_rotation_whatever_the_increments_are(algorithm, order, count, previous):
-    kernel, random = derive(algorithm, f"taylor{order}", count, previous=previous), Random(1969)
-    assert kernel.attitude_step.isometry
-    with mpmath.workdps(60):
-        for size in (10**-4, 1, 5):
-            samples = [mpmath.mpf(random.randint(-999, 999)) * size / 1000 for _ in kernel.inputs[1].elements]
-            turn = transition(kernel, samples)
-            product = turn.T * turn
-            assert mpmath.mnorm(product - mpmath.eye(product.rows)) < mpmath.mpf(10) ** -50
 
 
 @pytest.mark.long

@@ -10,11 +10,10 @@ from derived import kernel, program
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.ir.program import Program
 from strapgen.lowering import candidates, canonical
-from strapgen.lowering.arithmetic import operation_count
-from strapgen.lowering.canonical import search
+from strapgen.lowering.canonical import plan
 from strapgen.lowering.canonical.core import decompose
-from strapgen.lowering.names import is_temporary
 from strapgen.lowering.passes import optimize
+from strapgen.lowering.trees import is_temporary, operation_count
 
 #: Cayley-Klein parameters have the programs of Euler parameters by other names, which tests/lowering proves.
 STEPS = [Choice(a, m, n) for a in ("dcm", "euler") for m in STANDARD_METHODS for n in (1, 2, 3, 4, 5, None)]
@@ -75,14 +74,14 @@ def test_plans_that_are_not_written_are_exact_too_and_nearly_as_long_as_estimate
     """In a step on three increments some vectors are multiples of those that have a name."""
     choice = Choice("euler", "rk2", 3)
     core = canonical.extract_core(kernel(choice))
-    plans = search.plans(core, decompose(core))
+    plans = plan.plans(core, decompose(core))
     monkeypatch.setattr(canonical, "_WRITTEN", len(plans))
     _, *written = candidates(kernel(choice), core)
-    for plan, form, candidate in zip(plans, canonical.forms(core), written, strict=True):
+    for one, form, candidate in zip(plans, canonical.forms(core), written, strict=True):
         canonical.verify(core, candidate)
         count = sum(operation_count(assignment.value) for assignment in form)
         # An estimate knows neither the scalar products that a polynomial shares nor the signs that a sum absorbs.
-        assert abs(search._estimate(plan) - count) <= 2
+        assert abs(plan._estimate(one) - count) <= 2
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.kernel.polynomials import Polynomial, atoms
-from strapgen.lowering.canonical.products import choose_products
-from strapgen.lowering.canonical.vectors import Form
+from strapgen.lowering.canonical.vectors import Form, choose_products
 
 SETTINGS = settings(max_examples=25, derandomize=True, database=None, deadline=None)
 

@@ -18,8 +18,7 @@ from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles,
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError

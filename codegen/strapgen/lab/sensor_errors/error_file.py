@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.catalogue import toml_models
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import STANDARD_GRAVITY

@@ -10,8 +10,7 @@ from typing import Annotated
 import sympy as sp
 
 from strapgen.catalogue.coefficients import Number
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.calibration.calibration import QUANTITIES, Scheme
 

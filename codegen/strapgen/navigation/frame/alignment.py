@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.euler_angles import ANGLES
+from strapgen.catalogue.kernels.conversions import ANGLES
 from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.updates import TURN
+from strapgen.catalogue.kernels.two_speed_kernels import TURN
 from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder

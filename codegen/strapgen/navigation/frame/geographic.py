@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.euler_angles import followed_angles
+from strapgen.catalogue.kernels.conversions import followed_angles
 from strapgen.catalogue.kinematics import DCM
 from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.acceleration import rotated
+from strapgen.catalogue.kernels.two_speed_kernels import rotated
 from strapgen.catalogue.kernels.velocity_position import CHANGES
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
 from strapgen.ir.kernel_info import Recursion

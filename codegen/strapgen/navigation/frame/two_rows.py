@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.updates import NAVIGATION_ROTATION, ROTATION_VECTOR, transition
+from strapgen.catalogue.kernels.two_speed_kernels import NAVIGATION_ROTATION, ROTATION_VECTOR, transition
 from strapgen.catalogue.kinematics import DCM, SAVAGE, UNIT
 from strapgen.ir.kernel_info import Recursion
 from strapgen.ir.signals import Signal, after

@@ -12,8 +12,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from strapgen.catalogue import coefficients
 from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.methods.coefficient_files import Source, Title, slug
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, algebraic, refused
+from strapgen.catalogue.toml_models import Key, UserFile, algebraic, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 

@@ -8,8 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Annotated
 
 from strapgen.catalogue import toml_models
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.kernel.kernel import Kernel
 from strapgen.navigation.redundancy import failure_selection, parity_equations

@@ -9,8 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, parse, rational, refused
+from strapgen.catalogue.toml_models import Key, UserFile, parse, rational, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import CARRIES

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.catalogue.kernels.acceleration import (
-    NAVIGATION_VELOCITY,
-    VELOCITY_EQUATIONS,
-    compensated,
-    frame_correction,
-    rotated,
-)
-from strapgen.catalogue.kernels.coning_sculling import (
+from strapgen.catalogue.kernels.two_speed_kernels import (
     ANGLE_SUM,
     CONING,
     INCREMENT,
+    NAVIGATION_ROTATION,
+    NAVIGATION_VELOCITY,
     PREVIOUS,
+    PREVIOUS_TURN,
+    ROTATION_VECTOR,
     SCULLING,
+    TURN,
+    VELOCITY_EQUATIONS,
     VELOCITY_INCREMENT,
     VELOCITY_SUM,
     FastLoop,
+    compensated,
     coned,
+    frame_correction,
+    rotated,
+    rotation_sum,
     rotation_vector_of,
     sculled,
-)
-from strapgen.catalogue.kernels.updates import (
-    NAVIGATION_ROTATION,
-    PREVIOUS_TURN,
-    ROTATION_VECTOR,
-    TURN,
-    rotation_sum,
     transition,
     turned_frame,
 )
