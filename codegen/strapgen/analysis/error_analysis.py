@@ -24,7 +24,7 @@ from strapgen.results.records import INTERNAL, Record, entry
 from strapgen.results.result import Result
 
 if TYPE_CHECKING:
-    from strapgen.analysis.agreement import Agreement
+    from strapgen.analysis.series.prediction import Agreement
 
 
 @dataclass(frozen=True)
