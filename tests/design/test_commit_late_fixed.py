@@ -420,5 +420,3 @@ def test_tap_below_a_power_of_two_has_room():
     assert max(map(abs, rounded([Fraction(1, 3), Fraction(1, 3), tap], 31, 2))) >= 1 << 31, (
         "the reason for the room"
     )
-
-
