@@ -1,4 +1,8 @@
-"""Reads the command in the header of a generated file as data: nothing that it says is run or written."""
+"""Reads the command in the header of a generated file as data: nothing that it says is run or written.
+
+Generated files are back ends of comparisons too: `file_backend` of one function, `runner_of_file` of a described system
+or of two speeds.
+"""
 
 from __future__ import annotations
 
