@@ -83,10 +83,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.runs import simulate as simulate
     from strapgen.lab.scipy_rotations import from_rotation as from_rotation
     from strapgen.lab.scipy_rotations import to_rotation as to_rotation
-    from strapgen.navigation.courses.courses import Course as Course
-    from strapgen.navigation.courses.courses import course as course
-    from strapgen.navigation.systems.system_backends import SystemRunner as SystemRunner
-    from strapgen.navigation.systems.system_backends import system_runner as system_runner
+    from strapgen.navigation.courses import Course as Course
+    from strapgen.navigation.courses import course as course
+    from strapgen.navigation.systems.system_runner import SystemRunner as SystemRunner
+    from strapgen.navigation.systems.system_runner import system_runner as system_runner
     from strapgen.navigation.systems.wiring import read_system as read_system
     from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed as TwoSpeed
     from strapgen.pipeline import derive as derive
@@ -127,7 +127,7 @@ _NAMES = {
         "SampleKind",
     ),
     "run.backend_names": ("BACKENDS",),
-    "navigation.systems.system_backends": (
+    "navigation.systems.system_runner": (
         "SystemRunner",
         "system_runner",
     ),
@@ -192,7 +192,7 @@ _NAMES = {
         "quantize",
     ),
     "fixedpoint.floating.bounds": ("rounding_bounds",),
-    "navigation.courses.courses": (
+    "navigation.courses": (
         "Course",
         "course",
     ),

@@ -27,7 +27,7 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.cli import main
 from strapgen.lab.recordings.recording import read_inertial
-from strapgen.navigation.courses.courses import NavigationFrame, course
+from strapgen.navigation.courses import NavigationFrame, course
 from strapgen.results.display import formulas
 from strapgen.run import standard_tree
 from strapgen.run.backends import BACKENDS

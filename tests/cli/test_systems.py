@@ -15,10 +15,9 @@ from small_systems import COUNTING
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.motions.motions import motion
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import described
-from strapgen.navigation.two_speed.loop_files import LoopFiles
-from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+from strapgen.navigation.two_speed.two_speed_runner import LoopFiles, TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import loops
 
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10"

@@ -7,9 +7,8 @@ import pytest
 
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
-from strapgen.navigation.systems.system_agreement import agreement
-from strapgen.navigation.systems.system_backends import system_runner
-from strapgen.navigation.systems.system_memory import rescaled
+from strapgen.navigation.systems.system_comparison import agreement
+from strapgen.navigation.systems.system_runner import rescaled, system_runner
 from strapgen.navigation.systems.wiring import described
 
 SYSTEMS = ("two-speed-dcm", "two-speed-dcm-1", "two-speed-euler", "two-speed-euler-1")

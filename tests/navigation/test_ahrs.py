@@ -12,8 +12,8 @@ import pytest
 
 import strapgen
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.loops.ahrs import RestingSensors, run_modes, tilt
 from strapgen.navigation.loops.loop_schedule import read
+from strapgen.navigation.loops.loops_study import RestingSensors, run_modes, tilt
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "ahrs.toml"
 SCHEDULE = read()

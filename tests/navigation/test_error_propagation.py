@@ -10,7 +10,7 @@ from strapgen import derive, lower
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder
-from strapgen.navigation.systems.error_propagation import moved
+from strapgen.navigation.systems.system_bounds import moved
 
 
 @pytest.mark.parametrize("kernel", ["euler-product", "coriolis-gravity", "dcm-velocity-2"])

@@ -7,19 +7,12 @@ import pytest
 
 import strapgen
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.redundancy.failure_tables import (
+from strapgen.navigation.redundancy.geometry import HEXAD
+from strapgen.navigation.redundancy.geometry_report import (
     _different,
-    failure_directions,
     failure_table,
     failure_tables,
 )
-from strapgen.navigation.redundancy.geometry import HEXAD
-
-
-def test_failure_directions_are_the_null_space():
-    directions = failure_directions(HEXAD)
-    np.testing.assert_allclose(directions @ np.array(HEXAD.axes, float), 0, atol=1e-14)
-    np.testing.assert_allclose(directions @ directions.T, np.eye(3), atol=1e-14)
 
 
 @pytest.mark.long

@@ -8,7 +8,6 @@ import sympy as sp
 
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.loops import loop_gains
-from strapgen.navigation.loops.level import level_loop
 from strapgen.navigation.loops.loop_gains import (
     ORDERS,
     R,
@@ -23,6 +22,7 @@ from strapgen.navigation.loops.loop_gains import (
     tau,
     z,
 )
+from strapgen.navigation.loops.loop_kernels import level_loop
 
 LOOPS = [(name, order) for name, orders in ORDERS.items() for order in orders]
 

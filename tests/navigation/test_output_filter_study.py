@@ -8,9 +8,9 @@ import pytest
 from commands import run
 
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.outputs import output_filter_study as experiment
-from strapgen.navigation.outputs.output_filter import OutputFilter, decibels
-from strapgen.navigation.systems.radial_error import PRINTED, RAYLEIGH, radial_error_rate
+from strapgen.navigation import output_filter as experiment
+from strapgen.navigation.output_filter import OutputFilter, decibels
+from strapgen.navigation.outputs import PRINTED, RAYLEIGH, radial_error_rate
 
 EDGE = OutputFilter(3.2, 50)
 

@@ -12,8 +12,8 @@ from derived import kernel
 import strapgen
 from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.outputs.output_names import MOUNTINGS
-from strapgen.navigation.outputs.variation_table import VariationTable
+from strapgen.navigation.navigation_kernels import MOUNTINGS
+from strapgen.navigation.outputs import VariationTable
 
 
 @pytest.mark.long

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.outputs.output_words import OUTPUT_WORDS
+from strapgen.navigation.outputs import OUTPUT_WORDS
 
 #: Bits with the sign for a rounding of a tenth of the printed accuracy.
 BITS = {

@@ -13,9 +13,9 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.navigation.systems import system_bounds as pass_bounds
 from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
-from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.systems.system_bounds import bounds
 from strapgen.navigation.systems.system_file import parsed
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import Description, wired
 
 #: Intervals are rounded outward by units of 2^-160.

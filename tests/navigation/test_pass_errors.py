@@ -17,16 +17,18 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.signals import Signal
-from strapgen.navigation.systems.compiled_system import CompiledSystem
 from strapgen.navigation.systems.fitting import Fitted, fitted
-from strapgen.navigation.systems.system_backends import SystemMemory, system_runner
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.system_file import parsed
-from strapgen.navigation.systems.system_runner import SystemRunner
+from strapgen.navigation.systems.system_runner import (
+    CompiledSystem,
+    SystemMemory,
+    SystemRunner,
+    system_runner,
+)
 from strapgen.navigation.systems.wiring import Description, read_system, wired
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.navigation.two_speed.two_speed_c import LOOPS
-from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, sources
+from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, LOOPS, SCULLING, sources
 from strapgen.run import compiler
 from strapgen.run.evaluators import Array
 from strapgen.run.exact import DIGITS, number

@@ -12,11 +12,10 @@ import sympy as sp
 
 import strapgen
 from strapgen.ir.exceptions import InputError
+from strapgen.navigation.navigation_kernels import HEXAD_TRIADS, REDUNDANCY
 from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, geometry
-from strapgen.navigation.redundancy.geometry_file import kernels, read
 from strapgen.navigation.redundancy.geometry_report import GeometryResult
-from strapgen.navigation.redundancy.parity_equations import SensorSet
-from strapgen.navigation.redundancy.redundancy_names import HEXAD_TRIADS, REDUNDANCY
+from strapgen.navigation.redundancy.redundancy_kernels import SensorSet, kernels, read
 from strapgen.run.compiled_code import ModelEvaluator
 
 #: The parity vectors of the six sensors, by the sensors of each.

@@ -13,7 +13,7 @@ import strapgen
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import ANY
-from strapgen.navigation.systems.sampling_names import SAMPLING
+from strapgen.navigation.navigation_kernels import SAMPLING
 
 #: Settings and constants with which each runs in fixed point; a unit that is not known has no range of its own.
 RANGES = {

@@ -6,10 +6,10 @@ import pytest
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.systems.fitting import fitted
-from strapgen.navigation.systems.system_agreement import agreement
-from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.systems.system_bounds import bounds
+from strapgen.navigation.systems.system_comparison import agreement
 from strapgen.navigation.systems.system_file import parsed
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import wired
 
 #: Three rates, a delayed wire, sums, a state in another stage's cell, and words of two lengths.

@@ -14,7 +14,7 @@ from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.specific_forces import velocity_increments
 from strapgen.navigation.systems import system_comparison
 from strapgen.navigation.systems.system_comparison import compare_system
-from strapgen.navigation.systems.system_inputs import samples
+from strapgen.navigation.systems.system_runs import samples
 from strapgen.navigation.systems.wiring import described
 
 CONING = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)

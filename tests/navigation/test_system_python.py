@@ -8,7 +8,7 @@ from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
-from strapgen.navigation.systems.system_python import _moved
+from strapgen.navigation.systems.system_generation import _moved
 
 
 def test_a_value_is_moved_by_the_places_between_two_formats_and_held_in_the_word_of_its_destination():

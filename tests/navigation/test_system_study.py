@@ -11,8 +11,9 @@ from commands import run
 from strapgen.analysis.vibration.spectrum import read_spectrum
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_study
-from strapgen.navigation.systems.system_agreement import agreement
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_comparison import agreement
+from strapgen.navigation.systems.system_runner import system_runner
+from strapgen.navigation.systems.system_runs import begun
 from strapgen.navigation.systems.turning_vehicle import TurningVehicle
 from strapgen.navigation.systems.wiring import described
 
@@ -84,7 +85,7 @@ def test_every_pass_of_the_chain_is_within_the_sum_of_the_bounds(shaken, rate, s
     description = described(EXAMPLE, Fraction(rate))
     inputs = system_study.samples(description, shaken, Fraction(seconds))
     runner = system_runner(description, backend)
-    start = system_study.started(runner, system_study.Outputs.of(description), shaken)
+    start, _ = begun(runner, shaken.attitude(np.zeros(1))[0])
     result = agreement(runner, system_runner(description, reference), inputs, start)
     assert result.holds, {name: share for name, share in result.share.items() if share > 1}
     assert set(result.reasons) == {"angles_previous", "geographic_previous"}  # angles jump by a turn

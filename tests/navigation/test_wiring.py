@@ -13,8 +13,8 @@ from navigation.described_files import ATTITUDE, TWO_SPEEDS, description
 
 from strapgen.ir.signals import FRAMES
 from strapgen.navigation.systems.system import Push
-from strapgen.navigation.systems.system_backends import system_runner
 from strapgen.navigation.systems.system_file import parsed, read
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import wired
 
 

@@ -20,7 +20,7 @@ from strapgen.catalogue import choose
 from strapgen.cli import main
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.sources import Sources
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.run import backends as run
 from strapgen.run import compiler
 

@@ -225,7 +225,7 @@ def _of_system(
     algorithms: Iterable[str],
     run_differing: bool,
 ) -> tuple[RunsSamples, Settings | None]:
-    from strapgen.navigation.systems.compiled_system import CompiledSystem
+    from strapgen.navigation.systems.system_runner import CompiledSystem
     from strapgen.run.backends import BACKENDS
 
     fit, sources = command.system(algorithms)
@@ -248,9 +248,7 @@ def _of_loops(
     run_differing: bool,
 ) -> tuple[RunsSamples, Settings | None]:
     from strapgen.navigation.two_speed import two_speed_sources
-    from strapgen.navigation.two_speed.loop_files import LoopFiles
-    from strapgen.navigation.two_speed.loops import LoopSources
-    from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+    from strapgen.navigation.two_speed.two_speed_runner import LoopFiles, LoopSources, TwoSpeed
 
     request, system = command.two_speed(), description.system
     kernels = two_speed_sources.kernels(request.algorithm, request.sculling)

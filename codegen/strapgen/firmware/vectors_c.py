@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.ir.sources import Sources
-from strapgen.navigation.two_speed.two_speed_c import LOOPS, Wiring
+from strapgen.navigation.two_speed.two_speed_sources import LOOPS, Wiring
 from strapgen.targets.c_numbers import NumberText, numbers_of, types_of
 from strapgen.targets.printer import fill_arguments
 from strapgen.targets.rendering import render

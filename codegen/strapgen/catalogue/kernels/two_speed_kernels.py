@@ -201,26 +201,6 @@ SCULLING = Signal.vector(
 )
 
 
-class FastLoop:
-    """A fast loop under construction: its inputs, and the outputs that become them in the next cycle."""
-
-    def __init__(self) -> None:
-        self.build = KernelBuilder()
-        self.states: list[tuple[str, str]] = []
-
-    def hand_on(self, signal: Signal, value: sp.Matrix) -> None:
-        """Add a feedback pair: the value becomes this input in the next cycle."""
-        self.states.append((signal.name, after(signal).name))
-        self.build.output(after(signal), value)
-
-    def kernel(self, name: str, title: str, source: str) -> Kernel:
-        """Return the kernel; at the end of a slow cycle all states but the previous increment are reset."""
-        continued = tuple(state for state, _ in self.states if state == PREVIOUS.name)
-        return self.build.kernel(
-            name, title, f"{SAVAGE}, {source}", recursion=Recursion(tuple(self.states), continued)
-        )
-
-
 def coned(
     build: KernelBuilder, coning: sp.Matrix, beta: sp.Matrix, past: sp.Matrix, d: sp.Matrix
 ) -> sp.Matrix:
@@ -247,12 +227,12 @@ def sculled(
 
 def coning() -> Kernel:
     """Derive the fast loop of the rotation vector, equation (26)."""
-    loop = FastLoop()
-    beta, correction, past, d = map(loop.build.input, (ANGLE_SUM, CONING, PREVIOUS, INCREMENT))
-    loop.hand_on(ANGLE_SUM, beta + d)
-    loop.hand_on(CONING, coned(loop.build, correction, beta, past, d))
-    loop.hand_on(PREVIOUS, d)
-    return loop.kernel("coning-fast", "Rotation vector by recursion: fast loop", "equation (26)")
+    build = KernelBuilder()
+    beta, correction, past, d = map(build.input, (ANGLE_SUM, CONING, PREVIOUS, INCREMENT))
+    build.feedback(ANGLE_SUM, beta + d, reset=True)
+    build.feedback(CONING, coned(build, correction, beta, past, d), reset=True)
+    build.feedback(PREVIOUS, d)
+    return build.kernel("coning-fast", "Rotation vector by recursion: fast loop", f"{SAVAGE}, equation (26)")
 
 
 def rotation_vector_of(beta: sp.Matrix, correction: sp.Matrix) -> sp.Matrix:
@@ -272,18 +252,16 @@ def rotation_vector() -> Kernel:
 
 def sculling(form: int) -> Kernel:
     """Derive the fast loop of the velocity: S1 by equation (55) for form 1, S2 by (56) for form 2."""
-    loop = FastLoop()
-    beta, u, eta, d, dv = map(
-        loop.build.input, (ANGLE_SUM, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT)
-    )
-    loop.hand_on(ANGLE_SUM, beta + d)
-    loop.hand_on(VELOCITY_SUM, u + dv)
-    loop.hand_on(SCULLING, sculled(loop.build, form, eta, beta, u, d, dv))
+    build = KernelBuilder()
+    beta, u, eta, d, dv = map(build.input, (ANGLE_SUM, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT))
+    build.feedback(ANGLE_SUM, beta + d, reset=True)
+    build.feedback(VELOCITY_SUM, u + dv, reset=True)
+    build.feedback(SCULLING, sculled(build, form, eta, beta, u, d, dv), reset=True)
     title = "Sculling with rotation compensation apart" if form == 2 else "Sculling and rotation compensation"
-    return loop.kernel(
+    return build.kernel(
         f"sculling-fast-{form}",
         f"{title} by recursion: fast loop",
-        f"equation {'(56)' if form == 2 else '(55)'}",
+        f"{SAVAGE}, equation {'(56)' if form == 2 else '(55)'}",
     )
 
 
