@@ -103,8 +103,8 @@ def _allowed(schema: dict[str, Any]) -> str:
             return "table"
         names = schema.get("propertyNames", {}).get("enum")
         return f"table of {', '.join(f'`{name}`' for name in names)}" if names else "table by name"
-    if kind == "string":
-        return "text"
+    if kind in ("string", "boolean"):
+        return {"string": "text", "boolean": "`true`, `false`"}[kind]
     words = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
     limits = "".join(f" {word} {float(schema[name]):.7g}" for name, word in words.items() if name in schema)
     return f"{'whole number' if kind == 'integer' else 'number'}{limits}"

@@ -365,6 +365,8 @@ def test_a_command_of_a_page(command, workplace, capsys, monkeypatch):
     if command.startswith("strapgen generate --all"):  # of all, in tests/targets
         few = [derived.program(Choice("euler", "rk4", 2))]
         monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))
+    if "--variant" in command or command.startswith("strapgen build"):
+        shutil.copy(ROOT / "examples/variants/strapgen.toml", workplace)
     run(with_less(command), capsys)
 
 

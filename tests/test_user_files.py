@@ -239,24 +239,34 @@ WRONG = {
             ("[0, 1, 0]", "[0, 2, 0]", "positions[1] has the length 2; 1 is needed"),
         ],
     ),
+    "variants": (
+        "examples/variants/strapgen.toml",
+        "build",
+        [
+            ("max_rate_deg_s", "max_rate_rad_s", "key 'max_rate_rad_s' is not known (did you mean max_rate_deg_s"),
+            ("sample_hz = 200", "sample_hz = 0", "variant.flight.sample_hz: --sample-hz is 0; a number above 0"),
+            ("verify = true", "verify = 1", "variant.flight.checks.verify is 1; true or false is needed"),
+        ],
+    ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
 def test_a_wrong_file_gets_one_line_and_status_2(kind, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    name, command, changes = WRONG[kind]
-    text = (ROOT / name).read_text("utf-8")
+    example, command, changes = WRONG[kind]
+    text = (ROOT / example).read_text("utf-8")
     changes = [("\n", "\ncolour = 1\n", "key 'colour' is not known"), *changes]
+    name = "strapgen.toml" if kind == "variants" else "wrong.toml"
     for old, new, said in changes:
         assert old in text, old
-        Path("wrong.toml").write_text(text.replace(old, new, 1), "utf-8")
+        Path(name).write_text(text.replace(old, new, 1), "utf-8")
         with pytest.raises(SystemExit) as stop:
-            main(command.replace("FILE", "wrong.toml").split())
+            main(command.replace("FILE", name).split())
         told = capsys.readouterr()
         assert (stop.value.code, told.out, told.err.count("\n")) == (2, "", 1), told
-        assert told.err.startswith("strapgen: wrong.toml: ") and said in told.err
-        assert [path.name for path in Path().iterdir()] == ["wrong.toml"]
+        assert told.err.startswith(f"strapgen: {name}: ") and said in told.err
+        assert [path.name for path in Path().iterdir()] == [name]
 
 
 def test_a_limit_holds_as_its_decimal_digits():

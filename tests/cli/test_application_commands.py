@@ -1,4 +1,4 @@
-"""``strapgen coning --objective`` designs coefficients, and ``--coning`` takes them wherever a method goes."""
+"""Commands of applications: designed coning coefficients, sensor errors of runs, the appendix of the thesis."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import says
 from shared_results import shared_results  # noqa: F401
 
 from strapgen.catalogue.methods.shaped_coning import read
@@ -27,13 +28,7 @@ def run(capsys, tmp_path, monkeypatch):
     rows = ["frequency_hz,density,angle_x_rad,angle_y_rad", "2,1e-8,1,1", "40,1e-8,1,1"]
     (tmp_path / "shaken.csv").write_text("\n".join(rows))
 
-    def answer(command: str) -> tuple[object, str, str]:
-        with pytest.raises(SystemExit) as stop:
-            main(shlex.split(command))
-        said = capsys.readouterr()
-        return stop.value.code, said.out, said.err
-
-    return answer
+    return lambda command: says(command, capsys)
 
 
 @pytest.mark.long

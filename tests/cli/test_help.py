@@ -1,4 +1,4 @@
-"""The help of every command: plain text as wide as the terminal, the same words for the same option."""
+"""The help of every command, completion of words, spellings that stay, progress on stderr."""
 
 from __future__ import annotations
 

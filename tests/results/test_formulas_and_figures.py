@@ -1,4 +1,4 @@
-"""Kernels in words: text and LaTeX with every formula, and data that SymPy reads back."""
+"""Kernels as text, LaTeX and data that SymPy reads back; colours of figures that all readers tell apart."""
 
 from __future__ import annotations
 

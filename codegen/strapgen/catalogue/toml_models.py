@@ -3,7 +3,7 @@
 A field of a model is ``Annotated[type, Key(...)]``. The type says what is read:
 
 - ``Fraction`` and ``float``: a number, or a text such as "1/3"; exactly, or rounded to double;
-- ``Number``: the same with square roots; ``int`` and ``str`` themselves;
+- ``Number``: the same with square roots; ``int``, ``bool`` and ``str`` themselves;
 - ``tuple[X, ...]`` and ``tuple[X, X, X]``: a list, of any length or of this one;
 - ``Mapping[str, X]``: a table with names of the user's; a dataclass: a table with the keys of its fields;
 - ``X | None``: a key that may be left out; ``X | tuple[X, X, X]``: either, by what stands there;
@@ -243,6 +243,21 @@ class _Text(_Form):
         return {"type": "string"} | ({"pattern": f"^(?:{self.key.pattern})$"} if self.key.pattern else {})
 
 
+class _Flag(_Form):
+    """True or false."""
+
+    plural, words = "flags", "true or false"
+
+    def accepts(self, value: Any) -> bool:
+        return isinstance(value, bool)
+
+    def _read(self, where: str, value: Any) -> Any:
+        return value
+
+    def schema(self) -> dict[str, Any]:
+        return {"type": "boolean"}
+
+
 class _List(_Form):
     """A list of entries of one form: `count` of them, or as many as the key allows."""
 
@@ -400,6 +415,8 @@ def _form_of(hint: Any, key: Key) -> _Form:
         return _Names(names, _form(arguments[1], key)[0])
     if hint is str:
         return _Text(key)
+    if hint is bool:
+        return _Flag()
     if hasattr(hint, "from_toml"):
         return _Own(hint)
     return _table(hint) if hasattr(hint, "__dataclass_fields__") else _Number(hint, key)

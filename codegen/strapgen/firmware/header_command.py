@@ -1,4 +1,8 @@
-"""Reads the command in the header of a generated file as data: nothing that it says is run or written."""
+"""Reads the command in the header of a generated file as data: nothing that it says is run or written.
+
+Generated files are back ends of comparisons too: `file_backend` of one function, `runner_of_file` of a described system
+or of two speeds.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +47,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
     *("algorithm", "file", "window", "target", "targets"),
-    *("sculling", "sample_hz", "cpu", "name", "prefix"),
+    *("sculling", "sample_hz", "cpu", "name", "prefix", "variant"),
     *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 

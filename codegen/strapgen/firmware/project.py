@@ -1,4 +1,4 @@
-"""Returns the files of a project that builds, runs and tests generated C on any machine with CMake."""
+"""The files of a project that builds, runs and tests generated C on any machine with CMake."""
 
 from __future__ import annotations
 
