@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from strapgen.analysis.agreement import SETTINGS, agreement, agreement_text
 from strapgen.analysis.series.constant_rate import ANGLE, STEPS, ConstantRate, constant_rate, errors_after
 from strapgen.analysis.series.error_rate import accumulate, error_rate
 from strapgen.analysis.series.motion_rates import TIME
-from strapgen.analysis.series.prediction import parts_of
+from strapgen.analysis.series.prediction import SETTINGS, agreement, agreement_text, parts_of
 from strapgen.analysis.series.series import STEP
 from strapgen.catalogue import ALGORITHMS, MOTIONS, choose, choose_step
 from strapgen.ir.exceptions import InputError

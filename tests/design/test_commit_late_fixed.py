@@ -18,7 +18,7 @@ from strapgen.design.commit_late import commit_late_fixed, commit_late_sources, 
 from strapgen.design.commit_late.commit_late_fixed import Advance, functions, interface_of, rounded
 from strapgen.design.commit_late.commit_late_sources import LateSources, kernels
 from strapgen.design.commit_late.late_filters import REACH, FixedFilters, LateFilters, polynomial
-from strapgen.design.commit_late.late_unit import LateUnitInC, LateUnitOnIntegers, state_argument
+from strapgen.design.commit_late.late_unit import LateUnitOnIntegers, state_argument
 from strapgen.fixedpoint import quantize
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
@@ -420,22 +420,3 @@ def test_tap_below_a_power_of_two_has_room():
     assert max(map(abs, rounded([Fraction(1, 3), Fraction(1, 3), tap], 31, 2))) >= 1 << 31, (
         "the reason for the room"
     )
-
-
-def test_reset_begins_error_feedback_anew():
-    """With nothing where numbers are cut: in C as in the model."""
-    settings = Settings(carry="full", rounding="truncation")
-    late = commit_late_sources.parts(
-        commit_late_sources.family("window-3-3"), "euler", "fixed-model", settings
-    )
-    model = unit_after(late, [])
-    compiled = LateUnitInC(commit_late_sources.sources("window-3-3", target="c-fixed", settings=settings))
-    drawn = np.random.default_rng(3).integers(-late.fixed.limit, late.fixed.limit, (30, 3))
-    state = np.array([0, 0, 644245094, 858993459])
-    for place, sample in enumerate(drawn):
-        if place == 12:
-            model.reset(state)
-            compiled.reset(state)
-        assert model.push(sample, 0) == compiled.push(sample, 0)
-        np.testing.assert_array_equal(model.attitude, compiled.attitude)
-        np.testing.assert_array_equal(model.now(), compiled.now())
