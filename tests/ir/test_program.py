@@ -16,6 +16,7 @@ from strapgen.ir.program import (
     Program,
     Reference,
     Result,
+    once,
 )
 from strapgen.ir.signals import Signal
 
@@ -160,3 +161,26 @@ def test_split_cuts_where_the_first_input_comes_in():
     together = behind.run({"x": Fraction(1, 7)} | dict(zip(prepared.elements, values, strict=True)))
     assert together == whole.run({"x": Fraction(1, 7), "y": Fraction(2, 3)})
     assert ahead.operations["multiply"] + behind.operations["multiply"] == whole.operations["multiply"]
+
+
+class Counted:
+    """Counts how often its value is worked out."""
+
+    times = 0
+
+    @once
+    def value(self) -> int:
+        """The number of the time at which it was worked out."""
+        self.times += 1
+        return self.times
+
+
+def test_a_value_is_worked_out_once_for_each_object():
+    first, second = Counted(), Counted()
+    assert [first.value, first.value, second.value] == [1, 1, 1]
+    assert first.times == second.times == 1
+
+
+def test_the_class_has_the_property_with_its_docstring():
+    assert isinstance(Counted.value, once)
+    assert Counted.value.__doc__ == "The number of the time at which it was worked out."

@@ -1,5 +1,7 @@
 """Runge-Kutta steps: the fused kernels are the staged formulas of the thesis (chapter 3 A and B), exactly."""
 
+from __future__ import annotations
+
 from fractions import Fraction
 from functools import cache
 from random import Random
@@ -13,7 +15,7 @@ from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS
 from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
 from strapgen.catalogue.methods.method import increments_signal
-from strapgen.catalogue.methods.runge_kutta import method
+from strapgen.catalogue.methods.runge_kutta import _NODES, _WEIGHTS, method
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -177,3 +179,19 @@ def test_a_step_with_irrational_coefficients_has_its_order():
     difference = sp.expand(result[3] + sp.I * result[0] - exponential)
     assert all(sp.Poly(difference, x).coeff_monomial(x**k) == 0 for k in range(9))
     assert result[1] == result[2] == 0
+
+
+def test_the_coefficients_meet_the_conditions_of_third_order_in_time():
+    for power in range(3):
+        total = sum((w * c**power for w, c in zip(_WEIGHTS, _NODES, strict=True)), Fraction(0))
+        assert total == Fraction(1, power + 1)
+
+
+def test_the_coefficients_meet_the_condition_of_the_order_of_the_exponentials():
+    """The commutators of the product are those of the Magnus series: sum_(i<j) b_i b_j (c_j - c_i) is 1/6."""
+    nodes = range(len(_NODES))
+    total = sum(
+        (_WEIGHTS[i] * _WEIGHTS[j] * (_NODES[j] - _NODES[i]) for i in nodes for j in nodes if i < j),
+        Fraction(0),
+    )
+    assert total == Fraction(1, 6)

@@ -14,9 +14,6 @@ from strapgen.kernel.kernel import evaluate_stages
 from strapgen.lowering import canonical
 from strapgen.lowering.canonical.core import decompose
 
-#: Exact series of many methods: with the long tests.
-pytestmark = pytest.mark.long
-
 #: Cayley-Klein parameters are Euler parameters by other names.
 ALGORITHM = pytest.mark.parametrize("algorithm", ["dcm", "euler"])
 EXPANDED = [
@@ -32,6 +29,7 @@ def core(algorithm: str, method: str, count: int, previous: int) -> canonical.Co
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chosen", EXPANDED)
 @ALGORITHM
 def test_the_estimate_bounds_the_terms_of_the_decomposition(algorithm, chosen, monkeypatch):
@@ -45,6 +43,7 @@ def test_the_estimate_bounds_the_terms_of_the_decomposition(algorithm, chosen, m
     assert terms <= estimate * (2 if algorithm == "dcm" else 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chosen", STAGED)
 @ALGORITHM
 def test_long_transitions_are_computed_by_their_stages_and_say_so(algorithm, chosen):
@@ -60,6 +59,7 @@ def test_long_transitions_are_computed_by_their_stages_and_say_so(algorithm, cho
     assert reason in program(choice).notes and reason not in kernel(choice).notes
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chosen", [*EXPANDED, ("rk3", 8, 0), ("dormand-prince5", 3, 0)])
 @ALGORITHM
 def test_the_degree_is_that_of_the_transition(algorithm, chosen):
