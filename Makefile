@@ -98,13 +98,12 @@ test test-long: export PYTHONDONTWRITEBYTECODE =
 test: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
 
-# uv resolves direct requirements to their lowest versions. An old Typer takes longer to print help.
+# uv resolves direct requirements to their lowest versions.
 test-lowest:
 	$(PYTHON) -m venv .venv-lowest
 	.venv-lowest/bin/python -m pip install --disable-pip-version-check uv
 	.venv-lowest/bin/uv pip install --python .venv-lowest/bin/python --resolution lowest-direct -e '.[dev]'
-	.venv-lowest/bin/python -m pytest -n auto --dist worksteal -m "not long" \
-	  --deselect tests/cli/test_cli.py::test_help_is_quick
+	.venv-lowest/bin/python -m pytest -n auto --dist worksteal -m "not long"
 
 test-long: $(TOOLS)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from strapgen.catalogue import toml_schemas
+from strapgen.catalogue import toml_models
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "user-files.md"
@@ -21,8 +21,8 @@ MARK = "<!-- From here on the page comes from the schemas: python docs/user_file
 
 def files() -> dict[Path, str]:
     """Return the text of every schema and of the page, by path."""
-    kinds = toml_schemas.schemas()
-    texts = {toml_schemas.FOLDER / f"{kind}.json": toml_schemas.text(kind) for kind in kinds}
+    kinds = toml_models.schemas()
+    texts = {toml_models.FOLDER / f"{kind}.json": toml_models.schema_text(kind) for kind in kinds}
     head = PAGE.read_text("utf-8").partition(MARK)[0]
     sections = "".join(f"\n{_section(kind, schema())}" for kind, schema in kinds.items())
     return texts | {PAGE: f"{head}{MARK}{sections}"}
@@ -103,8 +103,8 @@ def _allowed(schema: dict[str, Any]) -> str:
             return "table"
         names = schema.get("propertyNames", {}).get("enum")
         return f"table of {', '.join(f'`{name}`' for name in names)}" if names else "table by name"
-    if kind == "string":
-        return "text"
+    if kind in ("string", "boolean"):
+        return {"string": "text", "boolean": "`true`, `false`"}[kind]
     words = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
     limits = "".join(f" {word} {float(schema[name]):.7g}" for name, word in words.items() if name in schema)
     return f"{'whole number' if kind == 'integer' else 'number'}{limits}"
@@ -112,7 +112,7 @@ def _allowed(schema: dict[str, Any]) -> str:
 
 def main() -> int:
     """Write the files that are out of step, and name them."""
-    toml_schemas.FOLDER.mkdir(exist_ok=True)
+    toml_models.FOLDER.mkdir(exist_ok=True)
     for path, text in files().items():
         if not path.is_file() or path.read_text("utf-8") != text:
             path.write_text(text, "utf-8")

@@ -1,4 +1,4 @@
-"""An algorithm of one's own: modified Rodrigues parameters, with the set switched so that they stay below 1.
+"""An algorithm of your own: modified Rodrigues parameters, with the set switched so that they stay below 1.
 
 strapgen takes this file wherever it takes the name of an algorithm:
 

@@ -1,4 +1,4 @@
-"""A motion of one's own: a pendulum swing about one axis while the body spins about another.
+"""A motion of your own: a pendulum swing about one axis while the body spins about another.
 
 `strapgen simulate`, `compare`, `converge` and `study word-length` take this file as --motion. It turns by the angle
 S sin(b t) about the reference axis x, and then by the angle g t about its own axis z.

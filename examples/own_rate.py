@@ -1,4 +1,4 @@
-"""A motion of one's own by its rate alone: a swing that grows faster and slower while the body spins.
+"""A motion of your own by its rate alone: a swing that grows faster and slower while the body spins.
 
 `strapgen simulate`, `compare`, `converge`, `series` and the studies take this file as --motion.
 """

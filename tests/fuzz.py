@@ -194,7 +194,7 @@ def fuzz_c(kernel: str, seconds: float, seed: int, keeps: bool) -> int:
             (inputs / f"{place}").write_bytes(data)
         for file, text in clang_checks.fuzz_files(subject).items():
             (folder / file).write_text(text)
-        report = clang_checks.built(folder, subject.sources)
+        report = clang_checks.compile_driver(folder, subject.sources)
         report = report or clang_checks.run_fuzzer(
             folder, [f"-max_total_time={_left(seconds)}", f"-seed={seed}", "inputs"]
         )

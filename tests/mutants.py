@@ -28,7 +28,6 @@ import time
 import tomllib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -68,8 +67,7 @@ DRAWS = {
 PARTS = ("seeded", *DRAWS)
 
 
-@dataclass(frozen=True)
-class Fault:
+class Fault(NamedTuple):
     """A fault, the list that it is on, and its line before and after."""
 
     part: str
@@ -131,34 +129,25 @@ def faults(part: str, seed: int) -> list[Fault]:
 # The tests of a fault
 
 
-def distance(file: str, test: str) -> int:
-    """Return how far a test stands from the mirror image of a file: 0 for its own tests, 1 for its folder, 2 beyond."""
-    path = Path(file)
-    if path.suffix == ".toml":
-        return 0 if path.stem in test else 1 if test.startswith("tests/catalogue/methods") else 2
-    in_template = path.parts[0] == "templates"
-    folder = Path("tests/targets", path.parts[1]) if in_template else Path("tests", *path.parts[2:-1])
-    stem = path.parts[1] if in_template else path.stem
-    if test.partition("::")[0] in (f"{folder}/test_{stem}.py", f"tests/targets/test_{stem}.py", file):
-        return 0
-    return 1 if test.startswith(f"{folder}/") else 2
-
-
 def executing(executed: CoverageData, file: str, line: int) -> list[str]:
-    """Return the test functions that execute a line, the nearest first.
+    """Return the test functions that execute a line, those named after the file first, then those of its folder.
 
     What runs when a module is imported, or stands in a table, counts as executed by all tests that use the module or
     read the table; a template is executed by those that use its twin among the targets.
     """
     path = Path(file)
+    subject, folder = path.stem, path.parts[2] if path.parts[0] == "codegen" else "targets"
     if path.parts[0] == "templates":
-        file, line = f"codegen/strapgen/targets/{path.parts[1]}/emit.py", 0
+        subject = path.parts[1]
+        file, line = f"codegen/strapgen/targets/{subject}/emit.py", 0
     elif path.suffix != ".py":
         file, line = "codegen/strapgen/catalogue/methods/tableaux.py", 0
     by_line = executed.contexts_by_lineno(file)
     contexts = {*by_line.get(line, ())} - {""} or {context for some in by_line.values() for context in some}
     functions = {context.partition("|")[0].partition("[")[0] for context in contexts} - {""}
-    return sorted(functions, key=lambda test: (distance(path.as_posix(), test), test))
+    return sorted(
+        functions, key=lambda test: (subject not in test, not test.startswith(f"tests/{folder}/"), test)
+    )
 
 
 # The runs
@@ -289,11 +278,8 @@ def run_all(runner: Runner, listed: Sequence[Fault], workers: int) -> None:
     noticed = {line["lasting_key"]: line["by"] for line in read_lines(runner.state.parent / "noticed.jsonl")}
     known = outcomes(runner.state)
     pending = [fault for fault in listed if fault.key not in known]
-    free, lock, count = (
-        [runner.copy(f"copy{k}") for k in range(workers)],
-        threading.Lock(),
-        iter(range(10**6)),
-    )
+    free = [runner.copy(f"copy{k}") for k in range(workers)]
+    lock, count = threading.Lock(), iter(range(10**6))
 
     def run(fault: Fault) -> None:
         if time.monotonic() > runner.end:

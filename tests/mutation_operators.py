@@ -10,9 +10,9 @@ import ast
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
+from typing import NamedTuple
 
 #: The folders of the package whose code has a numerical meaning.
 FOLDERS = (
@@ -22,7 +22,7 @@ FOLDERS = (
 #: Modules in them that compute nothing: names, texts, and how other people's code is run.
 WITHOUT_NUMBERS = (
     *("catalogue/names.py", "catalogue/user/", "targets/names.py", "targets/renaming.py", "targets/lines.py"),
-    *("targets/contract.py", "targets/rendering.py", "analysis/series/notation.py", "lowering/names.py"),
+    *("targets/contract.py", "targets/rendering.py", "analysis/series/notation.py"),
 )
 _SWAPPED = {
     ast.Add: ("+", "-"),
@@ -50,8 +50,7 @@ _MESSAGES = {"progress", "warn", "stage", "describe", "combination_meaning"}
 _LARGEST_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True, order=True)
-class Site:
+class Site(NamedTuple):
     """One fault: a stretch of a file and what replaces it."""
 
     file: str
@@ -91,8 +90,7 @@ class _Finder(ast.NodeVisitor):
         )
 
     def _text(self, node: ast.expr) -> str:
-        start, end = self._span(node)
-        return self.source[start:end]
+        return self.source[slice(*self._span(node))]
 
     def _put(self, start: int, end: int, text: str, kind: str) -> None:
         self.sites.append(Site(self.file, start, end, text, kind))
@@ -108,14 +106,9 @@ class _Finder(ast.NodeVisitor):
 
     # What is left alone
 
-    def visit_Raise(self, node: ast.Raise) -> None:
-        pass
-
-    def visit_Assert(self, node: ast.Assert) -> None:
-        pass
-
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
-        pass
+    def visit(self, node: ast.AST) -> None:
+        if not isinstance(node, ast.Raise | ast.Assert | ast.JoinedStr):
+            super().visit(node)
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
@@ -142,9 +135,7 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_IfExp(self, node: ast.IfExp) -> None:
-        if not any(
-            isinstance(n, ast.Constant | ast.JoinedStr) and _is_text(n) for n in (node.body, node.orelse)
-        ):
+        if not any(map(_is_text, (node.body, node.orelse))):
             self._negate(node.test)
             self.generic_visit(node)
 
@@ -249,23 +240,19 @@ def compiles(source: str) -> bool:
     return True
 
 
-_TEMPLATE_FAULTS = (
-    (re.compile(r"(?<=\s)<(?=\s)"), "<=", "bound"),
-    (re.compile(r"(?<=\s)>(?=\s)"), ">=", "bound"),
-    (re.compile(r"(?<=\s)\+(?=\s)"), "-", "operator"),
-    (re.compile(r"(?<=\s)-(?=\s)"), "+", "operator"),
-    (re.compile(r"<<"), ">>", "shift"),
-    (re.compile(r">>"), "<<", "shift"),
-    (re.compile(r"\+="), "-=", "operator"),
-    (re.compile(r"-="), "+=", "operator"),
-    (re.compile(r"&&"), "||", "and-or"),
-    (re.compile(r"\|\|"), "&&", "and-or"),
-    (re.compile(r"=="), "!=", "condition"),
-    (re.compile(r"!="), "==", "condition"),
-    (re.compile(r"\b0(?=;)"), "1", "off by one"),
-    (re.compile(r"\b2\b(?=[ ;])"), "3", "off by one"),
-    (re.compile(r"\b1\b(?=[ ;])"), "2", "off by one"),
-)
+#: Patterns in templates, what replaces a match, and the kind of the fault.
+_TEMPLATE_FAULTS = [
+    (re.compile(pattern), text, kind)
+    for kind, pairs in {
+        "bound": [(r"(?<=\s)<(?=\s)", "<="), (r"(?<=\s)>(?=\s)", ">=")],
+        "operator": [(r"(?<=\s)\+(?=\s)", "-"), (r"(?<=\s)-(?=\s)", "+"), (r"\+=", "-="), (r"-=", "+=")],
+        "shift": [("<<", ">>"), (">>", "<<")],
+        "and-or": [("&&", "||"), (r"\|\|", "&&")],
+        "condition": [("==", "!="), ("!=", "==")],
+        "off by one": [(r"\b0(?=;)", "1"), (r"\b2\b(?=[ ;])", "3"), (r"\b1\b(?=[ ;])", "2")],
+    }.items()
+    for pattern, text in pairs
+]
 _COMMENT = re.compile(r'^\s*(/?\*|//|#|""")|^\s*[A-Z][^=(]*\.$')
 
 
@@ -305,15 +292,7 @@ def drawn(by_folder: dict[str, list[Site]], root: Path, count: int, seed: int) -
     """Return faults drawn at random: from every folder in proportion to its number, one at least, of all kinds alike.
 
     The lot of a fault is a hash of the seed and of its own text, so that a change of the sources leaves the draw
-    elsewhere as it is.
-
-    Parameters
-    ----------
-    by_folder : dict of str to list of Site
-        What `sites` returns.
-    root : Path
-        Where their files are.
-    count, seed : int
+    elsewhere as it is. `by_folder` is what `sites` returns, `root` the folder of their files.
     """
     shares = _shares({folder: len(choices) for folder, choices in by_folder.items()}, count)
     return [site for folder, share in shares.items() for site in _mixed(by_folder[folder], share, seed, root)]
@@ -325,12 +304,8 @@ def _mixed(choices: Sequence[Site], count: int, seed: int, root: Path) -> Iterat
 
     def lot(site: Site) -> bytes:
         text = texts[site.file]
-        around = (
-            text[text.rfind("\n", 0, site.start) + 1 : site.start],
-            text[site.start : site.end],
-            site.text,
-        )
-        return _hash(seed, site.file, site.kind, *around)
+        before = text[text.rfind("\n", 0, site.start) + 1 : site.start]
+        return _hash(seed, site.file, site.kind, before, text[site.start : site.end], site.text)
 
     by_kind: dict[str, list[Site]] = {}
     for site in sorted(choices, key=lot, reverse=True):

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import strapgen
-from strapgen.navigation.frame.earth import Earth
+from strapgen.navigation.frame.frame_rates import Earth
 
 
 @cache

@@ -23,11 +23,15 @@ from strapgen.fixedpoint import series
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Recursion
-from strapgen.navigation.frame.navigation_names import NAVIGATION
-from strapgen.navigation.instruments.compensation_names import COMPENSATION
-from strapgen.navigation.loops.loop_names import LOOPS
-from strapgen.navigation.outputs.output_names import MOUNTINGS, OUTPUTS, TWO_ROWS
-from strapgen.navigation.redundancy.redundancy_names import REDUNDANCY
+from strapgen.navigation.navigation_kernels import (
+    COMPENSATION,
+    LOOPS,
+    MOUNTINGS,
+    NAVIGATION,
+    OUTPUTS,
+    REDUNDANCY,
+    TWO_ROWS,
+)
 from strapgen.run.backends import Evaluator
 from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
 from strapgen.run.kernel_sources import sources_of_program

@@ -365,6 +365,8 @@ def test_a_command_of_a_page(command, workplace, capsys, monkeypatch):
     if command.startswith("strapgen generate --all"):  # of all, in tests/targets
         few = [derived.program(Choice("euler", "rk4", 2))]
         monkeypatch.setattr(standard_tree, "programs", lambda: iter(few))
+    if "--variant" in command or command.startswith("strapgen build"):
+        shutil.copy(ROOT / "examples/variants/strapgen.toml", workplace)
     run(with_less(command), capsys)
 
 
@@ -644,7 +646,7 @@ def test_example(path, capsys, monkeypatch):
 def test_an_example_prints_what_a_page_shows(capsys):
     pattern = r"^    python examples/(\w+\.py)\n\n```text\n(.*?)^```"
     shown = [pair for text in DOCS.values() for pair in re.findall(pattern, text, re.MULTILINE | re.DOTALL)]
-    assert len(shown) >= 1
+    assert len(shown) >= 3
     for name, text in shown:
         runpy.run_path(str(ROOT / "examples" / name))["main"]()
         assert capsys.readouterr().out == text

@@ -151,7 +151,7 @@ SCRIPT = """
     reveal_type(run)  # strapgen.lab.runs.Run
     reveal_type(strapgen.compare)  # def (
     reveal_type(gyro.pulses)  # def (
-    reveal_type(tableaux.read("heun.toml"))  # strapgen.catalogue.methods.tableau.Tableau
+    reveal_type(tableaux.read("heun.toml"))  # strapgen.catalogue.methods.tableaux.Tableau
     reveal_type(KernelBuilder().input(Signal.vector("rate", "w")))  # Any
 """
 

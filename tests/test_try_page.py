@@ -15,8 +15,8 @@ from browser_checks import HEIGHT, WIDTHS, opened, served
 
 from strapgen import choose_step, derive, generate, lower, rounding_bounds
 from strapgen.analysis import vibration
-from strapgen.catalogue.method_names import METHODS
 from strapgen.catalogue.methods import tableaux
+from strapgen.catalogue.names import METHODS
 from strapgen.fixedpoint.floating import proved
 
 ROOT = Path(__file__).resolve().parents[1]

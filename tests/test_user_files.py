@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen import registration
-from strapgen.catalogue import toml_models, toml_schemas
+from strapgen.catalogue import toml_models
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 
@@ -25,7 +25,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import user_files  # noqa: E402
 
-SCHEMAS = {kind: schema() for kind, schema in toml_schemas.schemas().items()}
+SCHEMAS = {kind: schema() for kind, schema in toml_models.schemas().items()}
 MODELS = {
     kind: registration.load(place).model
     for one in registration.built_in().values()
@@ -42,7 +42,7 @@ def test_schemas_and_page_are_those_of_the_models():
         if not path.is_file() or path.read_text("utf-8") != text
     ]
     assert wrong == []
-    assert {path.stem for path in toml_schemas.FOLDER.iterdir()} == set(SCHEMAS)
+    assert {path.stem for path in toml_models.FOLDER.iterdir()} == set(SCHEMAS)
 
 
 def test_every_file_that_users_copy_names_the_schema_of_its_kind():
@@ -57,7 +57,7 @@ def test_every_file_that_users_copy_names_the_schema_of_its_kind():
     assert copied == set(EXAMPLES) and set(EXAMPLES.values()) == set(SCHEMAS)
     for path, kind in EXAMPLES.items():
         named = path.parent / path.read_text("utf-8").partition("\n")[0].removeprefix("#:schema ")
-        assert named.resolve() == toml_schemas.FOLDER / f"{kind}.json"
+        assert named.resolve() == toml_models.FOLDER / f"{kind}.json"
 
 
 def test_every_example_is_valid():
@@ -239,24 +239,34 @@ WRONG = {
             ("[0, 1, 0]", "[0, 2, 0]", "positions[1] has the length 2; 1 is needed"),
         ],
     ),
+    "variants": (
+        "examples/variants/strapgen.toml",
+        "build",
+        [
+            ("max_rate_deg_s", "max_rate_rad_s", "key 'max_rate_rad_s' is not known (did you mean max_rate_deg_s"),
+            ("sample_hz = 200", "sample_hz = 0", "variant.flight.sample_hz: --sample-hz is 0; a number above 0"),
+            ("verify = true", "verify = 1", "variant.flight.checks.verify is 1; true or false is needed"),
+        ],
+    ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
 def test_a_wrong_file_gets_one_line_and_status_2(kind, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    name, command, changes = WRONG[kind]
-    text = (ROOT / name).read_text("utf-8")
+    example, command, changes = WRONG[kind]
+    text = (ROOT / example).read_text("utf-8")
     changes = [("\n", "\ncolour = 1\n", "key 'colour' is not known"), *changes]
+    name = "strapgen.toml" if kind == "variants" else "wrong.toml"
     for old, new, said in changes:
         assert old in text, old
-        Path("wrong.toml").write_text(text.replace(old, new, 1), "utf-8")
+        Path(name).write_text(text.replace(old, new, 1), "utf-8")
         with pytest.raises(SystemExit) as stop:
-            main(command.replace("FILE", "wrong.toml").split())
+            main(command.replace("FILE", name).split())
         told = capsys.readouterr()
         assert (stop.value.code, told.out, told.err.count("\n")) == (2, "", 1), told
-        assert told.err.startswith("strapgen: wrong.toml: ") and said in told.err
-        assert [path.name for path in Path().iterdir()] == ["wrong.toml"]
+        assert told.err.startswith(f"strapgen: {name}: ") and said in told.err
+        assert [path.name for path in Path().iterdir()] == [name]
 
 
 def test_a_limit_holds_as_its_decimal_digits():

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from strapgen.run.backends import Backend, Evaluator
+from strapgen.run.backends import Backend
+from strapgen.run.evaluators import Evaluator
 
 # In floating point one step multiplies the state by a transition near a rotation: a sum of at most four products of
 # numbers up to 1, whose rounding is below 5 units of round-off for each of at most two terms that matter, and a

@@ -25,12 +25,12 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods import runge_kutta as runge_kutta
     from strapgen.catalogue.methods import tableaux as tableaux
     from strapgen.catalogue.methods import windows as windows
-    from strapgen.catalogue.methods.samples import Samples as Samples
-    from strapgen.catalogue.methods.samples import increments_signal as increments_signal
-    from strapgen.catalogue.methods.samples import turns_signal as turns_signal
-    from strapgen.catalogue.methods.samples import velocities_signal as velocities_signal
-    from strapgen.catalogue.methods.tableau import Tableau as Tableau
+    from strapgen.catalogue.methods.method import Samples as Samples
+    from strapgen.catalogue.methods.method import increments_signal as increments_signal
+    from strapgen.catalogue.methods.method import turns_signal as turns_signal
+    from strapgen.catalogue.methods.method import velocities_signal as velocities_signal
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
+    from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
     from strapgen.design import family as _family
@@ -83,10 +83,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.runs import simulate as simulate
     from strapgen.lab.scipy_rotations import from_rotation as from_rotation
     from strapgen.lab.scipy_rotations import to_rotation as to_rotation
-    from strapgen.navigation.courses.courses import Course as Course
-    from strapgen.navigation.courses.courses import course as course
-    from strapgen.navigation.systems.system_backends import SystemRunner as SystemRunner
-    from strapgen.navigation.systems.system_backends import system_runner as system_runner
+    from strapgen.navigation.courses import Course as Course
+    from strapgen.navigation.courses import course as course
+    from strapgen.navigation.systems.system_runner import SystemRunner as SystemRunner
+    from strapgen.navigation.systems.system_runner import system_runner as system_runner
     from strapgen.navigation.systems.wiring import read_system as read_system
     from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed as TwoSpeed
     from strapgen.pipeline import derive as derive
@@ -127,7 +127,7 @@ _NAMES = {
         "SampleKind",
     ),
     "run.backend_names": ("BACKENDS",),
-    "navigation.systems.system_backends": (
+    "navigation.systems.system_runner": (
         "SystemRunner",
         "system_runner",
     ),
@@ -143,14 +143,16 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
-    "catalogue.methods.samples": (
+    "catalogue.methods.method": (
         "Samples",
         "increments_signal",
         "turns_signal",
         "velocities_signal",
     ),
-    "catalogue.methods.tableau": ("Tableau",),
-    "catalogue.methods.tableaux": ("TABLEAUX",),
+    "catalogue.methods.tableaux": (
+        "Tableau",
+        "TABLEAUX",
+    ),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
     "analysis.algorithm": (
@@ -190,7 +192,7 @@ _NAMES = {
         "quantize",
     ),
     "fixedpoint.floating.bounds": ("rounding_bounds",),
-    "navigation.courses.courses": (
+    "navigation.courses": (
         "Course",
         "course",
     ),

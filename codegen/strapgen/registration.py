@@ -90,7 +90,7 @@ class Registration:
     backends : tuple of str, optional
         Tables of back ends: mappings of names to `strapgen.run.backend_names.Entry`.
     files : mapping of str to str, optional
-        Kinds of users' TOML files by name: each a `strapgen.catalogue.toml_files.UserFile`.
+        Kinds of users' TOML files by name: each a `strapgen.catalogue.catalogue.toml_models.UserFile`.
     lists : mapping of str to str, optional
         Functions without arguments that return names with their meanings, by the kind under which ``strapgen list``
         shows them.

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 import strapgen
 from strapgen import catalogue, derive
 from strapgen.analysis import vibration
-from strapgen.analysis.vibration import systems
 from strapgen.analysis.vibration.mean_rates import D_Y, PARTS, PHI, THETA_X, THETA_Y
 from strapgen.analysis.vibration.systems import T_L, T_M, F, T
 from strapgen.catalogue.methods import coning_coefficients
@@ -505,12 +504,3 @@ def test_numbers_that_are_refused(numbers, said):
 def test_a_recursion_needs_its_cycles():
     with pytest.raises(InputError, match="the number of its fast cycles in a step is needed"):
         vibration.of(choose("coning-fast")).rates(1, 1, theta_x=1)
-    assert (
-        tuple(
-            name
-            for name in catalogue.KERNELS
-            if name
-            in ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
-        )
-        == systems.RECURSIONS
-    )

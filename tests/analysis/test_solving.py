@@ -52,7 +52,7 @@ def test_the_three_sample_coefficients_for_coning():
     assert solved.values() == {"a": sp.Rational(27, 40), "b": sp.Rational(9, 20)}
 
 
-def test_the_two_sample_coefficient(tmp_path):
+def test_the_two_sample_coefficient():
     solved = solved_pairs(2, 0, general=4)
     assert solved.values() == {"k_0_1": sp.Rational(2, 3)}
 

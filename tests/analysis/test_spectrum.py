@@ -1,4 +1,4 @@
-"""Random vibration: Savage's integrals, single frequencies as the limit, and kernels that run on noise."""
+"""Random vibration: Savage's integrals, single frequencies as the limit, kernels that run on noise, and quadrature."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import strapgen
 from strapgen import catalogue
 from strapgen.analysis import vibration
 from strapgen.analysis.vibration import Spectrum, random_rates, read_spectrum
+from strapgen.analysis.vibration.spectrum import integrate
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.lab.runs import attitude
 from strapgen.run.increments import windows
@@ -323,37 +324,30 @@ def test_files_that_cannot_be_read(path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("transfers", "edges", "said"),
+    ("changed", "kind", "said"),
     [
-        ({"angle_z": abs}, (1.0, 2.0), "transfer function 'angle_z' is not known"),
-        ({}, (1.0, 2.0), "nothing moves; a transfer function is needed: angle_x, angle_y"),
-        ({"angle_x": abs}, (1.0,), "two rising frequencies"),
-        ({"angle_x": abs}, (), "two rising frequencies"),
-        ({"angle_x": abs}, (2.0, 1.0), "two rising frequencies"),
-        ({"angle_x": abs}, (-1.0, 1.0), "two rising frequencies"),
-        ({"angle_x": abs}, (1.0, math.inf), "two rising frequencies"),
+        ({"transfers": {"angle_z": abs}}, InputError, "transfer function 'angle_z' is not known"),
+        ({"transfers": {}}, InputError, "nothing moves; a transfer function is needed: angle_x, angle_y"),
+        *(
+            ({"edges": edges}, InputError, "two rising frequencies")
+            for edges in ((1.0,), (), (2.0, 1.0), (-1.0, 1.0), (1.0, math.inf))
+        ),
+        ({"density": 1}, InputTypeError, "density is 1; a function of frequency is needed"),
+        (
+            {"transfers": {"angle_x": 2.0}},
+            InputTypeError,
+            "angle_x is 2.0; a function of frequency is needed",
+        ),
+        ({"transfers": None}, InputTypeError, "functions are None; a dict of functions by name is needed"),
+        ({"edges": "ab"}, InputTypeError, "the edges are 'ab'; frequencies in Hz are needed"),
+        ({"edges": None}, InputTypeError, "the edges are None; frequencies in Hz are needed"),
+        ({"edges": (1.0, "b")}, InputTypeError, "the edges hold 'b'; frequencies in Hz are needed"),
+        ({"edges": (1.0, 2j)}, InputTypeError, "the edges hold 2j; frequencies in Hz are needed"),
     ],
 )
-def test_spectra_that_are_refused(transfers, edges, said):
-    with pytest.raises(InputError, match=said):
-        Spectrum(np.ones_like, transfers, edges)
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"density": 1}, "density is 1; a function of frequency is needed"),
-        ({"transfers": {"angle_x": 2.0}}, "angle_x is 2.0; a function of frequency is needed"),
-        ({"transfers": None}, "the transfer functions are None; a dict of functions by name is needed"),
-        ({"edges": "ab"}, "the edges are 'ab'; frequencies in Hz are needed"),
-        ({"edges": None}, "the edges are None; frequencies in Hz are needed"),
-        ({"edges": (1.0, "b")}, "the edges hold 'b'; frequencies in Hz are needed"),
-        ({"edges": (1.0, 2j)}, "the edges hold 2j; frequencies in Hz are needed"),
-    ],
-)
-def test_what_is_no_spectrum(changed, said):
+def test_spectra_that_are_refused(changed, kind, said):
     given = {"density": np.ones_like, "transfers": {"angle_x": np.ones_like}, "edges": (1.0, 2.0)}
-    with pytest.raises(InputTypeError, match=said):
+    with pytest.raises(kind, match=said):
         Spectrum(**{**given, **changed})
 
 
@@ -400,21 +394,14 @@ def test_functions_may_return_one_number():
     assert rates.continuous == pytest.approx(-math.pi * 3 / 2 * 2 * 2, rel=1e-12)  # pi f times 2 P
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ((3, SHAKEN, 1), "assessment is 3; what vibration.of returns is needed"),
-        ((vibration.of(choose("euler")), 3, 1), "spectrum is 3; a Spectrum is needed"),
-    ],
-)
-def test_random_rates_of_something_else(given, said):
-    with pytest.raises(InputTypeError, match=said):
-        random_rates(*given)
-
-
-def test_a_tolerance_and_a_path_must_be_one():
+def test_arguments_that_are_refused():
+    assessed = vibration.of(choose("euler"))
+    with pytest.raises(InputTypeError, match=r"assessment is 3; what vibration\.of returns is needed"):
+        random_rates(3, SHAKEN, 1)
+    with pytest.raises(InputTypeError, match="spectrum is 3; a Spectrum is needed"):
+        random_rates(assessed, 3, 1)
     with pytest.raises(InputError, match="tolerance is 0; a number above 0 is needed"):
-        random_rates(vibration.of(choose("euler")), SHAKEN, "0.001", tolerance=0)
+        random_rates(assessed, SHAKEN, "0.001", tolerance=0)
     with pytest.raises(InputTypeError, match="spectrum is None; the path of a file is needed"):
         read_spectrum(None)
 
@@ -438,3 +425,38 @@ def test_a_file_of_more_rows_than_a_spectrum_has_is_refused(most, tmp_path, monk
     else:
         with pytest.raises(InputError, match=r"has over 2 rows; that is too many for a spectrum$"):
             read_spectrum(path)
+
+
+@pytest.mark.parametrize(
+    ("function", "edges", "value"),
+    [
+        (lambda x: x**7, [0, 2], 32.0),
+        (
+            lambda x: np.exp(-x) * np.sin(40 * x),
+            [0, 3],
+            (40 - np.exp(-3) * (np.sin(120) + 40 * np.cos(120))) / 1601,
+        ),
+        (lambda x: np.abs(x - 0.3), [0, 0.3, 1], (0.09 + 0.49) / 2),
+        (lambda x: 1 / (1e-6 + (x - 0.5) ** 2), [0, 1], 2000 * np.arctan(500)),
+        (np.sqrt, [0, 1], 2 / 3),
+        (lambda x: 0 * x, [0, 1], 0.0),
+    ],
+)
+def test_integrals(function, edges, value):
+    found = integrate(lambda x: np.array([function(x), 3 * function(x)]), edges, 0.5)
+    for number, wanted in zip(found.values, (value, 3 * value), strict=True):
+        assert abs(number - wanted) <= 2e-10 * abs(wanted)
+    assert np.all(np.abs(found.values - [value, 3 * value]) <= found.errors + 1e-13 * abs(value))
+
+
+def test_what_cannot_be_integrated_is_refused():
+    with pytest.raises(InputError, match=r"not finite at 0\.5 Hz"):
+        integrate(lambda x: np.where(np.abs(x - 0.5) < 1e-3, np.nan, 1.0)[None], [0, 1], 1.0)
+    with pytest.raises(InputError, match="panels to integrate"):
+        integrate(lambda x: 1 / (x - 0.3)[None], [0, 1], 1.0)
+    with pytest.raises(InputError, match="panels to integrate"):
+        integrate(lambda x: x[None], [0, 1], 1e-7)
+    with pytest.raises(InputError, match="panels to integrate"):
+        integrate(lambda x: x[None], [0, 1e308], 1e-7)
+    with pytest.raises(InputError, match="the integral of the spectrum is beyond the range of double"):
+        integrate(lambda x: 1e308 + 0 * x[None], [0, 100], 1.0)

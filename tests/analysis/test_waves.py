@@ -1,4 +1,4 @@
-"""Sums of shifted oscillations: as complex numbers, and their response as it is computed step by step."""
+"""Sums of shifted oscillations as complex numbers, and kernels to second order beside SymPy's own series."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapgen.analysis.vibration.waves import Wave, resolvent
+from strapgen import derive
+from strapgen.analysis.vibration.waves import Expander, Wave, resolvent
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.signals import Signal
+from strapgen.kernel.kernel import KernelBuilder
 
 CYCLE = (3, 0)
 shifts = st.tuples(st.integers(-5, 5), st.integers(-2, 2))
@@ -76,3 +80,112 @@ def test_other_eigenvalues_are_told():
     # A 1 among them is divided out first.
     assert resolvent([[Fraction(1), Fraction(0)], [Fraction(5), Fraction(1, 2)]], Fraction(1)) is None
     assert resolvent([[Fraction(1), Fraction(0)], [Fraction(0), Fraction(2)]], Fraction(1)) is None
+
+
+X, Y = sp.symbols("x y", real=True)
+
+
+def kernel(*expressions, stages=()):
+    build = KernelBuilder()
+    for name in "xy":
+        build.scalar(Signal.scalar(name))
+    for name, expression in stages:
+        build.value(name, expression)
+    build.output(
+        Signal("out", (len(expressions),), tuple(f"out{k}" for k in range(len(expressions)))), expressions
+    )
+    return build.kernel("made", "Made", "none")
+
+
+def polynomial(expander, expansion):
+    """Return an expansion as SymPy's expression."""
+    total = expander.domain.to_sympy(expansion.constant)
+    for name, c in expansion.linear.items():
+        total += expander.domain.to_sympy(c) * sp.Symbol(name, real=True)
+    for pair, c in expansion.square.items():
+        total += expander.domain.to_sympy(c) * sp.Mul(*(sp.Symbol(name, real=True) for name in pair))
+    return sp.expand(total)
+
+
+def expanded(expression, stages=()):
+    made = kernel(expression, stages=stages)
+    expander = Expander([made])
+    (result,) = expander(made, {name: expander.variable(name) for name in "xy"})["out"]
+    return polynomial(expander, expander.expansion(result))
+
+
+def truncated(expression):
+    """Return Taylor's polynomial of second order by SymPy's derivatives; of a sinc, which has none at 0, the series."""
+    e = sp.Symbol("e", positive=True)
+    scaled = expression.replace(sp.sinc, lambda angle: 1 - angle**2 / 6)
+    scaled = scaled.subs({X: e * X, Y: e * Y}, simultaneous=True)
+    return sp.expand(sum(scaled.diff(e, k).subs(e, 0) / sp.factorial(k) for k in range(3)))
+
+
+R = sp.sqrt(X**2 + 2 * Y**2)
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        (1 + X - 3 * Y) * (2 - X * Y + Y),
+        (2 + X) ** 3 / (1 - Y),
+        sp.sqrt(4 + X + Y**2) / 3,
+        1 / sp.sqrt(1 + X - Y),
+        sp.sin(X + Y) * sp.cos(X) + sp.asin(Y),
+        sp.sinc(X - Y) * (1 + Y),
+        sp.atan2(X + Y, 1 + X),
+        sp.sqrt(3) * X / (1 + sp.sqrt(3) * Y),
+    ],
+    ids=str,
+)
+def test_expansions_are_those_of_sympy(expression):
+    assert sp.expand(expanded(expression) - truncated(expression)) == 0
+
+
+@pytest.mark.parametrize(
+    ("expression", "wanted"),
+    [
+        (sp.sinc(R / 2), 1 - (X**2 + 2 * Y**2) / 24),
+        (sp.cos(2 * R), 1 - 2 * (X**2 + 2 * Y**2)),
+        (R**2 * (1 + X), X**2 + 2 * Y**2),
+        (sp.Max(1, X**2) * Y, Y),
+        (sp.Piecewise((X, Y**2 > 1), (Y, True)), Y),
+        (sp.pi * X, None),
+    ],
+    ids=str,
+)
+def test_roots_and_branches(expression, wanted):
+    if wanted is None:  # what is not algebraic is rounded to many digits
+        assert abs(sp.N(expanded(expression).coeff(X) - sp.pi, 90)) < sp.Rational(1, 10) ** 75
+    else:
+        assert expanded(expression) == sp.expand(wanted)
+
+
+@pytest.mark.parametrize(
+    ("expression", "said"),
+    [
+        (1 / X, "a series that begins with 0 has no inverse"),
+        (R + X, "the square root of a series that begins with 0 is no series"),
+        (sp.cos(1 + X), "is no series with rational coefficients"),
+    ],
+    ids=str,
+)
+def test_what_has_no_expansion_is_refused(expression, said):
+    with pytest.raises(InputError, match="kernel made has no expansion to second order") as caught:
+        expanded(expression)
+    assert said in str(caught.value)
+
+
+def test_kernels_of_the_catalogue_are_their_polynomials_cut_off():
+    made = derive("dcm", "rk4", 2)
+    expander = Expander([made])
+    names = [name for signal in made.inputs for name in signal.elements]
+    result = expander(made, {name: expander.variable(name) for name in names})["next"]
+    for ours, whole in zip(result, made.polynomials()["next"], strict=True):
+        wanted = sp.S.Zero
+        for powers, c in whole.terms():
+            if sum(powers) <= 2:
+                factors = (sp.Symbol(n, real=True) ** p for n, p in zip(names, powers, strict=True))
+                wanted += c * sp.Mul(*factors)
+        assert polynomial(expander, expander.expansion(ours)) == sp.expand(wanted)

@@ -5,13 +5,20 @@ from __future__ import annotations
 import json
 import pickle
 import shlex
+import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
+from derived import kernel as derived
+from hypothesis import given
+from hypothesis import strategies as st
 
 import strapgen
 from strapgen import catalogue, pipeline
@@ -19,10 +26,14 @@ from strapgen.analysis import vibration
 from strapgen.analysis.series.constant_rate import constant_rate
 from strapgen.analysis.series.prediction import predict
 from strapgen.analysis.series.series import series
+from strapgen.catalogue import ALGORITHMS, KERNELS, MOST_INCREMENTS, STANDARD_METHODS, Choice, choose
+from strapgen.catalogue.choice import constant_options, number_text, read_constants
 from strapgen.catalogue.methods import tableaux
 from strapgen.cli import main
 from strapgen.firmware.check_code import conformance
-from strapgen.ir.exceptions import InputError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.program import RESOLUTION
 from strapgen.kernel.kernel import Kernel
 from strapgen.lab.comparison import compare
 from strapgen.lab.convergence import converge
@@ -92,15 +103,6 @@ def test_choices_differ_in_the_kernels_that_a_step_brings(chosen):
 
 
 @pytest.mark.long
-def test_each_runs_as_its_own_method(chosen, rng):
-    d = rng.normal(scale=0.05, size=(30, 2, 3))
-    for name in ("numpy", "c"):
-        for method, choice in chosen.items():
-            wanted = strapgen.backend("euler", method, backend=name).propagate(d)
-            np.testing.assert_array_equal(backend(choice, backend=name).propagate(d), wanted)
-
-
-@pytest.mark.long
 def test_each_has_the_companions_that_it_brings(chosen, rng):
     state = np.array([0.1, 0.2, 0.3, 1.0])
     d = rng.normal(scale=0.02, size=(30, 2, 3))
@@ -124,23 +126,6 @@ def test_an_evaluator_takes_a_choice_of_a_user_s_kernel(chosen, rng):
         np.testing.assert_array_equal(strapgen.evaluator(choice)(state, d), wanted)
     with pytest.raises(InputError, match="kernel 'mend' is not known"):
         strapgen.evaluator("mend")
-
-
-@pytest.mark.long
-def test_the_stages_by_hand_find_what_a_kernel_brings():
-    for target in ("numpy", "c"):
-        sources = strapgen.generate(strapgen.lower(strapgen.derive(FILE, "rk2")), target)
-        run = strapgen.simulate(
-            strapgen.build(sources), strapgen.motion("coning", **GENERAL), "1/16", 1, orthonormalize="1/4"
-        )
-        wanted = strapgen.simulate(
-            strapgen.backend("euler", "rk2", backend=target),
-            strapgen.motion("coning", **GENERAL),
-            "1/16",
-            1,
-            orthonormalize="1/4",
-        )
-        np.testing.assert_array_equal(run.computed, wanted.computed)
 
 
 def test_each_has_its_own_errors_in_many_digits(chosen):
@@ -170,20 +155,6 @@ def test_each_is_compared_and_checked_for_itself(chosen, rng):
         assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
     findings = {finding.name: finding for finding in conformance.check(chosen["rk2"])}
     assert findings["order"].measured == pytest.approx(2, abs=0.15)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("command", "columns"),
-    [
-        ("converge {} --method rk1,rk2 --steps 1/8,1/16 --duration 1 --format json", "rungs"),
-        ("stability {} --method rk1,rk3 --format json", "contractive"),
-    ],
-)
-def test_a_command_that_takes_methods_shows_each_in_its_own_column(says, command, columns):
-    ours = says(command.format("euler") + (" --increments 2" if command.startswith("converge") else ""))
-    assert [one[columns] for one in says(command.format(shlex.quote(FILE)))] == [one[columns] for one in ours]
-    assert ours[0][columns] != ours[1][columns]
 
 
 def test_an_algorithm_is_held_against_itself_by_another_method(says):
@@ -248,3 +219,165 @@ def test_no_module_of_the_package_holds_a_user_s_kernel(chosen):
     ]
     assert holding == []
     assert list(held({"a": [catalogue.derive(chosen["rk1"])]})) == ["mine"], "the check would see one"
+
+
+STANDARD = catalogue.standard()
+EVERY = pytest.mark.parametrize("choice", STANDARD, ids=lambda choice: choice.kernel)
+
+
+def test_the_default_is_fourth_order_on_two_increments():
+    assert choose("euler") == Choice("euler", "rk4", 2)
+    assert choose("dcm", "rk1", 8).kernel == "dcm-rk1-8"
+    assert choose("dcm-from-euler") == Choice("dcm-from-euler")
+    assert choose("dcm-from-euler").kernel == "dcm-from-euler"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("quaternion",), ["algorithm 'quaternion'", "euler", "strapgen list kernels shows all"]),
+        (("dcm", "rk5"), ["method 'rk5'", "rk4", "strapgen list methods shows all"]),
+        (("dcm", "rk4", 0), ["increments", "0", "1 to 8"]),
+        (("dcm", "rk4", MOST_INCREMENTS + 1), ["increments", "9", "1 to 8"]),
+        (("dcm", "rk4", 2.0), ["increments", "2.0", "1 to 8"]),
+        (("dcm", "rk4", True), ["increments", "True", "1 to 8"]),
+        (("error-matrix", "rk4"), ["error-matrix", "method", "rk4", *ALGORITHMS]),
+        (("error-matrix", None, 2), ["error-matrix", "increments", "2", *ALGORITHMS]),
+    ],
+)
+def test_a_wrong_choice_is_told_with_what_is_allowed(arguments, named):
+    with pytest.raises(InputError) as caught:
+        choose(*arguments)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert [word for word in named if word not in message] == []
+
+
+def test_orthonormalizations_of_each_algorithm():
+    assert catalogue.orthonormalizations("dcm") == [
+        "dcm-orthonormalize",
+        "dcm-orthonormalize-optimal",
+        "dcm-orthonormalize-first-order",
+        "dcm-orthonormalize-second-order",
+    ]
+    for algorithm in ("euler", "cayley-klein"):
+        normalize = f"{algorithm}-normalize"
+        assert catalogue.orthonormalizations(algorithm) == [normalize, f"{normalize}-first-order"]
+
+
+def test_the_standard_catalogue_holds_everything_once():
+    names = [choice.kernel for choice in STANDARD]
+    assert (
+        len(set(names))
+        == len(names)
+        == len(ALGORITHMS) * len(STANDARD_METHODS) + sum(recipe.standard for recipe in KERNELS.values())
+    )
+    identifiers = {name.replace("-", "_") for name in names}
+    assert len(identifiers) == len(names)
+
+
+@pytest.mark.long
+@EVERY
+def test_a_kernel_is_what_was_chosen(choice):
+    kernel = derived(choice)
+    assert kernel.name == choice.kernel
+    assert kernel.identifier.isidentifier()
+    assert kernel.title and kernel.source
+    # What stands in a generated header must lead back to the kernel.
+    name, *options = (kernel.arguments or kernel.name).split()
+    given = dict(zip(options[::2], options[1::2], strict=True))
+    increments = given.get("--increments")
+    assert choose(name, given.get("--method"), increments and int(increments)) == choice
+
+
+@EVERY
+def test_a_kernel_is_exact_and_closed(choice):
+    kernel = derived(choice)
+    known = [name for signal in kernel.inputs for name in signal.elements]
+    for stage in (*kernel.stages, *kernel.outputs):
+        assert len(stage.expressions) == stage.signal.size
+        for expression in stage.expressions:
+            assert not expression.has(sp.Float)
+            assert {symbol.name for symbol in expression.free_symbols} <= {*known, RESOLUTION}
+            assert all(symbol.is_real for symbol in expression.free_symbols)
+        known += stage.signal.elements
+    assert len(set(known)) == len(known)  # names serve as variables in generated code
+
+
+@EVERY
+def test_signals_are_explained(choice):
+    kernel = derived(choice)
+    for signal in (*kernel.inputs, *(stage.signal for stage in kernel.outputs)):
+        assert signal.meaning
+        if signal.shape == (3, 3) and "direction cosine" in signal.meaning:
+            assert "body to reference" in signal.meaning
+        if signal.shape == (4,) and signal.name != "transition":
+            assert ("scalar last" in signal.meaning) != ("scalar first" in signal.meaning)
+            assert ("scalar last" in signal.meaning) == signal.elements[3].endswith("_s")
+
+
+@pytest.mark.parametrize("choice", STANDARD[:12], ids=lambda choice: choice.kernel)
+def test_companions_are_in_the_catalogue_and_fit(choice):
+    kernel = derived(choice)
+    state = kernel.inputs[0]
+    attitude_step = kernel.attitude_step
+    product = derived(choose(attitude_step.product))
+    assert [signal.shape for signal in product.inputs] == [state.shape, state.shape]
+    assert attitude_step.orthonormalize in catalogue.orthonormalizations(choice.name)
+    assert len(attitude_step.identity) == state.size
+    if attitude_step.attitude is not None:
+        attitude = derived(choose(attitude_step.attitude))
+        assert attitude.inputs[0] == state
+        assert attitude.outputs[0].signal.shape == (3, 3)
+
+
+def test_names_are_listed_without_computer_algebra():
+    code = (
+        "import sys; from strapgen import catalogue; catalogue.standard(); catalogue.choose('euler');"
+        "print('sympy' in sys.modules)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(
+    "value", [0.02, "0.02", "1/50", Fraction(1, 50), Decimal("0.02"), np.float64(0.02), "2e-2"]
+)
+def test_a_number_is_exact_in_every_spelling(value):
+    assert read_constants({"cycle": value}) == (("cycle", (Fraction(1, 50),)),)
+
+
+def test_rows_follow_each_other_and_names_are_sorted():
+    rows = (("a", (Fraction(7),)), ("b", tuple(map(Fraction, range(4)))))
+    assert read_constants({"b": [[0, 1], [2, 3]], "a": 7}) == rows
+    assert read_constants({"a": [7], "b": np.arange(4.0).reshape(2, 2)}) == rows
+
+
+@pytest.mark.parametrize(
+    ("constants", "error", "words"),
+    [
+        ({"cycle": "fast"}, InputError, "constant cycle is 'fast'; a finite number is needed"),
+        ({"cycle": float("nan")}, InputError, "constant cycle is 'nan'"),
+        ({"cycle": True}, InputError, "constant cycle is 'True'"),
+        ({"cycle": [1, [2, None]]}, InputError, "constant cycle is 'None'"),
+        ({3: 1}, InputTypeError, "constants holds 3; the name of an input is needed"),
+        ([("cycle", 1)], InputTypeError, "a mapping from names of inputs is needed"),
+    ],
+)
+def test_what_is_no_number_is_refused(constants, error, words):
+    with pytest.raises(error) as caught:
+        read_constants(constants)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+@given(st.fractions(max_denominator=10**9) | st.floats(-1e30, 1e30).map(lambda x: checks.number("x", x)))
+def test_the_text_of_a_number_is_read_as_that_number(number):
+    assert checks.number("x", number_text(number)) == number
+    assert len(number_text(number)) <= max(8, len(str(number)))
+
+
+def test_a_long_option_has_spaces_inside_quotes_for_lines_to_break():
+    constants = read_constants({"cycle": 0.02, "rate_scale": [Fraction(10**16 // 3, 10**25)] * 9})
+    short, long = shlex.split(constant_options(constants))[1::2]
+    assert short == "cycle=0.02"
+    assert long.startswith("rate_scale=3.333333333333333e-10, 3.3") and long.count(", ") == 8

@@ -13,7 +13,10 @@ from pathlib import Path
 import pytest
 
 from strapgen.cli import main
+from strapgen.cli.output import Output
+from strapgen.ir.exceptions import InputError
 from strapgen.results import figures
+from strapgen.results.table import ANGLE, ERROR, Column, TextTable
 from strapgen.run.backends import BACKENDS
 
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
@@ -143,3 +146,181 @@ def test_several_methods_stand_side_by_side(answer):
         "dcm-rk2-2",
     ]
     assert "y_deg_s=10" in said
+
+
+SHORT = "--motion constant --set x_deg_s=1 --step 0.125 --duration 1"
+WITH_PLOTS = (
+    f"simulate euler {SHORT}",
+    "converge euler --method rk1 --steps 1/2,1/4",
+    "series euler --method rk1 --motion constant",
+    "study word-length --words 16 --carries none --duration 1",
+    f"compare euler {SHORT}",
+    "tables --table 1",
+    "rate-table --duration 1",
+)
+
+
+def test_the_result_is_printed_or_written_and_stderr_names_the_files(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Output().deliver("1\n2\n\n")
+    assert capsys.readouterr() == ("1\n2\n", "")
+    Output(Path("folder/run.txt"), Path("run.png")).deliver("1\n2\n", b"image")
+    assert capsys.readouterr() == ("", "wrote folder/run.txt and run.png\n")
+    assert (tmp_path / "folder" / "run.txt").read_text() == "1\n2\n"
+    assert (tmp_path / "run.png").read_bytes() == b"image"
+    Output(plot=Path("other.png")).deliver("1", b"image")
+    assert capsys.readouterr() == ("1\n", "wrote other.png\n")
+
+
+def test_nothing_is_written_where_one_file_cannot_be(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.txt").write_text("of yesterday")
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(InputError, match="cannot be written"):
+        Output(Path("run.txt"), Path("taken/run.png")).deliver("1", b"image")
+    assert capsys.readouterr() == ("", "")
+    assert (tmp_path / "run.txt").read_text() == "of yesterday"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("command", WITH_PLOTS)
+def test_a_plot_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch, capsys, command):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    for files, line in (
+        ("--out run.png --plot ./run.png", "--out and --plot are both run.png; two files are needed\n"),
+        ("--plot run.docx", "plot run.docx: file type 'docx' is not known; allowed: "),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(f"{command} {files}"))
+        said = capsys.readouterr()
+        assert (stop.value.code, said.out) == (2, "")
+        assert said.err.startswith(f"strapgen: {line}") and said.err.count("\n") == 1
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_command_says_what_it_wrote_and_prints_its_result_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(f"simulate euler {SHORT} --format csv --out out/attitude.csv"))
+    assert (stop.value.code, *capsys.readouterr()) == (0, "", "wrote out/attitude.csv\n")
+    with pytest.raises(SystemExit):
+        main(shlex.split(f"simulate euler {SHORT} --format csv"))
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ((tmp_path / "out" / "attitude.csv").read_text(), "")
+
+
+def test_a_file_that_a_command_reads_is_not_written_over(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    log = "t,dx,dy,dz\n" + "".join(f"{k / 100},0,0,0.001\n" for k in range(1, 9))
+    Path("log.csv").write_text(log)
+    Path("link.csv").symlink_to("log.csv")
+    for out in ("--out log.csv", "--out ./log.csv", "--out link.csv", "--plot log.csv"):
+        with pytest.raises(SystemExit) as stop:
+            main(shlex.split(f"simulate euler --increments-csv log.csv {out}"))
+        said = capsys.readouterr()
+        assert (stop.value.code, said.out) == (2, "")
+        assert "is a file that the command reads; another one is needed" in said.err
+    assert Path("log.csv").read_text() == log
+
+
+COLUMNS = (
+    Column("name", "<"),
+    Column("drift, deg", spec=ANGLE),
+    Column("error", spec=ERROR, gap=4),
+    Column("most from", "<"),
+)
+ROWS = (("euler", 0.123456, 1e-12, "rounding"), ("two-speed", None, 2, ""))
+
+
+def test_columns_are_as_wide_as_their_widest_cell():
+    assert TextTable(COLUMNS, ROWS).lines() == [
+        "name       drift, deg        error  most from",
+        "euler           0.123    1.000e-12  rounding",
+        "two-speed           -    2.000e+00",
+    ]
+
+
+def test_no_line_ends_in_spaces_and_all_have_the_indent():
+    text = TextTable(COLUMNS, ROWS).as_text("  ")
+    assert all(line == "  " + line.strip() for line in text.splitlines())
+
+
+def test_a_table_without_headers_has_rows_alone():
+    rows = [("a", 1), ("long", 20)]
+    assert TextTable([Column(align="<"), Column()], rows).lines() == ["a      1", "long  20"]
+    assert TextTable([Column(align="<"), Column()], []).lines() == []
+
+
+def test_a_wide_cell_widens_its_column_in_every_row_and_under_its_title():
+    columns = [
+        Column("s", spec=".0f", least=2, group="t"),
+        *(Column(a, least=3, gap=gap, group="rate") for a, gap in (("x", 2), ("y", 1))),
+    ]
+    assert TextTable(columns, [(1, 2, 3)]).lines() == [" t   rate", " s    x   y", " 1    2   3"]
+    assert TextTable(columns, [(1, 2, 3), (1000, 2, 3)]).lines() == [
+        "   t   rate",
+        "   s    x   y",
+        "   1    2   3",
+        "1000    2   3",
+    ]
+
+
+def test_csv_has_numbers_in_full_and_an_empty_cell_for_none():
+    read = list(csv.reader(TextTable(COLUMNS, ROWS).as_csv().splitlines()))
+    assert read == [
+        ["name", "drift, deg", "error", "most from"],
+        ["euler", "0.123456", "1e-12", "rounding"],
+        ["two-speed", "", "2", ""],
+    ]
+
+
+def test_markdown_has_the_cells_of_the_text_and_their_alignment():
+    lines = (
+        TextTable((*COLUMNS, Column("x", "^", group="rate")), [(*ROWS[0], "a|b")]).as_markdown().splitlines()
+    )
+    assert lines == [
+        "| name | drift, deg | error | most from | rate x |",
+        "| :-- | --: | --: | :-- | :-: |",
+        r"| euler | 0.123 | 1.000e-12 | rounding | a\|b |",
+    ]
+
+
+@pytest.mark.parametrize("row", [("euler",), ("euler", 1, 2, "rounding", "more")])
+def test_a_row_that_does_not_fit_its_columns_is_refused(row):
+    with pytest.raises(ValueError, match=r"zip"):
+        TextTable(COLUMNS, [row]).lines()
+
+
+def test_latex_has_rules_powers_of_ten_and_no_characters_that_it_reads_otherwise():
+    rows = [("a_b & 50%", -0.5, 1e-12, "x < y"), ("c", None, 2, "")]
+    assert TextTable(COLUMNS, rows).as_latex().splitlines() == [
+        r"\begin{tabular}{lrrl}",
+        r"\hline",
+        r"name & drift, deg & error & most from \\",
+        r"\hline",
+        r"a\_b \& 50\% & $-0.5$ & $1.000 \cdot 10^{-12}$ & x $<$ y \\",
+        r"c & - & $2.000 \cdot 10^{0}$ &  \\",
+        r"\hline",
+        r"\end{tabular}",
+    ]
+
+
+def test_latex_has_a_second_table_for_columns_that_a_page_does_not_hold():
+    columns = [Column("name", "<"), *(Column(f"a long column {k}") for k in range(8))]
+    text = TextTable(columns, [("x", *range(8))]).as_latex()
+    assert text.count(r"\begin{tabular}") == 3
+    assert text.count("name &") == 3 and text.count("a long column 7") == 1
+
+
+def test_latex_has_another_table_for_rows_that_a_page_does_not_hold():
+    text = TextTable([Column("name", "<"), Column("n")], [("x", n) for n in range(100)]).as_latex()
+    assert text.count(r"\begin{tabular}{lr}") == 3 and text.count("name & n") == 3
+    assert all(f"x & {n} " in text for n in range(100))
+
+
+def test_html_says_what_the_cells_say():
+    text = TextTable(COLUMNS, [("<b>", 0.5, 1e-12, "")]).as_html("a caption & more")
+    assert "&lt;b&gt;" in text and "<b>" not in text and "a caption &amp; more" in text
+    assert '<td style="text-align:right">1.000e-12</td>' in text
+    assert text.count("<th ") == 4

@@ -1,18 +1,27 @@
-"""The help of every command: plain text as wide as the terminal, the same words for the same option."""
+"""The help of every command, completion of words, spellings that stay, progress on stderr."""
 
 from __future__ import annotations
 
+import io
+import json
 import re
+import shlex
+import sys
+import time
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
+from commands import run
 from typer.main import get_command
 
 from strapgen import registration
-from strapgen.cli import app, help_layout, main
+from strapgen.cli import app, help_layout, main, progress
 from strapgen.cli.help_layout import summary
+from strapgen.cli.options import MethodOptions
 from strapgen.cli.program import PlainCommand, _label
 from strapgen.ir.checks import SYNONYMS
+from strapgen.run.backends import BACKENDS
 
 
 def commands(group, path=()):
@@ -135,3 +144,136 @@ def test_every_synonym_leads_to_a_name_that_exists():
         for synonym, meant in synonyms.items():
             assert {*meant} <= {*names[kind]}, (kind, synonym)
             assert kind in ("algorithm", "kernel") or synonym not in names[kind], (kind, synonym)
+
+
+@pytest.mark.parametrize(
+    ("words", "answer"),
+    [
+        ("strapgen simulate euler --step 0.1 --du", "--duration"),
+        ("strapgen generate euler --target ", ""),
+        ("strapgen simulate --motion ", ""),
+        ("strapgen generate euler --out ", ""),
+        ("strapgen nowhere --st", ""),
+    ],
+)
+def test_completion_prints_words_alone(words, answer, capsys, monkeypatch):
+    monkeypatch.setenv("_STRAPGEN_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    said = capsys.readouterr()
+    assert (said.out.strip(), said.err) == (answer, "") and stop.value.code == 0
+
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+PROMISED = json.loads((DATA / "promised_command_line.json").read_text())
+
+
+def command(name: str):
+    found = get_command(app)
+    for word in name.split():
+        found = found.commands[word]
+    return found
+
+
+@pytest.mark.parametrize("name", PROMISED["options"])
+def test_every_option_is_still_taken(name):
+    taken = {spelling for option in command(name).params for spelling in option.opts}
+    assert {*PROMISED["options"][name].split()} <= taken
+
+
+def test_back_ends_keep_their_names():
+    assert {"numpy", "c", "c-float", "c-q31", "c-q15", "fixed-model", "exact"} <= BACKENDS.keys()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("promise", PROMISED["json"])
+def test_every_line_answers_with_the_keys_that_it_had(tmp_path, monkeypatch, capsys, promise):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data").symlink_to(DATA)
+    (tmp_path / "examples").symlink_to(DATA.parents[1] / "examples")
+    if "--plot" in promise["line"]:
+        pytest.importorskip("matplotlib")
+    run(shlex.split(promise["line"]))
+    said = capsys.readouterr()
+    answer = json.loads(said.out)
+    assert isinstance(answer, list) == promise["list"]
+    assert {*promise["keys"].split()} <= (answer[0] if promise["list"] else answer).keys()
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make a moment short."""
+    monkeypatch.setattr(progress, "_PATIENCE", 0.02)
+    monkeypatch.setattr(progress, "_INTERVAL", 0.02)
+
+
+def wait_for(stream: io.StringIO, text: str) -> None:
+    """Wait until a text has been written; the test's own time limit ends it otherwise."""
+    for _ in range(3000):
+        if text in stream.getvalue():
+            return
+        time.sleep(0.01)
+    raise AssertionError(f"{text!r} was never written")
+
+
+def test_what_takes_time_is_shown_and_wiped_away(impatient, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", stream := Terminal())
+    with progress.waiting("deriving own.py"):
+        wait_for(stream, "deriving own.py 0 s")
+    assert stream.getvalue().endswith("\r\x1b[2K")
+
+
+@pytest.mark.parametrize("stream", [Terminal(), io.StringIO()])
+def test_it_is_quiet_when_fast_or_when_nobody_watches(stream, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", stream)
+    # However busy the machine is, an hour is not over.
+    monkeypatch.setattr(progress, "_PATIENCE", 3600.0 if stream.isatty() else 0.0)
+    with progress.waiting("deriving own.py"):
+        pass
+    assert stream.getvalue() == ""
+
+
+def test_an_error_ends_it(impatient, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", stream := Terminal())
+    with pytest.raises(ZeroDivisionError), progress.waiting("deriving own.py"):
+        wait_for(stream, "deriving")
+        raise ZeroDivisionError
+    assert stream.getvalue().endswith("\r\x1b[2K")
+
+
+def test_a_file_that_takes_its_time_shows_that_it_is_derived(tmp_path, impatient, monkeypatch):
+    path = tmp_path / "slow.py"
+    path.write_text("def algorithm():\n    import time; time.sleep(0.5)\n    return 3\n")
+    monkeypatch.setattr(sys, "stderr", stream := Terminal())
+    with pytest.raises(ValueError, match=r"returned int; a Kernel is needed"):
+        MethodOptions().choose(str(path))
+    assert re.search(r"deriving \S*slow\.py \d s", stream.getvalue())
+
+
+def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_path, capsys):
+    from strapgen.lab.recordings import recording
+
+    (tmp_path / "log.csv").write_text("".join(f"{k / 10},0,0,0\n" for k in range(4)))
+    stream = Terminal()
+
+    def slowly(function, text):
+        def wait(*arguments):
+            wait_for(stream, text)
+            return function(*arguments)
+
+        return wait
+
+    monkeypatch.setattr(sys, "stderr", stream)
+    for name, text in (("read_increments", "reading log.csv"), ("propagate", "running euler-rk4-2")):
+        monkeypatch.setattr(recording, name, slowly(getattr(recording, name), text))
+    run(["simulate", "euler", "--increments-csv", str(tmp_path / "log.csv")])
+    assert stream.getvalue().endswith("\r\x1b[2K")

@@ -45,7 +45,7 @@ def test_a_group_is_handed_over_as_one_object(capsys):
     application.command()(go)
     application(["home", "--course", "90", "--twice"], standalone_mode=False)
     assert capsys.readouterr().out == f"home {Motion('1', '90')} True\n"
-    assert parameters(go) == ["where", "speed", "course", "twice"]
+    assert parameters(go) == ["where", "speed", "course", "twice", "variant"]
 
 
 def test_a_command_may_show_some_options_in_its_own_order_and_place():
@@ -53,7 +53,7 @@ def test_a_command_may_show_some_options_in_its_own_order_and_place():
     def only(*, motion: Annotated[Motion, Shown(only=("course",))]) -> Motion:
         return motion
 
-    assert parameters(only) == ["course"]
+    assert parameters(only) == ["course", "variant"]
     assert only(course="3") == Motion("1", "3")
 
     @grouped
@@ -61,7 +61,7 @@ def test_a_command_may_show_some_options_in_its_own_order_and_place():
         *, first: int = 1, motion: Annotated[Motion, Shown(("course", "speed"), before="first")]
     ) -> None: ...
 
-    assert parameters(turned) == ["course", "speed", "first"]
+    assert parameters(turned) == ["course", "speed", "first", "variant"]
 
 
 def test_values_have_the_types_of_their_options():

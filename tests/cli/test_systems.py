@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import csv
 import json
-import shlex
+from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import says
 from small_systems import COUNTING
 
-from strapgen.cli import main
+from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.motions.motions import motion
+from strapgen.navigation.systems.system_runner import system_runner
+from strapgen.navigation.systems.wiring import described
+from strapgen.navigation.two_speed.two_speed_runner import LoopFiles, TwoSpeed
+from strapgen.navigation.two_speed.two_speed_sources import loops
 
 CONING = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10"
-
-
-def says(command: str, capsys) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stop:
-        main(shlex.split(command))
-    said = capsys.readouterr()
-    return int(stop.value.code or 0), said.out, said.err
 
 
 @pytest.fixture
@@ -134,3 +134,162 @@ def test_evidence_examines_every_stage_as_it_stands_in_the_system(file, capsys):
     assert status == 0
     assert {row["result"] for row in rows} == {"agrees"}
     assert [*dict.fromkeys(row["kernel"] for row in rows)] == ["counting_gyro_w16", "counting_attitude_w16"]
+
+
+#: A system of one stage that turns an attitude.
+SYSTEM = """title = "one stage"
+sample_hz = 100
+outputs = ["turn.{output}"]
+[inputs.gyro]
+unit = "rad"
+frame = "b"
+range = 1
+[[stage]]
+name = "turn"
+kernel = "{kernel}"
+every = 1
+wires = {{ rotation_vector = "gyro" }}
+{rest}
+"""
+
+
+@pytest.fixture
+def system(tmp_path: Path):
+    def write(kernel: str, output: str = "state", rest: str = "") -> Path:
+        path = tmp_path / "one.toml"
+        path.write_text(SYSTEM.format(kernel=kernel, output=output, rest=rest))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("kernel", ["euler-update", "dcm-update", "cayley-klein-update"])
+def test_attitude_begins_without_rotation_and_follows_the_motion(kernel, system, capsys):
+    status, out, _ = says(f"simulate {system(kernel)} {CONING} --duration 10 --format json", capsys)
+    drift = json.loads(out)["mean_drift_deg"]
+    assert status == 0 and 0 < drift < 0.1
+
+
+def test_truth_does_not_begin_with_the_system(system, capsys):
+    """It is turned by 180 deg about z; its drift vector is that of a half turn but for its sign: not small."""
+    path = system("euler-update", rest="initial = { state = [0, 0, 0.6, 0.8] }")
+    status, out, _ = says(f"simulate {path} {CONING} --duration 1 --format json", capsys)
+    assert status == 0 and json.loads(out)["mean_drift_deg"] > 50
+
+
+def test_rows_without_initial_are_refused(system, capsys):
+    status, out, error = says(
+        f"simulate {system('dcm-two-rows-update', 'row_1')} {CONING} --duration 1", capsys
+    )
+    assert (status, out, error.count("\n")) == (2, "", 1)
+    assert "row_1 is of length 1, and zero is none; state it under initial" in error
+
+
+def test_attitude_that_is_no_rotation_has_no_drift(system, capsys):
+    path = system("euler-update", rest="initial = { state = [0, 0, 0, 0] }")
+    status, out, error = says(f"simulate {path} {CONING} --duration 1", capsys)
+    assert (status, out, error.count("\n")) == (2, "", 1) and "is no rotation at 0 s" in error
+
+
+@pytest.mark.parametrize("duration", ["1e308", "1e7"])
+def test_run_of_too_many_cycles_is_refused_before_it_begins(duration, system, capsys):
+    status, out, error = says(f"simulate {system('euler-update')} {CONING} --duration {duration}", capsys)
+    assert (status, out, error.count("\n")) == (2, "", 1) and "up to 20,000,000 are run" in error
+
+
+def test_records_of_blocks_are_those_of_one_run(system, capsys, monkeypatch):
+    from strapgen.navigation.systems import system_runner
+
+    line = f"simulate {system('euler-update')} {CONING} --duration 1.5 --record 0.05 --format json"
+    whole = json.loads(says(line, capsys)[1])
+    monkeypatch.setattr(system_runner, "BLOCK", 7)
+    assert json.loads(says(line, capsys)[1]) == whole
+
+
+SECOND_AT_400_HZ = f"{CONING} --duration 1 --step 0.0025"
+GYRO = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"
+
+
+@pytest.fixture
+def system_source(tmp_path, capsys) -> Path:
+    assert says(f"system two-speed-dcm {GYRO} --out {tmp_path}/system", capsys)[0] == 0
+    return tmp_path / "system" / "two_speed_dcm_w32.c"
+
+
+@pytest.fixture
+def two_speed(tmp_path, capsys) -> Path:
+    assert says(f"two-speed dcm {GYRO} --out {tmp_path}/loops", capsys)[0] == 0
+    return tmp_path / "loops" / "dcm_two_speed_2_w32.h"
+
+
+def test_system_runs_on_the_counts_of_its_header(system_source, capsys):
+    line = f"compare two-speed-dcm --source {system_source} --backend c-fixed32 --reference exact {SECOND_AT_400_HZ}"
+    status, out, _ = says(f"{line} --format json", capsys)
+    rows = json.loads(out)
+    assert status == 0 and [row["backend"] for row in rows] == ["c-fixed32"] * 2 + [str(system_source)] * 2
+    # The back end of the same word runs on the same counts, and computes the same integers.
+    alike = [{**row, "backend": ""} for row in rows]
+    assert alike[:2] == alike[2:]
+    assert 0 < rows[0]["one_pass"] <= rows[0]["bound"]
+    # Each of 50 slow cycles adds the bound of a pass to three elements of a row, which only turn, and 7 passes of the
+    # fast loop, less than a tenth of it. Without whole counts for all, half a count would be between the two.
+    assert 0 < rows[0]["run"] <= 50 * 3 * rows[0]["bound"] < 7.6e-7 / 2
+
+
+def test_two_speeds_run_at_the_rates_of_the_built_in_system(two_speed, capsys):
+    line = f"compare two-speed-dcm --source {two_speed} --reference exact {SECOND_AT_400_HZ} --format json"
+    status, out, _ = says(line, capsys)
+    rows = {row["output"]: row for row in json.loads(out)}
+    assert status == 0 and {*rows} == {"slow_state", "nav_velocity_change"}
+    fast, slow, navigation = loops("dcm", 2, "c-fixed", Settings.of(sample_hz=400, lsb="0.0175dps"))
+    sums = sum(max(a.errors) for a in fast.fixed.outputs[:2])
+    turned = max(slow.fixed.outputs[0].errors) + max(navigation.fixed.outputs[0].errors)
+    # 50 slow cycles of 20 ms, each with the sums of 8 fast ones in three components, and the rounding of two loops.
+    assert 0 < rows["slow_state"]["run"] <= float(50 * (3 * 8 * sums + 3 * turned))
+    assert rows["slow_state"]["one_pass"] is None
+
+
+@pytest.mark.parametrize("algorithm", ["dcm", "euler"])
+def test_loops_run_as_the_built_in_system_does(algorithm, rng):
+    """In floating point both compute the same numbers, but for rounding, in a navigation frame that turns."""
+    description = described(f"two-speed-{algorithm}", Fraction(400))
+    inputs = {
+        signal.name: rng.uniform(-0.5, 0.5, (80, 3)) * float(signal.bound)
+        for signal in description.system.inputs
+    }
+    expected = system_runner(description, "numpy").run(inputs).values
+    values = LoopFiles(TwoSpeed(algorithm, 2, "numpy"), description.system).run(inputs).values
+    assert {*values} == {*expected} and len(values) == 2
+    for name, rows in expected.items():
+        # Turns of up to 5e-5 rad in ten slow cycles; rounding of doubles of at most 10 m/s, some hundred times.
+        np.testing.assert_allclose(values[name], rows, rtol=0, atol=1e-13)
+    with pytest.raises(InputError, match="has 79 cycles; two speeds take whole navigation cycles, of 40"):
+        LoopFiles(TwoSpeed(algorithm, 2, "numpy"), description.system).run(
+            {name: rows[1:] for name, rows in inputs.items()}
+        )
+
+
+def test_files_that_are_no_part_of_the_comparison_are_refused(system_source, two_speed, tmp_path, capsys):
+    def refused(line: str, said: str) -> None:
+        status, out, error = says(f"compare {line}", capsys)
+        assert (status, out, error.count("\n")) == (2, "", 1) and said in error, error
+
+    at = f"{SECOND_AT_400_HZ}"
+    for file in (system_source, two_speed):
+        refused(
+            f"two-speed-dcm --source {file} {CONING} --duration 1", "is for 400 Hz, and 3200 Hz is compared"
+        )
+    refused(f"two-speed-euler --source {system_source} {at}", "another two_speed_euler is compared")
+    refused(f"two-speed-euler --source {two_speed} {at}", "which are not those of two_speed_euler")
+    stage = system_source.with_name("two_speed_dcm_fast_w32.c")
+    refused(f"two-speed-dcm --source {stage} {at}", "is no source or header of a described system")
+    other = tmp_path / "other"
+    assert says(f"two-speed dcm {GYRO.replace('0.0175', '0.02')} --out {other}", capsys)[0] == 0
+    both = f"--source {two_speed} --source {other}"
+    refused(f"two-speed-dcm {both} {at}", "are different gyros; one run has the counts of one")
+    for file in (system_source, two_speed):
+        source = file.with_suffix(".c")
+        source.write_text(source.read_text().replace("return 0;", "return  0;", 1))
+        refused(f"two-speed-dcm --source {file} {at}", "edited: return 0;")
+        line = f"compare two-speed-dcm --source {file} {at} --run-differing --format json"
+        assert says(line, capsys)[0] == 0

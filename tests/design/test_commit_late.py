@@ -11,7 +11,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.commit_late.commit_late import CommitLate
 from strapgen.design.commit_late.commit_late_sources import family, parts, sources
@@ -90,14 +89,6 @@ def test_every_interval_has_the_filters_of_the_catalogue_for_its_place_in_the_re
         np.testing.assert_allclose(attitude, product(transitions[:number]), rtol=0, atol=ROUNDING)
     # The first order of normalization is all that now is without.
     np.testing.assert_allclose(now, committed[-1], rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.long
-def test_nothing_is_committed_before_a_whole_window_and_then_all_that_it_allows():
-    unit = CommitLate(WINDOW)
-    counts = [unit.push(sample) for sample in samples(12)]
-    assert counts == [0] * (W - 1) + [P + 1] + [1] * (12 - W)
-    assert unit.pending == L
 
 
 def test_now_is_an_answer_and_changes_nothing():
@@ -271,17 +262,6 @@ def test_the_direction_cosine_matrix_is_that_of_the_euler_parameters():
     convert = strapgen.evaluator("dcm-from-euler")
     for one, other in ((parameters.attitude, matrix.attitude), (parameters.now(), matrix.now())):
         np.testing.assert_allclose(convert(one), other, rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.long
-def test_filters_for_a_gyro_go_with_its_sampling_rate_alone():
-    family = replace(WINDOWS[WINDOW], gyro=GyroResponse(Fraction(40), Fraction(7, 10), Fraction(100)))
-    with pytest.raises(InputError, match=r"no sampling rate is stated.*at 100 Hz"):
-        CommitLate(family)
-    with pytest.raises(InputError, match=r"is 200 Hz.*at 100 Hz"):
-        CommitLate(family, sample_hz=200)
-    CommitLate(family, sample_hz="100")
-    CommitLate(WINDOW, sample_hz=200)
 
 
 @pytest.mark.parametrize("sample", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [0.0, 0.0, np.nan], "xyz"], ids=str)
@@ -507,37 +487,6 @@ def test_c_on_integers_refuses_what_its_header_says():
     assert list(state) == [0, 0, 0, 1 << 30]
     assert lib.euler_late_3_3_w32_reset(memory, state) == 0
     assert lib.euler_late_3_3_w32_flush(memory) == 17
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("algorithm", "window", "counts"),
-    [
-        ("euler", WINDOW, {}),
-        pytest.param("dcm", WINDOW, {}, marks=pytest.mark.long),
-        pytest.param("euler", "window-7-7", {}, marks=pytest.mark.long),
-        pytest.param("euler", WINDOW, COUNTS, marks=pytest.mark.long),
-    ],
-)
-def test_the_attitude_of_now_stays_within_its_certified_bound(algorithm, window, counts):
-    """Against double precision from the same integers, on samples that are drawn and on those of motions."""
-    filters, settings = family(window), Settings.of(carry="full", **counts)
-    late = parts(filters, algorithm, "c-fixed", settings)
-    bound, unit = float(late.fixed.now_errors.running), float(late.step.fixed.inputs[1].unit)
-    most = late.fixed.limit * unit
-    fixed = CommitLate(window, algorithm, "c-fixed32", settings=settings)
-    double = CommitLate(window, algorithm, "c")
-    drawn = np.random.default_rng(7).uniform(-most, most, (300, 3))
-    largest = 0.0
-    for sample in np.concatenate([drawn, np.sign(drawn) * most, samples(200) / 2]):
-        rounded = np.rint(np.clip(sample, -most, most) / unit) * unit
-        fixed.push(rounded)
-        double.push(rounded)
-        if fixed.pending == filters.window.ahead:
-            double.reset(fixed.attitude)
-            difference = (fixed.now() - double.now()).reshape(-1, 3 if algorithm == "dcm" else 4)
-            largest = max(largest, np.linalg.norm(difference, axis=1).max())
-    assert bound / 200 < largest < bound
 
 
 @pytest.mark.long

@@ -1,17 +1,16 @@
 """Answers of a design: what lines rectify to fourth order, what a run refuses, and errors that cancel."""
 
-import json
 import math
 from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 
-from strapgen.cli import main
 from strapgen.design.brief import read_brief
 from strapgen.design.selection import causes
 from strapgen.design.selection.candidates import contenders
 from strapgen.design.selection.judgement import after_run, in_order, judgements, verdicts
+from strapgen.design.selection.selection_report import SelectionResult
 from strapgen.design.selection.simulated import algorithm_named, confirmed, software_drifts, start_phases
 
 #: Three lines of at most 0.17 deg, of which each is twice the one below: what is of third order has a mean.
@@ -102,6 +101,9 @@ def test_the_cheapest_that_holds_in_its_run_is_the_answer(tmp_path):
     said = verdicts(brief, answer)
     assert said[1].startswith("its run in time confirms it: ")
     assert said[2].startswith("4 cheaper by prediction do not meet it in a run, the first euler coning-")
+    text = SelectionResult(brief, answer, None, "octaves").text()
+    assert "the run of the first confirms it, the others are predicted" in text
+    assert "coning, in its run" in text
 
 
 def test_the_verdict_of_a_run_is_by_all_limits(tmp_path):
@@ -178,22 +180,3 @@ def test_random_causes_count_with_the_software_against_the_budget(tmp_path):
     budget = Fraction(str(one.drift_deg_h["noise"])) * Fraction("0.999")
     tight = text.replace("drift_deg_h = 0.1", f"drift_deg_h = {float(budget)}")
     assert judged(tmp_path, tight, ["coning-compressed:3"])[2][0].binding == "noise"
-
-
-def test_the_command_tells_what_its_runs_refuse(tmp_path, capsys):
-    path = tmp_path / "brief.toml"
-    path.write_text(OCTAVES.format(second=10.80001, third=21.6))
-    words = ["design", str(path), "--method", ",".join(METHODS), "--jobs", "1"]
-    with pytest.raises(SystemExit) as stop:
-        main([*words, "--format", "json"])
-    assert stop.value.code in (0, None)
-    rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
-    assert rows["euler coning-compressed:8"]["meets"] is False
-    assert rows["euler coning-compressed:8"]["run_deg_h"]["coning"] > 0.04
-    assert rows["euler coning-compressed:8"]["coning_parts_deg_h"].keys() == {"2", "3", "4"}
-    assert rows["euler coning-combined:3+3"]["meets"] and rows["dcm window-7-7:1+7+7"]["run_deg_h"] is None
-    with pytest.raises(SystemExit):
-        main(words)
-    text = capsys.readouterr().out
-    assert "the run of the first confirms it, the others are predicted" in text
-    assert "coning, in its run" in text

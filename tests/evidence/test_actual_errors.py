@@ -79,12 +79,12 @@ def test_runs_stay_within_their_bound(step, settings):
 
 def test_a_run_that_drifts_is_noticed(monkeypatch):
     angles = EULER.fixed.interface.angle_accumulation
-    model, beside = actual_errors._models(EULER)
+    model, normalization = actual_errors._models(EULER)
 
     def drifting(words, *others):
         return ((results := model(words, *others))[0][0] + 40, *results[0][1:]), *results[1:]
 
-    monkeypatch.setattr(actual_errors, "_models", lambda _: (drifting, beside))
+    monkeypatch.setattr(actual_errors, "_models", lambda _: (drifting, normalization))
     run = actual_errors.run_of(EULER, angles, 200)
     assert run.angle > run.bound
 
@@ -135,16 +135,16 @@ def test_functions_of_balls_are_those_of_programs(kind, arguments):
     names = [f"x{k}" for k in range(len(arguments))]
     code = small({"y": node(kind, *names)}, dict.fromkeys(names, 9))
     exact = code.run({name: float(x) for name, x in zip(names, arguments, strict=True)})["out"][0]
-    (near,) = actual_errors.outcome(code, [actual_errors.column_of([x]) for x in arguments])
+    (near,) = actual_errors.evaluate_single(code, [actual_errors.column_of([x]) for x in arguments])
     assert float(near[0]) == pytest.approx(float(exact), abs=1e-14)
 
 
 def test_a_comparison_that_a_ball_leaves_open_holds_both_values():
     code = small({"y": node("select", node("at_least", "x", 0), 1, 5)}, {"x": 1})
-    (unsure,) = actual_errors.outcome(code, [flint.arb(0, 1)])
+    (unsure,) = actual_errors.evaluate_single(code, [flint.arb(0, 1)])
     assert unsure.contains(flint.arb(1))
     assert unsure.contains(flint.arb(5))
-    assert actual_errors.outcome(code, [flint.arb(-1)]) == [5]
+    assert actual_errors.evaluate_single(code, [flint.arb(-1)]) == [5]
 
 
 def test_products_in_pairs_are_products_in_order():
@@ -153,6 +153,6 @@ def test_products_in_pairs_are_products_in_order():
     columns = [np.array([flint.arb(x) for x in row], object) for row in turns]
     expected = [column[0] for column in columns]
     for k in range(1, 7):
-        expected = actual_errors.outcome(product, [*expected, *(column[k] for column in columns)])
-    pairs = zip(actual_errors.multiplied(product, columns), expected, strict=True)
+        expected = actual_errors.evaluate_single(product, [*expected, *(column[k] for column in columns)])
+    pairs = zip(actual_errors.product_in_pairs(product, columns), expected, strict=True)
     assert all(near.overlaps(other) and near.rad() < 1e-10 for near, other in pairs)

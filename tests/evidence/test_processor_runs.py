@@ -15,7 +15,7 @@ from strapgen.catalogue import choose
 from strapgen.evidence import processor_runs
 from strapgen.evidence.actual_errors import PRECISION, ball, exact_states
 from strapgen.evidence.collection import Subject
-from strapgen.evidence.processor_runs import Part, motion_rows, of_model, parts_of
+from strapgen.evidence.processor_runs import Part, model_parts, motion_rows, read_parts
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.processors import RUNNERS, Runner
 from strapgen.lab.runner_c import MOST, NEEDED, CallRun
@@ -112,7 +112,7 @@ def test_a_program_can_be_run_again_by_hand(monkeypatch, tmp_path):
     processor_runs.same_bits(subject, tmp_path)
     folder = tmp_path / "processors" / "host"
     said = subprocess.run(["sh", "run.sh"], cwd=folder, capture_output=True, text=True, check=True).stdout
-    assert [part.name for part in parts_of(said)] == ["coning", "random"]
+    assert [part.name for part in read_parts(said)] == ["coning", "random"]
     for name, text in subject.sources.step_files.items():
         assert (tmp_path / "processors" / name).read_text() == text
 
@@ -120,7 +120,7 @@ def test_a_program_can_be_run_again_by_hand(monkeypatch, tmp_path):
 def test_a_run_that_accepts_too_little_fails(monkeypatch, tmp_path):
     on(monkeypatch, HOST)
     expected = [Part("coning", MOST, NEEDED - 1, 0)]
-    monkeypatch.setattr(processor_runs, "of_model", lambda *_: expected)
+    monkeypatch.setattr(processor_runs, "model_parts", lambda *_: expected)
     (verdict,) = processor_runs.same_bits(Subject(choose("euler-product")), tmp_path)
     assert verdict.detail == f"coning: {NEEDED - 1} of {MOST} calls are accepted"
 
@@ -164,7 +164,7 @@ def test_the_random_part_reaches_both_ends_of_every_range():
 def test_the_parts_of_a_run_are_coning_and_random_input():
     subject = Subject(choose("euler-product"))
     run = CallRun(subject.sources, motion_rows(subject.sources.fixed, 250))
-    parts = [*of_model(subject, run)]
+    parts = [*model_parts(subject, run)]
     assert [part.name for part in parts] == ["coning", "random"]
     assert all(part.accepted == NEEDED for part in parts)
 
@@ -235,7 +235,7 @@ def test_a_changed_shift_is_seen(short, monkeypatch, tmp_path):
 def test_a_refused_step_is_seen():
     subject = Subject(choose("euler"), processor_runs.SETTINGS)
     run = processor_runs.noisy_run(subject, 1, 2)
-    states = processor_runs.states_of("state 00000000 00000000 00000000 40000000\nrefused 0 0 0 0\n")
+    states = processor_runs.read_states("state 00000000 00000000 00000000 40000000\nrefused 0 0 0 0\n")
     assert states == [[0, 0, 0, 1 << 30]]
     assert processor_runs.compared(
         states, [*exact_states(subject, processor_runs.noisy_integers(run), len(run.rows))], run

@@ -105,11 +105,11 @@ PLANE = flint.fmpq_mpoly_ctx.get(["x", "y", "z"], flint.Ordering.lex)
 def test_what_turns_with_rotations_of_all_vectors_is_told():
     d = flint.fmpq_mpoly_ctx.get([f"d{k}" for k in range(6)], flint.Ordering.lex).gens()
     dot = sum(d[k] * d[k + 3] for k in range(3))
-    assert state_lengths.turns_alone([[dot**2 + 3 * dot]])
-    assert not state_lengths.turns_alone([[dot + d[0] * d[3]]])
+    assert state_lengths.is_covariant([[dot**2 + 3 * dot]])
+    assert not state_lengths.is_covariant([[dot + d[0] * d[3]]])
     products = [[d[i] * d[3 + j] + d[j] * d[3 + i] for j in range(3)] for i in range(3)]
-    assert state_lengths.turns_alone(products)
-    assert not state_lengths.turns_alone([[*products[0][:2], 2 * products[0][2]], *products[1:]])
+    assert state_lengths.is_covariant(products)
+    assert not state_lengths.is_covariant([[*products[0][:2], 2 * products[0][2]], *products[1:]])
 
 
 @pytest.mark.long
@@ -119,7 +119,7 @@ def test_the_largest_eigenvalue_is_bounded_where_variables_may_lie():
     zero = PLANE.constant(0)
 
     def largest(*rows) -> Fraction:
-        return state_lengths.largest([[list(row) for row in rows]])
+        return state_lengths.eigenvalue_bound([[list(row) for row in rows]])
 
     assert 2 <= largest([x + z]) <= 2.05
     assert 1 <= largest([y**2 + z**2]) <= 1.1
@@ -130,13 +130,13 @@ def test_the_largest_eigenvalue_is_bounded_where_variables_may_lie():
 
 def test_the_largest_of_several_matrices_counts():
     x, y, _ = PLANE.gens()
-    assert 3 <= state_lengths.largest([[[x]], [[3 * x * y]]]) <= 3.1
+    assert 3 <= state_lengths.eigenvalue_bound([[[x]], [[3 * x * y]]]) <= 3.1
 
 
 def test_a_matrix_of_polynomials_below_zero_has_the_bound_zero():
     """What is divided by a power of x is below zero up to x = 0."""
     x, y, z = PLANE.gens()
-    assert state_lengths.largest([[[-(x**4) * (1 + y * y + z)]]]) < 1e-100
+    assert state_lengths.eigenvalue_bound([[[-(x**4) * (1 + y * y + z)]]]) < 1e-100
 
 
 def test_numbers_above_eigenvalues_are_above_them():

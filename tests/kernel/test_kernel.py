@@ -1,12 +1,17 @@
 """Kernels: stages, outputs, exact evaluation."""
 
+from __future__ import annotations
+
 from fractions import Fraction
 
 import pytest
 import sympy as sp
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
-from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, symbols
+from strapgen.kernel.derivatives import add_tangents
+from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, evaluate_stages, symbols
+from strapgen.kernel.reading import expression
 
 
 def two_stages() -> Kernel:
@@ -95,3 +100,91 @@ def test_every_element_has_an_expression():
     kernel = Kernel("short", "Short", "this test", (), (stage,))
     with pytest.raises(ValueError, match="shorter"):
         kernel.expand({})
+
+
+def test_changes_are_derivatives_along_the_change_of_the_inputs():
+    build = KernelBuilder()
+    x, y, dx, dy, t = (build.scalar(Signal.scalar(name)) for name in ("x", "y", "dx", "dy", "t"))
+    product = build.value("product", x * y)
+    square = build.value("square", product**2 + x + 2)
+    root = build.value("root", 1 / sp.sqrt(square))
+    kept = build.value("kept", 3 * t)
+    before = list(build.stages)
+    changes = add_tangents(build, before, {x: dx, y: dy}, "change", "m/s")
+    assert kept not in changes
+    along = {s: sp.Symbol(s.name, real=True) for s in (x, y, dx, dy, t)}
+    computed = evaluate_stages(build.stages, {s.name: s for s in along})
+    for name in (product, square, root):
+        value = computed[name.name]
+        expected = sp.diff(value, x) * dx + sp.diff(value, y) * dy
+        assert sp.simplify(computed[changes[name].name] - expected) == 0
+    assert not any(stage.expressions[0].has(sp.sqrt(square)) for stage in build.stages[len(before) :])
+
+
+def test_changes_that_are_symbols_have_no_stage_of_their_own():
+    build = KernelBuilder()
+    x, dx = build.scalar(Signal.scalar("x")), build.scalar(Signal.scalar("dx"))
+    same = build.value("same", x)
+    changes = add_tangents(build, list(build.stages), {x: dx}, "change", "m/s")
+    assert changes[same] == dx
+    assert len(build.stages) == 1
+
+
+def test_units_of_changes():
+    build = KernelBuilder()
+    x = build.input(Signal.vector("x", "x", unit="rad"))
+    dx = build.input(Signal.vector("dx", "dx", unit="m/s"))
+    build.stage(Signal.vector("angle", "angle", unit="rad"), 2 * x)
+    build.stage(Signal.scalar("square"), [x[0] ** 2])
+    add_tangents(build, list(build.stages), dict(zip(x, dx, strict=True)), "v", "m/s")
+    assert [stage.signal.unit for stage in build.stages] == ["rad", "1", "m/s", "1"]
+    assert build.stages[2].signal.elements == ("angle_v_x", "angle_v_y", "angle_v_z")
+
+
+A, B = sp.symbols("a b", real=True)
+NAMES = {"a": A, "b": B}
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        sp.Rational(-57, 80),
+        (A - B) ** 3 / (2 * A + sp.sqrt(3)),
+        sp.sqrt(1 + sp.sqrt(2)) * A**-2,
+        sp.sin(2 * A) * sp.cos(B) - sp.pi / 7,
+    ],
+)
+def test_what_sympy_writes_is_read(value):
+    assert expression("value", sp.sstr(value), NAMES) == value
+
+
+def test_decimals_are_exact():
+    assert expression("value", "0.1 + 2e-1*a", NAMES) == sp.Rational(1, 10) + A / 5
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("c + 1", "c is not known; known are a, b, pi"),
+        ("a +", "an expression such as"),
+        ("1/(a - a)", "it divides by zero"),
+        ("0**-1", "it divides by zero"),
+        ("a**b", "a power must be whole"),
+        ("a**1000", "at most 100"),
+        ("1e999", "an exponent of at most 100"),
+        ("sqrt(1, 2, 3, 4)", "another number of arguments"),
+        ("a.real", "are allowed"),
+        ("'a'", "are allowed"),
+        ("[a]", "are allowed"),
+        ("a if b else 1", "are allowed"),
+        ("eval('1')", "are allowed"),
+        (0.5, "is of type float"),
+        ("(" * 3000 + "1" + ")" * 3000, "value is"),
+    ],
+)
+def test_anything_else_is_refused_in_one_line(text, reason):
+    with pytest.raises(InputError) as refusal:
+        expression("value", text, NAMES)
+    assert reason in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 300

@@ -90,13 +90,6 @@ def test_substitution(p, parts, point):
     assert substitute(p, atom) == p
 
 
-def test_nothing_is_changed_in_place():
-    p, q = {("x",): Fraction(1), (): Fraction(2)}, {("x",): Fraction(-1)}
-    before = dict(p), dict(q)
-    add(p, q), multiply(p, q), scale(p, 2), substitute(p, lambda _: q)
-    assert (p, q) == before
-
-
 def test_atoms_of_several():
     assert atoms([{("x", "y"): Fraction(1)}, {(): Fraction(3)}, {("z", "z"): Fraction(1)}]) == set("xyz")
     # Any kind that can be ordered will do.

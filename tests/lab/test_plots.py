@@ -26,9 +26,7 @@ from strapgen.lab.convergence_report import ConvergenceResult, convergence_image
 from strapgen.lab.recordings.recording import History
 from strapgen.lab.runs import Run, simulate
 from strapgen.lab.runs_report import HistoryResult, RunResult, history_image, run_image
-from strapgen.navigation.rate_table.rate_table import Row
-from strapgen.navigation.rate_table.rate_table_plot import rate_table_image
-from strapgen.navigation.rate_table.rate_table_report import RateTableResult
+from strapgen.navigation.rate_table import RateTableResult, Row, rate_table_image
 from strapgen.results import figures as drawing
 from strapgen.thesis.predicted_tables import PredictedEntry, PredictedTablesResult
 from strapgen.thesis.tables_report import ThesisTablesResult, predicted_tables_image, thesis_tables_image

@@ -9,8 +9,7 @@ import pytest
 
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.rate_table.rate_table import MOTIONS, angles, stress
-from strapgen.navigation.rate_table.rate_table_report import RateTableResult
+from strapgen.navigation.rate_table import MOTIONS, RateTableResult, angles, stress
 
 
 def test_both_motions_pass_the_vertical():

@@ -12,7 +12,7 @@ from strapgen.catalogue import choose
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.specific_forces import force
-from strapgen.navigation.velocity_position.translations import translate
+from strapgen.navigation.translations import translate
 
 CONE, LEVER = motion("coning", a_deg_s=60, b_deg_s=100, g_deg_s=40), force("lever", x_m=1, y_m=2, z_m=3)
 WILD, PUSH = motion("random", rate_deg_s=60), force("random", rms_m_s2=10, z_m_s2="9.8")

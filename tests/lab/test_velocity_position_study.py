@@ -10,8 +10,7 @@ import pytest
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.specific_forces import force
-from strapgen.navigation.velocity_position import velocity_position_study
-from strapgen.navigation.velocity_position.velocity_position_study import Flight, candidates, study
+from strapgen.navigation.translations import DEFAULT, Flight, candidates, study
 
 
 def flight(backend="numpy", duration="2", hertz=10):
@@ -26,20 +25,20 @@ def test_every_method_has_a_velocity_and_windows_beat_the_recursion():
     recursion, step, window = rows.values()
     # Errors begin at the second, fourth and sixth power of the angle by which the motion goes on between samples.
     angle = 2 * math.pi * 2 / 100
-    assert recursion.velocity > step.velocity > window.velocity / angle**2
-    assert recursion.position > window.position / angle**4
+    assert recursion.velocity_m_s > step.velocity_m_s > window.velocity_m_s / angle**2
+    assert recursion.position_m > window.position_m / angle**4
     assert recursion.multiply < step.multiply < window.multiply
 
 
 def test_the_default_algorithms_exist():
-    assert len(candidates(velocity_position_study.DEFAULT)) == len(velocity_position_study.DEFAULT)
+    assert len(candidates(DEFAULT)) == len(DEFAULT)
 
 
 def test_fixed_point_adds_rounding_alone():
     double, fixed = (
         next(study(candidates(["rk4:2"]), flight(backend))) for backend in ("numpy", "c-fixed32")
     )
-    assert fixed.velocity == pytest.approx(double.velocity, abs=1e-5)
+    assert fixed.velocity_m_s == pytest.approx(double.velocity_m_s, abs=1e-5)
 
 
 def test_a_duration_that_is_no_multiple_of_a_sample_is_refused():

@@ -1,7 +1,6 @@
 """Lowering: every program of the catalogue computes its kernel, exactly."""
 
 from collections import Counter
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from random import Random
@@ -13,10 +12,10 @@ from derived import FUNCTIONS, kernel, precisely, program, tells_more
 
 from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
-from strapgen.ir.program import RESOLUTION, Assignment, Constant, Node, Operation, Program, Reference, walk
+from strapgen.ir.program import RESOLUTION, Constant, Node, Operation, Program, Reference, walk
 from strapgen.kernel.kernel import Kernel, rationalized
 from strapgen.lowering import candidates, canonical
-from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
+from strapgen.lowering.passes import PASSES, cost, optimize
 
 STANDARD = catalogue.standard()
 EVERY = pytest.mark.parametrize(
@@ -199,43 +198,6 @@ def test_nothing_unused_is_left(choice):
         "euler-angles-from-dcm": {"last_pitch", "last_heading"},  # only roll is held
     }
     assert set(input_names(made)) - used == unused.get(choice.name, set())
-
-
-def test_remove_unused_drops_chains_and_keeps_results():
-    made = program(Choice("euler-product"))
-    dead = Assignment("dead", Operation("multiply", (Reference("e_x"), Reference("e_x"))))
-    deader = Assignment("deader", Operation("sqrt", (Reference("dead"),)))
-    padded = replace(made, body=(dead, *made.body, deader))
-    assert remove_unused(padded) == made
-
-
-def test_remove_unused_keeps_the_transition():
-    made = program(Choice("dcm", "rk4", 2))
-    without_outputs = replace(made, outputs=())
-    names = {a.name for a in remove_unused(without_outputs).body}
-    assert {node.name for node in made.transition.nodes} <= names
-    assert not any(name.startswith("next_") for name in names)
-
-
-@TOGETHER
-def test_operations_are_those_of_a_walk(choice):
-    made = program(choice)
-    kinds: Counter[str] = Counter()
-    pending = [assignment.value for assignment in made.body]
-    while pending:
-        node = pending.pop()
-        if isinstance(node, Operation):
-            kinds[node.kind] += 1
-            pending.extend(node.arguments)
-    assert made.operations == {
-        "add": kinds["add"] + kinds["subtract"],
-        "multiply": kinds["multiply"],
-        "divide": kinds["divide"],
-        "sqrt": kinds["sqrt"],
-        "negate": kinds["negate"],
-        "select": kinds["select"] + kinds["maximum"],
-        "function": sum(kinds[k] for k in ("sin", "cos", "sinc", "atan2", "direction", "wrap")),
-    }
 
 
 @TOGETHER

@@ -13,8 +13,7 @@ from commands import run
 from strapgen import pipeline
 from strapgen.catalogue import Choice
 from strapgen.lab.processors import PROCESSORS
-from strapgen.navigation.attitude_form import attitude_form
-from strapgen.navigation.two_speed import transformation_error
+from strapgen.navigation import attitude_form
 
 
 def test_the_series_are_those_of_the_integral_of_the_exact_attitude():
@@ -26,8 +25,8 @@ def test_the_series_are_those_of_the_integral_of_the_exact_attitude():
     assert sp.simplify(along - (1 - sp.sin(phi) / phi)) == 0
     assert sp.simplify(across - (phi / 2 - (1 - sp.cos(phi)) / phi)) == 0
     for exact, series in (
-        (along, transformation_error.along_series),
-        (across, transformation_error.across_series),
+        (along, attitude_form.along_series),
+        (across, attitude_form.across_series),
     ):
         terms = sum(sp.Rational(c.numerator, c.denominator) * phi**power for power, c in series(5).items())
         assert sp.expand(sp.series(exact, phi, 0, 12).removeO() - terms) == 0
@@ -43,7 +42,7 @@ def test_the_series_are_those_of_the_integral_of_the_exact_attitude():
 def test_numbers_of_the_error_and_a_quadrature():
     digits = [("1.665833532e-03", "4.165278e-05"), ("4.166145864e-04", "5.2079e-06")]
     for phi, (along, across) in zip((0.1, 0.05), digits, strict=True):
-        one, other = transformation_error.errors(phi)
+        one, other = attitude_form.velocity_errors(phi)
         assert f"{one:.9e}" == along
         assert f"{other:.{len(across) - 6}e}" == across
     nodes, weights = np.polynomial.legendre.leggauss(20)
@@ -51,11 +50,11 @@ def test_numbers_of_the_error_and_a_quadrature():
         angles = phi * (nodes + 1) / 2
         along = weights @ (1 - np.cos(angles)) / 2
         across = weights @ (angles - np.sin(angles)) / 2
-        assert np.allclose(transformation_error.errors(phi), (along, across), rtol=1e-11, atol=0)
+        assert np.allclose(attitude_form.velocity_errors(phi), (along, across), rtol=1e-11, atol=0)
     for error in (1e-6, 1e-3):
-        hz = transformation_error.slowest_rate(math.radians(70), error)
+        hz = attitude_form.slowest_rate(math.radians(70), error)
         assert math.isclose(
-            math.hypot(*transformation_error.errors(math.radians(70) / hz)), error, rel_tol=1e-9
+            math.hypot(*attitude_form.velocity_errors(math.radians(70) / hz)), error, rel_tol=1e-9
         )
 
 

@@ -13,35 +13,19 @@ FAST, SLOW, NAVIGATION = "every = 1\n", "every = 8\n", "every = 16\n"
 #: A change of TWO_SPEEDS, and what the message says.
 BAD = [
     # Inputs
-    ("range = 0.001\n", "", "inputs.gyro.range is missing; a number above 0, or a text such as"),
     ("range = 0.001\n", "range = -1\n", "inputs.gyro.range is -1; a number above 0, or a text"),
-    ("range = 0.001\n", "range = nan\n", "inputs.gyro.range is nan; a finite number is needed"),
-    ("range = 0.001\n", "range = 1e400\n", "inputs.gyro.range is 1e+400; a finite number is needed"),
-    ("range = 0.001\n", 'range = "wide"\n', "inputs.gyro.range is 'wide'; a finite number is needed"),
     ("range = 0.001\n", 'range = "1/0"\n', "inputs.gyro.range is '1/0', which divides by 0"),
-    (
-        "range = 0.001\n",
-        "range = 2020-01-01\n",
-        "inputs.gyro.range is 2020-01-01; a number",
-    ),
     (
         'frame = "n"',
         'frame = "q"',
         "inputs.earth.frame is 'q'; one of b, n, e, i, g, an attitude such as b to n",
     ),
-    ('frame = "n"', 'frame = "any"', "inputs.earth.frame is 'any'; one of b"),
     (
         'unit = "m/s"',
         'unit = "any"',
         "inputs.accelerometer.unit is 'any'; a unit, '1' for a pure number, is needed",
     ),
-    ('unit = "m/s"\n', "", "inputs.accelerometer.unit is missing; a unit"),
     (GYRO, f'[inputs.spare]\nunit = "1"\nrange = 1\n{GYRO}', "input spare is taken by no stage"),
-    (
-        GYRO,
-        f"[inputs]\nspare = 3\n{GYRO}",
-        "inputs.spare is 3; a table with unit, range, frame, meaning is needed",
-    ),
     # Names
     ("gyro", "int", "input 'int' has a meaning in generated code; another name is needed"),
     ("gyro", "lambda", "input 'lambda' has a meaning in generated code"),
@@ -50,17 +34,12 @@ BAD = [
     ("gyro", "two_fast", "input 'two_fast' has a meaning in generated code"),
     ("gyro", "Gyro", "key of inputs is 'Gyro'; a name of at most 31 lower-case letters"),
     ('"navigation"', '"run"', "stage 'run' has a meaning in generated code"),
-    ('"navigation"', '"every_1"', "stage 'every_1' has a meaning in generated code"),
-    ('"navigation"', '"residuals"', "stage 'residuals' has a meaning in generated code"),
     ('name = "two"', 'name = "string"', "the name 'string' has a meaning in generated code"),
-    ('name = "two"', 'name = "2"', "name is '2'; a name of at most 31"),
     (
         'name = "slow"',
         'name = "fast"',
         "the name 'fast' stands twice; every input and stage needs its own name",
     ),
-    ('name = "slow"', 'name = "gyro"', "the name 'gyro' stands twice"),
-    ('name = "slow"\n', "", "stage[2].name is missing; a name of at most 31"),
     ('title = "Two', 'title = "*/Two', "title holds */, which has a meaning in generated code; leave it out"),
     # Wires
     (
@@ -78,13 +57,6 @@ BAD = [
         '"fast.conin"',
         "stage slow: coning = 'fast.conin': value of stage fast 'conin' is not known",
     ),
-    ('"fast.coning"', '"fast."', "stage slow: coning = 'fast.': "),
-    (
-        '"fast.coning"',
-        '"fast.coning.x"',
-        "stage slow: coning = 'fast.coning.x': value of stage fast 'coning.x'",
-    ),
-    ('"fast.coning"', "7", "stage[slow].wires.coning is 7; a text is needed"),
     ('turn = "earth"', 'trun = "earth"', "'trun' is not known (did you mean turn?)"),
     (
         'turn = "earth"\n',
@@ -92,7 +64,6 @@ BAD = [
         "stage slow: turn is not wired; wire it to an input or a stage.output, or state a constant",
     ),
     ('frame = "n"', 'frame = "b"', "stage slow: turn = 'earth': frame b meets frame n"),
-    ('frame = "n"\n', "", "stage slow: turn = 'earth': frame none meets frame n"),
     ('unit = "m/s"', 'unit = "m"', "stage fast: velocity_increment = 'accelerometer': unit m meets unit m/s"),
     (
         'state = "slow.state"',
@@ -104,21 +75,14 @@ BAD = [
         'coning = "fast.angle_sum"',
         "stage fast: coning is a sum that no stage takes",
     ),
-    ('"fast.angle_sum"', '"gyro"', "stage fast: angle_sum is a sum that no stage takes"),
     # What goes back
     ('turn = "earth"', 'turn = "slow.navigation_rotation"', "comes from the stage itself; state its delay"),
-    (
-        'increment = "gyro"',
-        'increment = "navigation.velocity_change"',
-        "stage fast: increment = 'navigation.velocity_change': unit m/s meets unit rad",
-    ),
     (
         SLOW,
         f"{SLOW}delay = {{ coning = 1 }}\n",
         "stage slow: delay of coning, which comes from the earlier stage fast",
     ),
     (SLOW, f"{SLOW}delay = {{ turn = 1 }}\n", "stage slow: delay of turn, which is an input of the system"),
-    (SLOW, f"{SLOW}delay = {{ turn = 2 }}\n", "stage[slow].delay.turn is 2; 1 is needed"),
     (
         SLOW,
         f"{SLOW}delay = {{ trun = 1 }}\n",
@@ -134,19 +98,8 @@ BAD = [
     ("every = 16", "every = 12", "stage navigation: every 12 is no multiple of the 8 of slow; rates divide"),
     ("every = 16", "every = 4", "stage navigation (every 4) stands after slow (every 8)"),
     ("every = 1\n", "every = 2\n", "stage fast: every is 2; the fastest stage has 1, unless it collects"),
-    ("every = 16", "every = 0", "stage[navigation].every is 0; a whole number from 1 to 1048576 is needed"),
-    ("every = 16", "every = 99999999999", "stage[navigation].every is 99999999999; a whole number from 1 to"),
-    (
-        "every = 16",
-        "every = 1.5",
-        "stage[navigation].every is 1.5; a whole number from 1 to 1048576 or a text as '50 Hz' is",
-    ),
     ("every = 16", 'every = "7 Hz"', "stage[navigation].every is '7 Hz', which does not divide the 3200 Hz"),
     ("every = 16", 'every = "0 Hz"', "stage[navigation].every is '0 Hz'; a rate above 0 Hz is needed"),
-    ("every = 16\n", "", "stage[navigation].every is missing; a whole number from 1"),
-    ("sample_hz = 3200\n", "", "sample_hz is missing; a number above 0 in Hz is needed"),
-    ("sample_hz = 3200\n", "sample_hz = 0\n", "sample_hz is 0; a number above 0 in Hz is needed"),
-    ("sample_hz = 3200\n", "sample_hz = true\n", "sample_hz is true; a number above 0"),
     # Kernels
     (
         "two-speed-fast-2",
@@ -154,14 +107,7 @@ BAD = [
         "'two-speed-fsat-2' is not known (did you mean two-speed-fast-2",
     ),
     (FAST, f'{FAST}method = "rk4"\n', "stage fast: kernel two-speed-fast-2 takes no method (got rk4)"),
-    (FAST, f"{FAST}increments = 2\n", "stage fast: kernel two-speed-fast-2 takes no increments (got 2)"),
-    (FAST, f"{FAST}evry = 1\n", "stage[fast]: key 'evry' is not known (did you mean every?)"),
     (FAST, f"{FAST}constants = {{ coning = [0, 0, 0] }}\n", "coning is a state, which each call changes"),
-    (
-        FAST,
-        f"{FAST}constants = {{ conig = [0, 0, 0] }}\n",
-        "stage fast: kernel two-speed-fast-2: constant 'conig'",
-    ),
     (
         SLOW,
         f"{SLOW}constants = {{ turn = [0, 0, 0] }}\n",
@@ -178,23 +124,10 @@ BAD = [
         "stage slow: initial state holds 3, beyond its range of 1",
     ),
     (
-        SLOW,
-        f'{SLOW}initial = {{ state = ["x", 0, 0, 1] }}\n',
-        "stage[slow].initial.state[1] is 'x'; a finite number",
-    ),
-    (
         NAVIGATION,
         f"{NAVIGATION}initial = {{ state = [0, 0, 0, 1] }}\n",
         "initial state is that of another stage",
     ),
-    (
-        "turn = 0.0001 }",
-        "trun = 0.0001 }",
-        "stage slow: ranges: input of euler-two-speed-slow-2 'trun' is not known",
-    ),
-    ("turn = 0.0001 }", "turn = 0 }", "stage[slow].ranges.turn is 0; a number above 0"),
-    ("word = 32", "word = 7", "stage[navigation].word is 7; a whole number from 8 to 64 in bit is needed"),
-    ('carry = "full"', 'carry = "some"', "stage[fast].carry 'some' is not known; allowed: none, state, full"),
     (
         NAVIGATION,
         f'{NAVIGATION}writes = {{ next = "slow.state" }}\n',
@@ -212,18 +145,6 @@ BAD = [
         "outputs: fast.none: value of stage fast 'none' is not known",
     ),
     ("sample_hz", 'outputs = ["gyro"]\nsample_hz', "outputs: stage 'gyro' is not known; allowed: fast, slow"),
-    (
-        "sample_hz",
-        'outputs = "fast.coning"\nsample_hz',
-        "outputs is 'fast.coning'; a list of texts is needed",
-    ),
-    (
-        "sample_hz",
-        "sampel = 1\nsample_hz",
-        "key 'sampel' is not known (did you mean sample_hz?)",
-    ),
-    ("sample_hz", "sample_hz = 3\nsample_hz", "is not TOML"),
-    ("sample_hz", f"outputs = {'[' * 3000}{']' * 3000}\nsample_hz", "is not TOML"),
 ]
 #: Changes of ATTITUDE.
 BAD_STEPS = [
@@ -253,6 +174,10 @@ ADDED = [
         'wires = { increment = "late.sum" }',
         "stage late: the range of sum is missing; state it under ranges",
     ),
+    (
+        'name = "late"\nkernel = "sum-3"\nevery = 16\nwires = { increment = "fast.coning" }\nranges = { sum = 1 }',
+        "a sum that is cleared every 8 cycles is taken every 16 too",
+    ),
 ]
 
 
@@ -277,48 +202,18 @@ def check(folder: Path, text: str, message: str, capsys: pytest.CaptureFixture[s
     assert sorted(folder.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("old, new, message", BAD)
-def test_a_file_that_is_wrong_in_one_place_is_refused_in_one_line(old, new, message, tmp_path, capsys):
-    assert old in TWO_SPEEDS
-    check(tmp_path, TWO_SPEEDS.replace(old, new), message, capsys)
-
-
-@pytest.mark.parametrize("old, new, message", BAD_STEPS)
-def test_a_step_that_collects_increments_is_refused_in_one_line_too(old, new, message, tmp_path, capsys):
-    assert old in ATTITUDE
-    check(tmp_path, ATTITUDE.replace(old, new), message, capsys)
+@pytest.mark.parametrize(
+    "text, old, new, message",
+    [*((TWO_SPEEDS, *case) for case in BAD), *((ATTITUDE, *case) for case in BAD_STEPS)],
+)
+def test_a_file_with_one_error_is_refused_in_one_line(text, old, new, message, tmp_path, capsys):
+    assert old in text
+    check(tmp_path, text.replace(old, new), message, capsys)
 
 
 @pytest.mark.parametrize("stage, message", ADDED)
-def test_a_stage_too_many_is_refused_in_one_line(stage, message, tmp_path, capsys):
+def test_a_stage_that_does_not_fit_is_refused_in_one_line(stage, message, tmp_path, capsys):
     check(tmp_path, f"{TWO_SPEEDS}\n[[stage]]\n{stage}\n", message, capsys)
-
-
-def test_a_sum_is_cleared_at_one_rate(tmp_path, capsys):
-    late = '\n[[stage]]\nname = "late"\nkernel = "sum-3"\nevery = 16\nwires = { increment = "fast.coning" }\n'
-    message = "a sum that is cleared every 8 cycles is taken every 16 too"
-    check(tmp_path, f"{TWO_SPEEDS}{late}ranges = {{ sum = 1 }}\n", message, capsys)
-
-
-@pytest.mark.parametrize(
-    "content, message",
-    [
-        (b"", "sample_hz is missing; a number above 0 in Hz is needed"),
-        (b"sample_hz = 1\ninputs = {}\nstage = []", "stage has 0 entries; from 1 to 64 are needed"),
-        (
-            b"sample_hz = 1\nstage = 3\ninputs = {}",
-            "stage is 3; a list of 1 to 64 tables is needed",
-        ),
-        (b"\xff\xfe", "is not UTF-8 (byte 0)"),
-        (b"\0", "is not TOML"),
-        (b"x" * (1 << 20) + b"xx", "is over 1048576 bytes long"),
-    ],
-)
-def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, tmp_path, capsys):
-    path = tmp_path / "case.toml"
-    path.write_bytes(content)
-    assert message in refused([str(path), "--out", str(tmp_path / "out")], capsys)
-    assert sorted(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize(
@@ -326,7 +221,6 @@ def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, 
     [
         ("nowhere.toml", "nowhere.toml cannot be read (No such file or directory)"),
         ("two-speed-dmc", "system 'two-speed-dmc' is not known (did you mean two-speed-dcm"),
-        (".", ". cannot be read (Is a directory)"),
         ("a*/b.toml", "FILE holds */"),
         (
             "case.toml --target rust",
@@ -336,7 +230,6 @@ def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, 
             "case.toml --word 16",
             "the options of fixed point go with --target c-fixed or fixed-model, not with c",
         ),
-        ("case.toml --target c-fixed --word 17", "word"),
         (
             "case.toml --target numpy --out o --with-runs",
             "--with-runs goes with targets in C, not with numpy",
@@ -348,10 +241,8 @@ def test_a_file_that_is_no_description_is_refused_in_one_line(content, message, 
         ("case.svg --draw ./case.svg", "--draw case.svg is the file that the command reads"),
         ("case.toml --out o --check --draw o.svg", "--check writes nothing; --draw does not go with it"),
         ("case.toml --sample-hz 0", "--sample-hz is 0; a number above 0 is needed"),
-        ("case.toml --sample-hz fast", "--sample-hz is 'fast'; a finite number is needed"),
         ("case.toml --target numpy --cpu cortex-m3", "--cpu goes with targets in C, not with numpy"),
         ("case.toml --cpu z80", "cpu 'z80' is not known"),
-        ("case.toml --format csv", "format 'csv' is not known"),
     ],
 )
 def test_words_that_do_not_go_together_are_refused_in_one_line(words, message, tmp_path, capsys, monkeypatch):

@@ -7,8 +7,8 @@ import pytest
 
 from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import built_in
-from strapgen.navigation.systems.sums import copies, summed
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.fitting import copies, summed
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import described
 from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, description, kernels

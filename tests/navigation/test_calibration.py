@@ -8,15 +8,15 @@ import pytest
 import sympy as sp
 
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.calibration.calibration import (
+from strapgen.navigation.calibration import (
     ACCELERATION,
     RATE,
     at_rest,
     calibrated,
     eight_about_each,
     error_derivatives,
+    read,
 )
-from strapgen.navigation.calibration.calibration_file import read
 
 calibrated = cache(calibrated)
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -18,8 +18,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.recordings.recording import InertialRecording, read_inertial
 from strapgen.lab.runs import drift_between
-from strapgen.navigation.courses.course_report import CourseResult, course_table
-from strapgen.navigation.courses.courses import NavigationFrame, course
+from strapgen.navigation.courses import CourseResult, NavigationFrame, course, course_table
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"

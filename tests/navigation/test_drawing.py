@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 from navigation.described_files import ATTITUDE, description
 
 from strapgen.ir.signals import Signal
-from strapgen.navigation.systems.drawing.drawing import drawing
-from strapgen.navigation.systems.drawing.drawing_layout import plan
-from strapgen.navigation.systems.drawing.drawing_parts import Box, Link, Placement, Port, Way
+from strapgen.navigation.systems.drawing_routing import Box, Link, Placement, Port, Way
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Rate, SystemStage, Wire
+from strapgen.navigation.systems.system_drawing import drawing, plan
 from strapgen.navigation.systems.wiring import read_system
 
 ROOT = Path(__file__).parents[2]

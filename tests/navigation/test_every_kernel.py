@@ -13,7 +13,7 @@ from strapgen.catalogue import Choice
 from strapgen.catalogue.names import KERNELS
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import ANY, Signal
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import read_system
 from strapgen.run import backends
 

@@ -18,10 +18,8 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.navigation.systems import system_generation
 from strapgen.navigation.systems.budget import budget, lines
-from strapgen.navigation.systems.compiled_system import CompiledSystem
 from strapgen.navigation.systems.fitting import fitted
-from strapgen.navigation.systems.system_backends import system_runner
-from strapgen.navigation.systems.system_memory import rescaled
+from strapgen.navigation.systems.system_runner import CompiledSystem, rescaled, system_runner
 from strapgen.targets.rendering import render
 
 TEXTS = {"two": TWO_SPEEDS, "att": ATTITUDE, "writes": f'{ATTITUDE}writes = {{ next = "step.state" }}\n'}

@@ -14,7 +14,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.systems.fitting import fitted
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import loops
 from strapgen.run.compiled_code import ModelEvaluator

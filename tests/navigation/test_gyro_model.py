@@ -6,8 +6,8 @@ import pytest
 import sympy as sp
 
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.instruments import gyro_model
-from strapgen.navigation.instruments.gyro_model import (
+from strapgen.navigation.instruments import imu_errors
+from strapgen.navigation.instruments.imu_errors import (
     PARAMETERS,
     RATE,
     TERMS,
@@ -104,7 +104,7 @@ def test_the_torques_are_turned_with_a_gyro_that_is_turned_about_its_spin():
     angle = symbol("angle")
     c, s = sp.cos(angle), sp.sin(angle)
     turn = sp.Matrix([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    W, A = gyro_model.RATE, gyro_model.ACCELERATION
+    W, A = imu_errors.RATE, imu_errors.ACCELERATION
     none = dict.fromkeys(PARAMETERS, sp.S.Zero)
     for name in ("D", "E", "J", "dP", "dB"):
         error = none | {name: symbol(name)}
@@ -113,7 +113,7 @@ def test_the_torques_are_turned_with_a_gyro_that_is_turned_about_its_spin():
 
 
 def test_the_last_matrix_of_the_residual_is_antisymmetric_but_for_its_diagonal():
-    W, A = gyro_model.RATE, gyro_model.ACCELERATION
+    W, A = imu_errors.RATE, imu_errors.ACCELERATION
     errors = gyro_errors(1, W, A, B)
     D, E = symbol("D1"), symbol("E1")
     elastic = sp.Matrix([[D, E], [-E, D]]) * sp.Matrix([A[0] * A[2], A[1] * A[2]])
@@ -152,7 +152,7 @@ def as_scanned(W, A, unbalance, error):
 
 @pytest.mark.long
 def test_with_the_sign_of_the_scans_figure_20_does_not_follow(monkeypatch):
-    monkeypatch.setattr(gyro_model, "gyro_torques", as_scanned)
+    monkeypatch.setattr(imu_errors, "gyro_torques", as_scanned)
     structure = error_structure(diagonal_layout(), 1)
     forms = structure.matrices["E"].subs(structure.forms)
     D, E = symbol("D1"), symbol("E1")
@@ -164,6 +164,6 @@ def test_with_the_sign_of_the_scans_the_torques_do_not_turn_with_the_gyro():
     angle = sp.pi / 2
     turn = sp.Matrix([[sp.cos(angle), sp.sin(angle), 0], [-sp.sin(angle), sp.cos(angle), 0], [0, 0, 1]])
     error = dict.fromkeys(PARAMETERS, sp.S.Zero) | {"E": symbol("E")}
-    W, A = gyro_model.RATE, gyro_model.ACCELERATION
+    W, A = imu_errors.RATE, imu_errors.ACCELERATION
     turned = as_scanned(turn * W, turn * A, B, error) - turn[:2, :2] * as_scanned(W, A, B, error)
     assert turned.applyfunc(sp.simplify) != sp.zeros(2, 1)

@@ -11,8 +11,12 @@ import sympy as sp
 import strapgen
 from strapgen import derive
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.instruments.gyro_model import PARAMETERS, source_structure
-from strapgen.navigation.instruments.imu_errors import imu_compensate, imu_errors
+from strapgen.navigation.instruments.imu_errors import (
+    PARAMETERS,
+    imu_compensate,
+    imu_errors,
+    source_structure,
+)
 from strapgen.navigation.instruments.separation import UNBALANCE
 
 ROWS = (1, 2, 3, 4, 5, 6, 7, 8, 9)

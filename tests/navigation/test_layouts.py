@@ -16,9 +16,9 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.navigation.instruments.layout import Layout, read
 from strapgen.navigation.instruments.layouts import gyros
 from strapgen.navigation.instruments.separation import determinant, measurement_matrix, noise_gains
-from strapgen.navigation.systems.system_agreement import agreement
-from strapgen.navigation.systems.system_backends import system_runner
+from strapgen.navigation.systems.system_comparison import agreement
 from strapgen.navigation.systems.system_file import parsed
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.wiring import wired
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "layouts"

@@ -14,8 +14,7 @@ import strapgen
 from strapgen import derive
 from strapgen.kernel.algebra import cross, rotation
 from strapgen.kernel.kernel import Kernel
-from strapgen.navigation.frame.earth import Earth
-from strapgen.navigation.frame.frame_rates import AZIMUTHS
+from strapgen.navigation.frame.frame_rates import AZIMUTHS, Earth
 
 PRECISE = mpmath.mp.clone()
 PRECISE.dps = 40

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import json
+import math
+import shlex
 from fractions import Fraction
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
 
 import strapgen
+from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
+from strapgen.navigation.navigation_kernels import HEXAD_TRIADS, REDUNDANCY
 from strapgen.navigation.redundancy.geometry import HEXAD, SensorGeometry, geometry
-from strapgen.navigation.redundancy.geometry_file import kernels, read
-from strapgen.navigation.redundancy.geometry_report import GeometryResult
-from strapgen.navigation.redundancy.parity_equations import SensorSet
-from strapgen.navigation.redundancy.redundancy_names import HEXAD_TRIADS, REDUNDANCY
+from strapgen.navigation.redundancy.geometry_report import (
+    GeometryResult,
+    _different,
+    failure_table,
+    failure_tables,
+)
+from strapgen.navigation.redundancy.redundancy_kernels import SensorSet, kernels, read
+from strapgen.navigation.redundancy.redundancy_study import SensorErrors
 from strapgen.run.compiled_code import ModelEvaluator
 
 #: The parity vectors of the six sensors, by the sensors of each.
@@ -354,3 +363,159 @@ def test_every_kernel_says_what_is_printed_derived_or_lost():
     for name in REDUNDANCY:
         source = strapgen.derive(name).source
         assert "Sebring" in source and "derived" in source, name
+
+
+@pytest.mark.long
+def test_the_kernel_and_the_table_agree_wherever_the_kernel_isolates():
+    """A status becomes a parity of twice the trip level in the equations that fail, and none in the others."""
+    select = strapgen.evaluator("select-hexad")
+    for removed in ((), (4,)):
+        table = failure_table(HEXAD, removed)
+        statuses = np.zeros((len(table.verdicts), 15))
+        statuses[:, list(table.equations)] = list(table.verdicts)
+        excluded = np.zeros_like(statuses[:, :6])
+        excluded[:, list(removed)] = 1
+        detected, failed, _ = select(0.002 * statuses, np.full_like(statuses, 0.001), excluded)
+        np.testing.assert_array_equal(detected, statuses.any(axis=1))
+        isolated = failed.any(axis=1)
+        assert {*failed[isolated].argmax(axis=1)} == {*range(6)} - {*removed}
+        verdicts = list(table.verdicts.values())
+        assert [verdicts[k].failed for k in np.flatnonzero(isolated)] == [*failed[isolated].argmax(axis=1)]
+
+
+@pytest.mark.long
+def test_every_failure_along_its_direction_is_declared_and_not_selected():
+    vectors = np.array(HEXAD.equations, float)
+    lengths = np.linalg.norm(vectors, axis=1)
+    for table in failure_tables(HEXAD):
+        valid = {*range(6)} - {*table.removed}
+        for sensor in valid:
+            status = tuple(
+                bool(x)
+                for x in np.abs(vectors[list(table.equations), sensor]) * 6 >= lengths[list(table.equations)]
+            )
+            verdict = table.verdicts[status]
+            members = {*HEXAD.triads[verdict.triad].sensors}
+            assert members <= valid
+            if len(table.removed) < 2:
+                assert verdict.failed == sensor and sensor not in members
+            else:
+                assert verdict.failed is None and any(status)
+        still = table.verdicts[(False,) * len(table.equations)]
+        assert still.failed is None
+
+
+def test_without_equations_there_is_no_table():
+    with pytest.raises(InputError, match="no parity equation is left"):
+        failure_table(HEXAD, (0, 1, 2))
+
+
+def test_statuses_are_told_apart_in_their_order(rng):
+    """As rows of booleans are, of any number of equations."""
+    for equations in (1, 8, 15, 20):
+        fails = rng.random((equations, 3000)) < 0.2
+        fails[-2:] = rng.random((min(equations, 2), 3000)) < 0.9
+        statuses, place = _different(fails)
+        expected, inverse = np.unique(fails.T, axis=0, return_inverse=True)
+        np.testing.assert_array_equal(statuses, expected)
+        np.testing.assert_array_equal(place, inverse.reshape(-1))
+
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "hexad.toml"
+
+
+def run(command: str, capsys: pytest.CaptureFixture[str], status: int = 0) -> str:
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(command))
+    said = capsys.readouterr()
+    assert stop.value.code == status, said.err
+    return said.err if status else said.out
+
+
+def test_trip_levels_are_multiples_of_the_steady_errors_and_of_those_that_grow_with_the_turn():
+    """In arc seconds 3 of noise, 4 of counts and 12 of bias make 13; scale and bending act on a turn of 0.05 rad."""
+    errors = SensorErrors(
+        cycle_s=1,
+        noise_arcsec=3,
+        pulse_arcsec=4 * 6**0.5,
+        bias_deg_h=12,
+        scale_ppm=100,
+        bending_arcmin_g=2,
+        trip_sigmas=2,
+        trip_rate=3,
+    )
+    levels = errors.trip(np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.04]]), np.array([3.0, 3.0]))
+    steady, bent = math.radians(2 * 13 / 3600), math.radians(6 / 60)
+    assert levels == pytest.approx([steady, steady + 3 * (1e-4 + bent) * 0.05], rel=1e-12)
+
+
+@pytest.mark.long
+def test_failures_are_counted_with_errors_of_all_kinds(capsys):
+    data = json.loads(run("study redundancy --trials 200 --format json", capsys))
+    rows = {(row["removed"], row["size"]): row for row in data["rows"]}
+    assert {removed for removed, _ in rows} == {0, 1, 2}
+    for (removed, size), row in rows.items():
+        assert row["trials"] == 200 and row["wrong"] <= 2, (removed, size)
+        assert row["undetected"] == (200 - row["detected"] if size else 0)
+        assert row["false_alarms"] == (0 if size else row["detected"]) <= 2
+        if size >= 6:  # above 1 / 0.2357 trip levels, with noise of a fifth of one
+            assert row["detected"] == 200
+            assert row["isolated"] == row["table_isolated"] == (0 if removed == 2 else 200)
+            assert removed == 2 or row["selected"] == row["table_selected"] == 200
+
+
+@pytest.mark.long
+def test_the_study_is_the_same_on_every_back_end_and_goes_into_files(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    texts = [
+        run(f"study redundancy --trials 20 --format csv --backend {name}", capsys) for name in ("numpy", "c")
+    ]
+    assert texts[0] == texts[1] and texts[0].startswith("removed,size,detected,undetected,false_alarms,")
+    run(f"study redundancy {EXAMPLE} --trials 20 --format csv --out a.csv --plot a.png", capsys)
+    assert Path("a.csv").read_text() == texts[0] and Path("a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.long
+def test_a_geometry_becomes_code_and_tables(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("skew.toml").write_text(
+        'axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], ["2/3", "2/3", "1/3"], [0.6, 0, -0.8]]'
+    )
+    data = json.loads(run("redundancy skew.toml --target c-fixed --word 16 --out out --format json", capsys))
+    assert (data["fail_operate"], data["next_is_detected"]) == (0, True)
+    assert data["equations"][0] == [-2, -2, -1, 3, 0]
+    assert {Path(name).name for name in data["files"]} == {path.name for path in Path("out").iterdir()}
+    assert (
+        "Generated by: strapgen redundancy skew.toml --target c-fixed"
+        in Path("out/select_skew_w16.h").read_text()
+    )
+    lines = Path("out/skew_tables.csv").read_text().splitlines()
+    assert lines[0] == "removed,equations,status,failed,triad,points"
+    assert len(lines) == 1 + sum(len(table["verdicts"]) for table in data["tables"])
+    said = run("redundancy skew.toml --target c --out out", capsys)  # other names: all are new but the tables
+    assert "no failure is isolated, whichever sensors fail; one more is detected" in said
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("redundancy flat.toml", "flat.toml: all axes lie in one plane"),
+        ("redundancy absent.toml", "absent.toml cannot be read"),
+        ("redundancy flat.toml --force", "--force needs --out"),
+        ("study redundancy --set noise=3", "noise"),
+        ("study redundancy --set noise_arcsec=-3", "noise_arcsec is -3.0"),
+        ("study redundancy --set rate_deg_s=1000", "beyond the range 1/8"),
+        ("study redundancy --trials 0", "trials is 0"),
+        ("study redundancy acc.toml", "are accelerometers"),
+        ("study redundancy --backend exact", "backend"),
+    ],
+)
+def test_what_cannot_be_studied_is_refused_in_one_line(command, reason, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("flat.toml").write_text("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0]]")
+    Path("acc.toml").write_text(
+        "sensor = 'accelerometer'\naxes = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]"
+    )
+    error = run(command, capsys, 2)
+    assert reason in error and error.count("\n") == 1

@@ -22,7 +22,7 @@ from strapgen.navigation.instruments.separation import (
     separating_kernel,
     separation_matrix,
 )
-from strapgen.run.backends import of_sources
+from strapgen.run.backend_names import of_sources
 
 B = UNBALANCE
 LAYOUTS = {"canonical": (canonical_layout(), -1), "45": (diagonal_layout(), 1)}

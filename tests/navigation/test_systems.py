@@ -14,12 +14,13 @@ from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.specific_forces import velocity_increments
 from strapgen.lab.recordings.recording import InertialRecording, Recording
 from strapgen.lab.runs import simulate
-from strapgen.navigation.systems.system_backends import system_runner
-from strapgen.navigation.systems.system_inputs import cycles_of, samples
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.system_runs import (
     attitude_output,
+    cycles_of,
     matrices,
     rate_of,
+    samples,
     simulate_system,
     system_course,
     system_history,

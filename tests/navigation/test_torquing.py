@@ -10,8 +10,7 @@ import sympy as sp
 from strapgen import derive
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel.kernel import evaluate_stages
-from strapgen.navigation.torquing.torquing import TorqueLoop
-from strapgen.navigation.torquing.torquing_study import torquing_rows
+from strapgen.navigation.torquing import TorqueLoop, torquing_rows
 
 #: Linear and quantised figures of the set that fits, to the digits of the derivation.
 EXPECTED = {

@@ -16,8 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.two_speed.loops import Loops, LoopSources
-from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+from strapgen.navigation.two_speed.two_speed_runner import Loops, LoopSources, TwoSpeed
 from strapgen.navigation.two_speed.two_speed_sources import ALGORITHMS, SCULLING, loops, sources
 from strapgen.run import compiler
 from strapgen.run.backend_names import evaluator_class

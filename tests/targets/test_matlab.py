@@ -23,24 +23,10 @@ from strapgen.run.backends import of_sources
 from strapgen.targets.matlab import MATLAB, _MatlabPrinter
 
 #: Functions of MATLAB without a toolbox that Octave has too: all that generated code calls.
-COMMON = {
-    *(
-        "atan2",
-        "cos",
-        "floor",
-        "isempty",
-        "max",
-        "min",
-        "mod",
-        "nargin",
-        "NaN",
-        "repmat",
-        "reshape",
-        "sin",
-        "size",
-    ),
-    *("sqrt", "zeros"),
-}
+_COMMON_TEXT = """
+atan2 cos floor isempty max min mod nargin NaN repmat reshape sin size sqrt zeros
+"""
+COMMON = {*_COMMON_TEXT.split()}
 #: Steps of a run, in more than one block of the loop.
 STEPS = 1003
 WORDS = {"function", "end", "if", "for"}

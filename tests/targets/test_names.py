@@ -42,34 +42,12 @@ FIXED = Settings(carry="full")
 PYTHON_WORDS = {"lambda", "def", "None", "True", "yield", "match", "await", "print"}
 KEYWORDS = sorted(names._C_WORDS | PYTHON_WORDS | matlab._WORDS)
 MACROS = ["NULL", "INT32_MAX", "I", "EOF", "NAN", "M_PI", "SIZE_MAX", "INFINITY", "EDOM", "SIGINT"]
-FUNCTIONS = [
-    "sqrt",
-    "sin",
-    "cos",
-    "fmax",
-    "sinf",
-    "hypot",
-    "write",
-    "read",
-    "index",
-    "y0",
-    "j1",
-    "assert",
-    "memcpy",
-]
+_FUNCTIONS_TEXT = """
+sqrt sin cos fmax sinf hypot write read index y0 j1 assert memcpy
+"""
+FUNCTIONS = _FUNCTIONS_TEXT.split()
 ODD = [
-    "_",
-    "__",
-    "_x",
-    "x_",
-    "__x",
-    "__debug__",
-    "_Bool",
-    "__LINE__",
-    "_Noreturn",
-    "np_",
-    "state_",
-    "k_",
+    *["_", "__", "_x", "x_", "__x", "__debug__", "_Bool", "__LINE__", "_Noreturn", "np_", "state_", "k_"],
     "x" * 70,
 ]
 DERIVED = [
@@ -345,39 +323,11 @@ def test_every_target_computes_the_same_under_any_names(several, tmp_path_factor
 
 
 #: Kernels that are called as functions, headers and keywords are.
-KNOWN = [
-    *(
-        "hypot",
-        "write",
-        "step",
-        "main",
-        "read",
-        "index",
-        "y0",
-        "j1",
-        "int32-t",
-        "lambda",
-        "np",
-        "numpy",
-        "math",
-        "stdint",
-    ),
-    *(
-        "int",
-        "double",
-        "sqrt",
-        "size-t",
-        "errno",
-        "true",
-        "class",
-        "k",
-        "one",
-        "isqrt",
-        "abs",
-        "isinstance",
-        "string",
-    ),
-]
+_KNOWN_TEXT = """
+hypot write step main read index y0 j1 int32-t lambda np numpy math stdint int double sqrt size-t
+errno true class k one isqrt abs isinstance string
+"""
+KNOWN = _KNOWN_TEXT.split()
 
 
 @pytest.mark.long

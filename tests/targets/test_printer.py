@@ -24,7 +24,7 @@ from strapgen.run.compiler import C_FLAGS
 from strapgen.targets import c
 from strapgen.targets.numpy_code import _NumpyPrinter
 from strapgen.targets.numpy_code import emit as emit_numpy
-from strapgen.targets.printer import fill_expression
+from strapgen.targets.printer import fill, fill_arguments, fill_definition, fill_expression
 
 NAMES = ("x_1", "x_2", "x_3", "x_4")
 VALUES = dict(zip(NAMES, (1.1, -0.37, 3.0000000000000004, 7e-3), strict=True))
@@ -201,3 +201,27 @@ def test_lines_break_at_spaces_and_behind_parentheses(tree):
     text = _NumpyPrinter().text(tree)
     wrapped = fill_expression(text, " " * 8, 40)
     assert re.sub(r"\(\n +", "(", wrapped).split() == text.split()
+
+
+@pytest.mark.parametrize("filled", [fill_arguments, fill_expression])
+def test_a_line_may_be_as_long_as_the_width(filled):
+    text = "first, second, third"
+    assert filled(text, "    ", len(text)) == text
+    assert filled(text, "    ", len(text) - 1) == "first, second,\n    third"
+
+
+def test_prose_is_wrapped_at_spaces_and_written_with_single_spaces_for_ends_of_lines():
+    text = "first second third"
+    assert fill(text, "    ", len(text)) == fill(f"{text} ", "", len(text) + 1) == text
+    assert fill(text, "    ", len(text) - 1) == "first second\n    third"
+    assert fill("first\nsecond", "", 40) == "first second"
+    assert fill("", "") == fill("  ", "") == ""
+
+
+@pytest.mark.parametrize("width", range(40, 60))
+def test_no_line_of_a_macro_is_longer_than_the_width(width):
+    values = ", ".join(f"{10**k}" for k in range(12))
+    lines = fill_definition("NAME_OF_A_MACRO", f"{{{values}}}", "powers of ten", width).split("\n")
+    assert lines[:2] == ["/* powers of ten */", "#define NAME_OF_A_MACRO \\"]
+    assert max(map(len, lines)) <= width
+    assert " ".join(line.strip(" \\") for line in lines[2:]) == f"{{{values}}}"

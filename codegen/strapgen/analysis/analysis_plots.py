@@ -13,9 +13,9 @@ from strapgen.results import figures
 from strapgen.results.table import READABLE_UNITS
 
 if TYPE_CHECKING:
-    from strapgen.analysis.agreement import Agreement, StepAgreement
     from strapgen.analysis.error_analysis import SeriesResult
     from strapgen.analysis.growth import Stability, StabilityResult
+    from strapgen.analysis.series.prediction import Agreement, StepAgreement
     from strapgen.analysis.vibration.mean_rates import Curve
     from strapgen.analysis.vibration.vibration_report import VibrationResult
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from strapgen.analysis.algorithm import AttitudeAlgorithm
-from strapgen.analysis.error_analysis import ErrorAnalysis
+from strapgen.analysis.error_analysis import ErrorAnalysis, invariant_rows
 from strapgen.analysis.growth import Stability, stability_latex
-from strapgen.analysis.series.invariants import LATEX, covariant_text
 from strapgen.analysis.series.series import PARTS, STEP, ErrorSeries
 from strapgen.analysis.series.velocity_series import VelocitySeries, velocity_series_latex
 from strapgen.analysis.unknowns import unknowns_report
@@ -21,39 +20,21 @@ from strapgen.results.display.objects import latex
 _LINES = 24
 
 
+latex.register(UnknownTableau, unknowns_report.unknown_tableau_latex)
+latex.register(Family, unknowns_report.family_latex)
+latex.register(PolynomialSolution, unknowns_report.solution_latex)
+latex.register(SolvedStep, unknowns_report.solved_latex)
+latex.register(LeadingError, unknowns_report.leading_latex)
+
+
 @latex.register
 def _(stability: Stability) -> str | None:
     return stability_latex([stability])
 
 
 @latex.register
-def _(tableau: UnknownTableau) -> str | None:
-    return unknowns_report.unknown_tableau_latex(tableau)
-
-
-@latex.register
 def _(equation: Equation) -> str | None:
     return unknowns_report.conditions_latex([equation])
-
-
-@latex.register
-def _(family: Family) -> str | None:
-    return unknowns_report.family_latex(family)
-
-
-@latex.register
-def _(solution: PolynomialSolution) -> str | None:
-    return unknowns_report.solution_latex(solution)
-
-
-@latex.register
-def _(solved: SolvedStep) -> str | None:
-    return unknowns_report.solved_latex(solved)
-
-
-@latex.register
-def _(error: LeadingError) -> str | None:
-    return unknowns_report.leading_latex(error)
 
 
 @latex.register
@@ -70,18 +51,10 @@ def _(analysis: ErrorAnalysis) -> str | None:
 @latex.register
 def _(series: ErrorSeries) -> str | None:
     """Return the leading terms of drift, scale and skew: in vectors for a general rate."""
-    rows = []
+    rows: list[tuple[str, str]] = []
     if series.invariant:
         power = min(series.invariant)
-        one = series.invariant[power]
-        rows.append((rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX)))
-        if one.symmetric:
-            rows.append(
-                (
-                    rf"h^{{{power}}}\!:\ \mathbf{{Y}}",
-                    covariant_text(one.symmetric, symmetric=True, notation=LATEX),
-                )
-            )
+        rows = invariant_rows(power, series.invariant[power])
     else:
         for part in PARTS:
             if coefficients := series.coefficients(part):

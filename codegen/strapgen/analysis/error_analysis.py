@@ -11,7 +11,7 @@ import sympy as sp
 from strapgen.analysis.growth import Growth, contraction, growth
 from strapgen.analysis.series.constant_rate import ConstantRate, constant_rate
 from strapgen.analysis.series.error_rate import RunDrift, accumulate
-from strapgen.analysis.series.invariants import LATEX, covariant_text, intervals_text, scalar_text
+from strapgen.analysis.series.invariants import LATEX, Invariants, covariant_text, intervals_text, scalar_text
 from strapgen.analysis.series.motion_rates import is_plain
 from strapgen.analysis.series.series import PARTS, STEP, ErrorSeries, series
 from strapgen.catalogue import Choice
@@ -24,7 +24,7 @@ from strapgen.results.records import INTERNAL, Record, entry
 from strapgen.results.result import Result
 
 if TYPE_CHECKING:
-    from strapgen.analysis.agreement import Agreement
+    from strapgen.analysis.series.prediction import Agreement
 
 
 @dataclass(frozen=True)
@@ -215,16 +215,22 @@ def _series(expression: sp.Expr) -> str:
     return text or "0"
 
 
+def invariant_rows(power: int, one: Invariants) -> list[tuple[str, str]]:
+    """Return drift, and scale and skew where there are some, at a power of the step in vectors, as LaTeX."""
+    rows = [(rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX))]
+    if one.symmetric:
+        text = covariant_text(one.symmetric, symmetric=True, notation=LATEX)
+        rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", text))
+    return rows
+
+
 def series_latex(analysis: ErrorAnalysis) -> str:
     """Return a report as LaTeX: lines of an align environment of the package amsmath."""
     step = analysis.step
     rows: list[tuple[str, str]] = []
     if step.invariant:
         for power, one in step.invariant.items():
-            rows.append((rf"h^{{{power}}}\!:\ \mathbf{{d}}", covariant_text(one.drift, notation=LATEX)))
-            if one.symmetric:
-                text = covariant_text(one.symmetric, symmetric=True, notation=LATEX)
-                rows.append((rf"h^{{{power}}}\!:\ \mathbf{{Y}}", text))
+            rows += invariant_rows(power, one)
     else:
         for part in PARTS:
             rows += _latex_rows(rf"\mathrm{{{part}}}", step.expressions(part))

@@ -20,6 +20,7 @@ from strapgen.analysis.series.invariants import (
     scalar_value,
     sum_text,
 )
+from strapgen.analysis.series.motion_rates import in_powers_of_the_step
 from strapgen.analysis.series.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
@@ -92,17 +93,13 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     order = attitude_step.kernel.order
     top = 2 + (order.step if order else 1) + terms
     most = top + one_step.PATIENCE
-    try:
+    with in_powers_of_the_step(attitude_step.kernel.name):
         while True:
             candidate = _growth(attitude_step, motion, terms, top)
             known = [x for x in (candidate.length, candidate.determinant) if x is not None]
             if top >= most or all(len(x) >= terms for x in known):
                 return candidate
             top += 1
-    except ArithmeticError as error:
-        raise InputError(
-            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
-        ) from None
 
 
 def _growth(attitude_step: Step, motion: str, terms: int, top: int) -> Growth:

@@ -28,7 +28,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.run_options import MOTION_NAMES, MotionSettings, in_words
 
 if TYPE_CHECKING:
-    from strapgen.analysis.agreement import Agreement
+    from strapgen.analysis.series.prediction import Agreement
     from strapgen.catalogue import Choice
 
 
@@ -97,16 +97,16 @@ class DriftPlot:
 
     def agreements(self, choice: Choice, motion: str, count: int) -> tuple[Sequence[Agreement], str]:
         """Return the drift on a motion of the catalogue, predicted and simulated, with a title."""
-        from strapgen.analysis import agreement
+        from strapgen.analysis.series import prediction
         from strapgen.catalogue import MOTIONS
         from strapgen.lab.motions import motions
 
         checks.choice("motion", motion, MOTIONS)
-        settings = self.settings or agreement.SETTINGS[motion]
-        ladder = self.steps or agreement.default_steps(choice)
+        settings = self.settings or prediction.SETTINGS[motion]
+        ladder = self.steps or prediction.default_steps(choice)
         profile = motions.motion(motion, **settings)
         agreements = [
-            agreement.agreement(choice, profile, ladder, self.duration, powers)
+            prediction.agreement(choice, profile, ladder, self.duration, powers)
             for powers in ((1,) if count == 1 else (1, 3))  # every other power may be without drift
         ]
         title = (

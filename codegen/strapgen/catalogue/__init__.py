@@ -10,17 +10,18 @@ from strapgen.catalogue.choice import Choice, orthonormalizations
 from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
-from strapgen.catalogue.method_names import (
+from strapgen.catalogue.methods.method_spec import MOST_BESIDE, MOST_INCREMENTS, Integrator
+from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,
+    KERNELS,
+    LAYOUT_KERNELS,
     METHODS,
     STANDARD_METHODS,
     VECTORS,
     StepVector,
+    reserved,
 )
-from strapgen.catalogue.methods.integrators import Integrator
-from strapgen.catalogue.methods.method_spec import MOST_BESIDE, MOST_INCREMENTS
-from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, reserved
 from strapgen.ir.kernel_info import Recipe
 
 __all__ = [

@@ -1,23 +1,27 @@
-"""A choice says which kernel to derive. `choose` returns it, and all later stages take it."""
+"""A choice says which kernel to derive: `choose` returns it, and all later stages take it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import pickle
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from decimal import Context, Decimal
+from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from strapgen.catalogue.constants import Constants, options
-from strapgen.catalogue.method_names import INTEGRATORS, named_method
 from strapgen.catalogue.methods.method_spec import MethodSpec
 from strapgen.catalogue.methods.window import Window
-from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
-from strapgen.catalogue.user_kernel import UserKernel
+from strapgen.catalogue.names import INTEGRATORS, KERNELS, LAYOUT_KERNELS, named_method
+from strapgen.ir import checks
+from strapgen.ir.checks import shown
+from strapgen.ir.exceptions import InputTypeError
 from strapgen.ir.kernel_info import Description
 from strapgen.ir.notebook_display import full_text, short_repr
 
 if TYPE_CHECKING:
-    from strapgen.kernel.kernel import Kernel
+    from strapgen.ir.kernel_info import AttitudeStep
+    from strapgen.kernel.kernel import Kernel, Stage
 
 
 #: What chooses a method: its name, or the value that holds its coefficients.
@@ -122,7 +126,7 @@ class Choice:
             return f"{self.kernel} {self.user_kernel.text}"
         if self.method is not None and not isinstance(self.method, str):
             return f"{self.kernel} {full_text(self.method)} {self.method.file}"
-        words = [self.kernel, options(self.constants), *self._code_of_packages()]
+        words = [self.kernel, constant_options(self.constants), *self._code_of_packages()]
         if self.layout is not None:
             words += [full_text(self.layout), self.layout.file]
         return " ".join(filter(None, words))
@@ -172,3 +176,179 @@ def orthonormalizations(algorithm: str) -> list[str]:
     """Return the kernels that orthonormalize the state of an algorithm of the catalogue."""
     starts = (f"{algorithm}-orthonormalize", f"{algorithm}-normalize")
     return [name for name in KERNELS if name.startswith(starts)]
+
+
+@dataclass(frozen=True)
+class _Head:
+    """The properties of a kernel that need none of its formulas."""
+
+    name: str
+    samples: int  # rows of its last input: of an attitude step all increments that it takes
+    attitude_step: AttitudeStep | None  # of an attitude step
+    brought: tuple[str, ...]  # names of the kernels that come with it
+    text: str  # differs between different kernels; without their arguments
+    unknowns: tuple[str, ...] = ()
+    #: Samples from before and from after a step of velocity and position; None for any other kernel.
+    beside: tuple[int, int] | None = None
+
+    @classmethod
+    def of(cls, kernel: Kernel) -> _Head:
+        shape = kernel.inputs[-1].shape if kernel.inputs else ()
+        brought = tuple(other.name for other in kernel.bundled_kernels)
+        text = _text(replace(kernel, arguments=""))
+        samples = shape[0] if shape else 1
+        beside = (kernel.previous, kernel.ahead) if kernel.takes_velocity else None
+        return cls(kernel.name, samples, kernel.attitude_step, brought, text, kernel.unknowns, beside)
+
+
+class UserKernel:
+    """A user's kernel, whose formulas may lie in the cache; equal to one with the same formulas and arguments."""
+
+    def __init__(self, head: _Head, restore: Callable[[], Kernel], arguments: str | None = None) -> None:
+        self.head, self.arguments = head, arguments
+        self._restore = restore
+        self._kernel: Kernel | None = None
+
+    @classmethod
+    def of(cls, kernel: Kernel) -> UserKernel:
+        """Return a kernel that is at hand."""
+        return cls(_Head.of(kernel), lambda: kernel, kernel.arguments)
+
+    def with_arguments(self, arguments: str) -> UserKernel:
+        """Return the same kernel with other arguments."""
+        return UserKernel(self.head, self._restore, arguments)
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Coefficients without a value."""
+        return self.head.unknowns
+
+    @property
+    def text(self) -> str:
+        """Text that differs between different kernels, or the same with different arguments."""
+        return f"{self.arguments} {self.head.text}"
+
+    @property
+    def kernel(self) -> Kernel:
+        """The kernel with its formulas."""
+        if self._kernel is None:
+            kernel = self._restore()
+            self._kernel = kernel if self.arguments is None else replace(kernel, arguments=self.arguments)
+        return self._kernel
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, UserKernel) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return UserKernel.of, (self.kernel,)
+
+
+def packed(kernel: Kernel) -> bytes | None:
+    """Return the head of a kernel as bytes; None if they hold something of SymPy, which takes long to import."""
+    head = _Head.of(kernel)
+    if b"sympy" in pickle.dumps(replace(head, text="")):
+        return None
+    return pickle.dumps(head)
+
+
+def _text(kernel: Kernel) -> str:
+    """Return a kernel as text, its formulas with the class of every part.
+
+    SymPy's own text shows the number pi and a symbol of that name alike.
+    """
+    from sympy import srepr
+
+    def shown(stages: tuple[Stage, ...]) -> str:
+        return full_text([(s.signal, [srepr(x, order="none") for x in s.expressions]) for s in stages])
+
+    rest = replace(kernel, stages=(), outputs=(), bundled_kernels=())
+    return " ".join(
+        [full_text(rest), shown(kernel.stages), shown(kernel.outputs), *map(_text, kernel.bundled_kernels)]
+    )
+
+
+#: Constants as a value: the name of each input with its numbers in row-major order, sorted by the names.
+Constants: TypeAlias = tuple[tuple[str, tuple[Fraction, ...]], ...]
+
+#: Most characters of a decimal number that stands as it is, and of an option that stands without spaces.
+_SHORT_NUMBER, _SHORT_OPTION = 8, 60
+
+
+def read_constants(constants: Mapping[str, Any]) -> Constants:
+    """Return constants by the name of the input, in its unit and row by row, as a value with exact numbers.
+
+    A number is an int, a Fraction, a decimal or a fraction as text, or a float, which stands for its shortest decimal.
+
+    >>> read_constants({"rate_bias": [0.5, "1/3", 0], "cycle": "0.02"})
+    (('cycle', (Fraction(1, 50),)), ('rate_bias', (Fraction(1, 2), Fraction(1, 3), Fraction(0, 1))))
+    """
+    if not isinstance(constants, Mapping):
+        raise InputTypeError(f"constants is {shown(constants)}; a mapping from names of inputs is needed")
+    for name in constants:
+        if not isinstance(name, str):
+            raise InputTypeError(f"constants holds {shown(name)}; the name of an input is needed")
+    return tuple(
+        (name, tuple(checks.number(f"constant {name}", value) for value in _flat(constants[name])))
+        for name in sorted(constants)
+    )
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    """Yield the numbers of an array or of nested sequences."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, list | tuple):
+        for part in value:
+            yield from _flat(part)
+    else:
+        yield value
+
+
+def constant_options(constants: Constants) -> str:
+    """Return constants as options of the command line; a long one has spaces, at which a header may wrap it.
+
+    Examples
+    --------
+    >>> constant_options(read_constants({"cycle": "1/50", "rate_bias": [1e-9, -0.5, "1/3"]}))
+    '--constant cycle=0.02 --constant rate_bias=1e-9,-0.5,1/3'
+    """
+    words = []
+    for name, numbers in constants:
+        texts = [number_text(number) for number in numbers]
+        short = f"--constant {name}={','.join(texts)}"
+        words.append(short if len(short) <= _SHORT_OPTION else f"--constant '{name}={', '.join(texts)}'")
+    return " ".join(words)
+
+
+def number_text(number: Fraction) -> str:
+    """Return a short text that `checks.number` reads as this number.
+
+    Examples
+    --------
+    >>> number_text(Fraction(1, 4)), number_text(Fraction(-3, 10**9)), number_text(Fraction(2, 3))
+    ('0.25', '-3e-9', '2/3')
+    """
+    places = _decimal_places(number.denominator)
+    if places is None:
+        return str(number)
+    sign = "-" if number < 0 else ""
+    digits = str(abs(number.numerator) * (10**places // number.denominator))
+    plain = f"{sign}{Decimal(digits).scaleb(-places, Context(len(digits))):f}"
+    if len(plain) <= _SHORT_NUMBER:
+        return plain
+    first, rest = digits[0], digits[1:].rstrip("0")
+    short = f"{sign}{first}{'.' if rest else ''}{rest}e{len(digits) - 1 - places}"
+    return min(plain, short, str(number), key=len)
+
+
+def _decimal_places(denominator: int) -> int | None:
+    """Return how many decimal places a denominator needs; None if no number of them is enough."""
+    powers = []
+    for prime in (2, 5):
+        powers.append(0)
+        while denominator % prime == 0:
+            denominator //= prime
+            powers[-1] += 1
+    return max(powers) if denominator == 1 else None

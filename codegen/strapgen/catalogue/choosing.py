@@ -9,23 +9,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen import registration
-from strapgen.catalogue import constants as constant_values
-from strapgen.catalogue.choice import AnyMethod, Choice
-from strapgen.catalogue.method_names import (
+from strapgen.catalogue.choice import AnyMethod, Choice, constant_options, read_constants
+from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS, Asked, MethodSpec
+from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.catalogue.methods.window import Window
+from strapgen.catalogue.methods.windows import EXACT
+from strapgen.catalogue.names import (
     ALGORITHMS,
     INTEGRATORS,
+    KERNELS,
+    LAYOUT_KERNELS,
     METHODS,
     STANDARD_METHODS,
     VECTORS,
     StepVector,
     is_built_in,
     named_method,
+    reserved,
 )
-from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS, Asked, MethodSpec
-from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.catalogue.methods.window import Window
-from strapgen.catalogue.methods.windows import EXACT
-from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS, reserved
 from strapgen.catalogue.user import loading
 from strapgen.ir import checks
 from strapgen.ir.checks import some
@@ -33,7 +34,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.kernel_info import Description
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.constants import Constants
+    from strapgen.catalogue.choice import Constants
     from strapgen.kernel.kernel import Kernel
 
 #: What every message about an algorithm allows beside the names.
@@ -124,7 +125,7 @@ def choose(
 
 def _with_constants(choice: Choice, constants: Mapping[str, Any]) -> Choice:
     """Return a choice with constants in place of inputs."""
-    values = constant_values.read(constants)
+    values = read_constants(constants)
     if choice.user_kernel is not None and choice.user_kernel.unknowns:
         return Choice.of_user(_with_values(choice.user_kernel.kernel, values))
     if values and (choice.name in ALGORITHMS or choice.name in VECTORS or choice.user_kernel is not None):
@@ -141,7 +142,7 @@ def _with_values(kernel: Kernel, values: Constants) -> Kernel:
         if len(numbers) != 1:
             raise InputError(f"kernel {kernel.name}: {name} has {len(numbers)} numbers; 1 is needed")
     chosen = kernel.substitute({name: number for name, (number,) in values})
-    return replace(chosen, arguments=f"{kernel.arguments} {constant_values.options(values)}".strip())
+    return replace(chosen, arguments=f"{kernel.arguments} {constant_options(values)}".strip())
 
 
 def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Choice:

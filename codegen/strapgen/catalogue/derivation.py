@@ -8,9 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from strapgen.catalogue.choice import AnyMethod, Choice
-from strapgen.catalogue.method_names import INTEGRATORS, METHODS, VECTORS, named_method
 from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS
-from strapgen.catalogue.names import KERNELS, LAYOUT_KERNELS
+from strapgen.catalogue.names import INTEGRATORS, KERNELS, LAYOUT_KERNELS, METHODS, VECTORS, named_method
 from strapgen.ir import checks
 from strapgen.ir.timing import timed
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from strapgen.catalogue.constants import Constants, number_text, options
+from strapgen.catalogue.choice import Constants, constant_options, number_text
 from strapgen.ir.checks import counted, needed, unknown
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
@@ -51,7 +51,7 @@ def fold(kernel: Kernel, constants: Constants) -> Kernel:
         stages=stages,
         outputs=outputs,
         transition=None if transition is None else kernel.transition,
-        arguments=f"{kernel.arguments or kernel.name} {options(constants)}",
+        arguments=f"{kernel.arguments or kernel.name} {constant_options(constants)}",
         notes=(*kernel.notes, _note(signals, constants)),
     )
 

@@ -1,30 +1,46 @@
-"""Models of users' TOML files: dataclasses whose annotations say what each key holds, read and refused in one place.
+"""Users' TOML files: a kind of file has a model, a dataclass whose annotations say what each key holds.
 
 A field of a model is ``Annotated[type, Key(...)]``. The type says what is read:
 
 - ``Fraction`` and ``float``: a number, or a text such as "1/3"; exactly, or rounded to double;
-- ``Number``: the same with square roots; ``int`` and ``str`` themselves;
+- ``Number``: the same with square roots; ``int``, ``bool`` and ``str`` themselves;
 - ``tuple[X, ...]`` and ``tuple[X, X, X]``: a list, of any length or of this one;
 - ``Mapping[str, X]``: a table with names of the user's; a dataclass: a table with the keys of its fields;
 - ``X | None``: a key that may be left out; ``X | tuple[X, X, X]``: either, by what stands there;
 - a class with `from_toml`: what that returns.
 
-The same annotations give the JSON Schema of a file.
+The same annotations give the JSON Schema of a file; the schemas are files of the folder ``schemas`` of the package. An
+editor that knows the directive ``#:schema`` checks a file that begins with it while it is written.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import re
+import tomllib
 import types
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
-from typing import Annotated, Any, ClassVar, Protocol, Union, get_args, get_origin, get_type_hints
+from pathlib import Path
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Generic,
+    Protocol,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
+from strapgen import registration
 from strapgen.catalogue import coefficients
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives, counted, unknown
@@ -227,6 +243,21 @@ class _Text(_Form):
         return {"type": "string"} | ({"pattern": f"^(?:{self.key.pattern})$"} if self.key.pattern else {})
 
 
+class _Flag(_Form):
+    """True or false."""
+
+    plural, words = "flags", "true or false"
+
+    def accepts(self, value: Any) -> bool:
+        return isinstance(value, bool)
+
+    def _read(self, where: str, value: Any) -> Any:
+        return value
+
+    def schema(self) -> dict[str, Any]:
+        return {"type": "boolean"}
+
+
 class _List(_Form):
     """A list of entries of one form: `count` of them, or as many as the key allows."""
 
@@ -384,6 +415,8 @@ def _form_of(hint: Any, key: Key) -> _Form:
         return _Names(names, _form(arguments[1], key)[0])
     if hint is str:
         return _Text(key)
+    if hint is bool:
+        return _Flag()
     if hasattr(hint, "from_toml"):
         return _Own(hint)
     return _table(hint) if hasattr(hint, "__dataclass_fields__") else _Number(hint, key)
@@ -412,3 +445,83 @@ def keys(model: Any) -> dict[str, Key]:
 def schema(hint: Any) -> dict[str, Any]:
     """Return the JSON Schema of an annotation, for instance of a model."""
     return _form(hint)[0].schema()
+
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class UserFile(Generic[T]):
+    """A kind of files."""
+
+    #: What a message calls one, as "a brief"
+    what: str
+    #: Dataclass of its keys, see `toml_models`
+    model: type[T]
+    #: A longer file is refused
+    most_bytes: int
+
+    def read(self, path: str | Path) -> T:
+        """Return the model of a file."""
+        return self.convert(path, lambda model: model)
+
+    def convert(self, path: str | Path, then: Callable[[T], R]) -> R:
+        """Return what `then` makes of the model of a file; every refusal begins with the path."""
+        data = self.content(path)
+        try:
+            return then(parse(self.model, data))
+        except InputError as error:
+            located = InputError(f"{path}: {error}")
+            located.in_file = True
+            raise located from None
+
+    def content(self, path: str | Path) -> dict[str, Any]:
+        """Return the tables of a file, whose decimals keep their digits."""
+        return content(path, self.what, self.most_bytes)
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON Schema of such a file, with the unit of each key."""
+        return {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": f"{self.what[0].upper()}{self.what[1:]} for strapgen",
+            "description": " ".join((self.model.__doc__ or "").split("\n\n")[0].split()),
+            **schema(self.model),
+        }
+
+
+def content(path: str | Path, what: str, most_bytes: int) -> dict[str, Any]:
+    """Return the content of a TOML file of at most `most_bytes`; error messages say `what` it holds."""
+    place = checks.path("path", path)
+    try:
+        with place.open("rb") as file:
+            data = file.read(most_bytes + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None
+    if len(data) > most_bytes:
+        raise InputError(f"{path} is over {most_bytes} bytes long; {what} is shorter")
+    try:
+        return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"), parse_float=Decimal)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 (byte {error.start})") from None
+    except (ValueError, ArithmeticError, RecursionError) as error:
+        raise InputError(f"{path} is not TOML ({error})") from None
+
+
+#: Folder of the files, each with the name of its kind.
+FOLDER = Path(registration.__file__).parent / "schemas"
+
+
+def schemas() -> dict[str, Callable[[], dict[str, Any]]]:
+    """Return the functions that return the JSON Schema of each kind, by name.
+
+    >>> schemas()["coning"]()["properties"]["band"]["unit"]
+    'rad a sample'
+    """
+    known = registration.schemas().items()
+    return {name.removesuffix(".toml"): one.read for name, one in known if one.kind == "file"}
+
+
+def schema_text(kind: str) -> str:
+    """Return the text of the file of a schema."""
+    return json.dumps(schemas()[kind](), indent=1, ensure_ascii=False) + "\n"

@@ -56,6 +56,15 @@ class SourceOptions:
             help="In C, C++, Rust and MATLAB: what the name of the function begins with.",
         ),
     ] = None
+    variant: Annotated[
+        str | None,
+        option(
+            "--variant",
+            metavar="NAME",
+            help="Take options from this variant of strapgen.toml, which headers then name; others that you state here "
+            "win.",
+        ),
+    ] = None
     with_runs: WithRuns = False
     project: Project = False
     check: Annotated[
@@ -75,7 +84,7 @@ class SourceOptions:
         """The name that the options choose."""
         from strapgen.targets.names import Naming
 
-        return Naming(self.name, self.prefix)
+        return Naming(self.name, self.prefix, self.variant)
 
     def require_language(self, target: str) -> None:
         """Check that the options go with the language of a target."""

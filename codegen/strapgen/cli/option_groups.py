@@ -15,6 +15,7 @@ from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
+import typer
 from typer.models import OptionInfo, ParameterInfo
 
 from strapgen.cli import values
@@ -23,6 +24,22 @@ from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+#: The option of every command that takes others from a variant, which are in place when the command runs.
+VARIANT = Parameter(
+    "variant",
+    Parameter.KEYWORD_ONLY,
+    default=None,
+    annotation=Annotated[
+        str | None,
+        typer.Option(
+            "--variant",
+            metavar="NAME",
+            help="Take options from this variant of strapgen.toml; those that you state here win.",
+        ),
+    ],
+)
 
 
 def grouped(command: Command) -> Command:
@@ -38,6 +55,8 @@ def grouped(command: Command) -> Command:
         return command(**options.typed(words))
 
     parameters = [option.parameter for option in options.options.values()]
+    if VARIANT.name not in options.options:
+        parameters.append(VARIANT)
     del run.__dict__["__wrapped__"]  # else the command's own signature would be read
     run.__dict__["__signature__"] = Signature(parameters)
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
@@ -69,6 +88,13 @@ class Option(NamedTuple):
     def is_argument(self) -> bool:
         """Whether it has no name on the command line."""
         return not self.spelling.startswith("-")
+
+    @property
+    def help(self) -> str:
+        """What the option is, in a line."""
+        return next(
+            (one.help or "" for one in self.parameter.annotation.__metadata__ if hasattr(one, "help")), ""
+        )
 
     def value(self, word: Any) -> Any:
         """Return the typed value of a word; None stands for none, as no words do."""

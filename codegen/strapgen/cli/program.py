@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
@@ -13,6 +14,7 @@ from typer.core import TyperCommand, TyperGroup
 from strapgen import registration
 from strapgen.cli import help_layout
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
+from strapgen.cli.option_groups import CommandOptions
 from strapgen.ir.checks import alternatives, suggestions
 from strapgen.ir.exceptions import InputError, StrapgenError
 from strapgen.registration import Command
@@ -28,6 +30,9 @@ class PlainCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line; an option's name is not the value of the option before it."""
         _refuse_missing_values(self, ctx, args)
+        if name := _value_of("--variant", args):
+            words = registration.extension("cli.variant", "--variant")
+            ctx.default_map = words(name, ctx.command_path.partition(" ")[2], args)
         return list(super().parse_args(ctx, args))
 
     def invoke(self, ctx: Any) -> Any:
@@ -52,6 +57,16 @@ class PlainGroup(TyperGroup):
     def get_help(self, ctx: Any) -> str:
         """Return usage, text, options and the commands under their headings."""
         return lay_out(help_parts(self, ctx), self.listed())
+
+
+def _value_of(option: str, words: Sequence[str]) -> str:
+    """Return the value of an option of a command line; "" if it is not there."""
+    for word, following in pairwise([*words, ""]):
+        if word == "--":
+            break
+        if word.partition("=")[0] == option:
+            return word.partition("=")[2] or following
+    return ""
 
 
 def help_parts(command: Any, context: Any) -> CommandHelp:
@@ -206,6 +221,19 @@ _added: set[str] = set()
 _groups: dict[str, typer.Typer] = {}
 #: The commands of strapgen by name.
 _OWN = {name: command for one in registration.built_in().values() for name, command in one.commands.items()}
+
+
+def commands() -> list[str]:
+    """Return the names of the commands of strapgen; one of a group has the name of the group and its own."""
+    return [*_OWN]
+
+
+def options_of(command: str) -> CommandOptions:
+    """Return the options of a command."""
+    function = registration.load(_OWN[command].function)
+    if not isinstance(options := getattr(function, "options", None), CommandOptions):
+        raise InputError(f"strapgen {command} takes no options of a variant")
+    return options
 
 
 def app() -> typer.Typer:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.spectrum import Spectrum, random_rates, read_spectrum
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.processors import PROCESSORS
 from strapgen.lab.recordings.recording import read_increments
@@ -259,7 +258,7 @@ class GyroBrief:
 
 @dataclass(frozen=True)
 class BudgetBrief:
-    """What an algorithm may lose."""
+    """Limits of the errors."""
 
     drift_deg_h: Annotated[
         float,
@@ -283,7 +282,7 @@ class BudgetBrief:
 
 @dataclass(frozen=True)
 class ProcessorBrief:
-    """What an algorithm may cost."""
+    """Limits of the cost."""
 
     word: Annotated[int, Key("Length of a word", "bit", choices=TARGETS["c-fixed"].words or ())] = 32
     operations_per_s: Annotated[float | None, Key("Most operations", "1/s", above=0)] = None
@@ -346,9 +345,9 @@ class BriefFile:
         Fraction, Key("Largest rate about an axis, vibration included", "deg/s", above=0)
     ]
     gyro: Annotated[GyroBrief, Key("The gyro")]
-    budget: Annotated[BudgetBrief, Key("What an algorithm may lose")]
+    budget: Annotated[BudgetBrief, Key("Limits of the errors")]
     vibration: Annotated[VibrationFile, Key("The vibration; none without it")] = VibrationFile()
-    processor: Annotated[ProcessorBrief, Key("What an algorithm may cost")] = ProcessorBrief()
+    processor: Annotated[ProcessorBrief, Key("Limits of the cost")] = ProcessorBrief()
 
 
 BRIEF = UserFile("a brief", BriefFile, 100_000)

@@ -11,11 +11,11 @@ from functools import cached_property
 import numpy as np
 
 from strapgen.catalogue.methods import coning_drift
-from strapgen.catalogue.methods.coning import method, sample_terms
+from strapgen.catalogue.methods.coning import by_form, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import SOURCES, Design
 from strapgen.catalogue.methods.coning_drift import ConingShape
+from strapgen.catalogue.methods.method import sample_names
 from strapgen.catalogue.methods.rotation_series import Scalars
-from strapgen.catalogue.methods.samples import sample_names
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design.coning_design import Lines, annulling
 from strapgen.results.records import INTERNAL, entry, reader_table
@@ -64,7 +64,7 @@ class ConingResult(Result):
             residual=drift.expression,
             leading=drift.leading_expression,
             pairs=[[names[older], names[newer]] for older, newer in design.pairs],
-            order=method(design.form).step_order(design.samples, design.previous).step,
+            order=by_form(design.form).step_order(design.samples, design.previous).step,
             third_order=by_sample if terms else None,
             fourth_order=by_pair if terms else None,
         )

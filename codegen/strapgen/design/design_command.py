@@ -82,9 +82,7 @@ def design(
     Example: strapgen design examples/briefs/ahrs.toml --simulate 5 --generate out/ahrs
     """
     output.check(file, results)
-    for name, path in (("--out", output.file), ("--plot", output.plot)):
-        if path is not None and results is not None and path.resolve() == results.resolve():
-            raise InputError(f"{name} and --results are both {path}; two files are needed")
+    _check_results(results, output)
     count, cluster = workers.jobs, workers.workers()
     from strapgen.design.brief import read_brief
     from strapgen.design.selection.candidates import contenders
@@ -102,6 +100,13 @@ def design(
     if generate is not None:
         _write(brief, file, ordered, generate, result.text())
     output.show(result)
+
+
+def _check_results(results: Path | None, output: Output) -> None:
+    """Refuse an output that would be written over the results."""
+    for name, path in (("--out", output.file), ("--plot", output.plot)):
+        if path is not None and results is not None and path.resolve() == results.resolve():
+            raise InputError(f"{name} and --results are both {path}; two files are needed")
 
 
 def _simulated(
@@ -148,12 +153,6 @@ class StudyRun:
         ),
     ] = None
 
-    def check(self, output: Output) -> None:
-        """Check that the output is not written over the results."""
-        for name, path in (("--out", output.file), ("--plot", output.plot)):
-            if path is not None and self.results is not None and path.resolve() == self.results.resolve():
-                raise InputError(f"{name} and --results are both {path}; two files are needed")
-
 
 @grouped
 @rules(Needs("--set", "--motion"))
@@ -192,7 +191,7 @@ def frontier(
     out/frontier.png
     """
     output.check(run.results, motion if motion and is_file(motion) else None)
-    run.check(output)
+    _check_results(run.results, output)
     from strapgen.cli.progress import track
     from strapgen.design import frontier as study
 

@@ -41,7 +41,7 @@ class FamilyBrief:
         Standard deviation of the noise of an increment, by that of the rate times the sampling interval, for the
         committed filters, for the one-sided ones and for those of the first intervals of a recording.
     spectrum : tuple of int, optional
-        Density of the rate, see `spectra.weights`; by default it is flat over the band.
+        Density of the rate, see `responses.weights`; by default it is flat over the band.
     rotation : str, optional
     terms : int, optional
         As in `Window`.

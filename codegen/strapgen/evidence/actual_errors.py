@@ -1,6 +1,8 @@
 """Certifies in ball arithmetic how far single calls and runs in fixed point are from exact arithmetic.
 
-The integer model computes what the C computes; the exact program is evaluated in balls on the same integers.
+The integer model computes what the C computes; the exact program is evaluated on the same integers in balls, numbers
+with a radius in which the exact value is certain to lie. Radii grow with every operation. Products of transitions are
+multiplied in pairs, then in pairs of pairs, so that radii grow with the number of levels, not with that of the steps.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ _SMALL = Fraction(1, 128)
 #: Iterations from a matrix to the nearest rotation; each squares the distance.
 _ITERATIONS = 10
 #: The orthonormalization of a run of matrices, which keeps the nearest rotation.
-_OF_MATRICES = "dcm-orthonormalize-first-order"
+_MATRIX_NORMALIZATION = "dcm-orthonormalize-first-order"
 TOOL = Tool(
     "FLINT", (), "python-flint from PyPI", lambda: importlib.metadata.version("python-flint"), ("flint",)
 )
@@ -82,7 +84,7 @@ def errors_of_calls(subject: Subject, count: int) -> tuple[int, float, float]:
             for column in map(column_of, zip(*(row.inputs[place] for row in rows), strict=True))
         ]
         for place, (argument, exact) in enumerate(
-            zip(interface.outputs, outcomes(subject.program, values), strict=True)
+            zip(interface.outputs, evaluate(subject.program, values), strict=True)
         ):
             columns = map(column_of, zip(*(row.outputs[place] for row in rows), strict=True))
             for column, balls, bound in zip(columns, exact, argument.errors, strict=True):
@@ -132,7 +134,7 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
     Where the state is proved to stay proper for some steps, the increments fill their range and the state is normalized
     as often as that; elsewhere they are small.
     """
-    model, beside = _models(subject)
+    model, normalization = _models(subject)
     state, samples = subject.fixed.interface.inputs
     stream, every = random.Random(seed), subject.fixed.interface.normalized_within
     between = every if every and len(state.signal.shape) == 2 else BETWEEN
@@ -141,16 +143,16 @@ def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 
     identity = subject.program.attitude_step.identity if subject.program.attitude_step else ()
     words, count, worst, proper = [int(one / state.unit) for one in identity], 0, (0.0, 1.0), True
     feedback = [entry.fresh for entry in subject.fixed.interface.residuals]
-    exact = exact_states(subject, increments, between, beside if between == every else None)
+    exact = exact_states(subject, increments, between, normalization if between == every else None)
     for step, row in enumerate(increments, 1):
         results = model(words, row, *([feedback] if feedback else []))
         words, feedback = [*results[0]], [*results[1]] if feedback else []
         proper = proper and _is_proper([float(word * state.unit) for word in words], angles)
         if every and step % every == 0:
-            words, count = [*beside.model(words)[0]], count + 1
+            words, count = [*normalization.model(words)[0]], count + 1
         if step % between == 0:
             angle = angle_between([ball(word * state.unit) for word in words], next(exact))
-            bound = angles.bound(step, count, beside.error)
+            bound = angles.bound(step, count, normalization.error)
             worst = max(worst, (angle, bound), key=lambda pair: pair[0] / pair[1])
     return CertifiedRun(steps, count, *worst, proper)
 
@@ -168,19 +170,22 @@ def _models(subject: Subject) -> tuple[Any, _Normalization]:
     kernels = subject.program.attitude_step
     assert kernels is not None
     matrix = len(subject.program.inputs[0].shape) == 2
-    name = _OF_MATRICES if matrix else str(kernels.orthonormalize)
-    beside = Subject(choose(name), subject.fixed.interface.companion_settings)
+    name = _MATRIX_NORMALIZATION if matrix else str(kernels.orthonormalize)
+    normalization = Subject(choose(name), subject.fixed.interface.companion_settings)
     step, normalize = (
-        ModelEvaluator(pipeline.compile(part.choice, MODEL, part.settings)).step for part in (subject, beside)
+        ModelEvaluator(pipeline.compile(part.choice, MODEL, part.settings)).step
+        for part in (subject, normalization)
     )
-    return step, _Normalization(normalize, beside.program, max(beside.fixed.interface.outputs[0].errors))
+    return step, _Normalization(
+        normalize, normalization.program, max(normalization.fixed.interface.outputs[0].errors)
+    )
 
 
 def exact_states(
     subject: Subject,
     increments: Iterable[Sequence[int]],
     between: int,
-    beside: _Normalization | None = None,
+    normalization: _Normalization | None = None,
 ) -> Iterator[list[Any]]:
     """Yield balls of the exact state after every block of steps; with a normalization, after that."""
     from flint import ctx
@@ -192,11 +197,13 @@ def exact_states(
     exact = [ball(one) for one in kernels.identity]
     steps = iter(increments)
     while len(rows := list(islice(steps, between))) == between:
-        with ctx.workprec(_MORE_BITS if beside else PRECISION):
+        with ctx.workprec(_MORE_BITS if normalization else PRECISION):
             columns = [column_of(column) * ball(samples.unit) for column in zip(*rows, strict=True)]
-            exact = outcome(product, [*exact, *multiplied(product, outcome(transition, columns))])
-            if beside:
-                exact = outcome(beside.program, exact)
+            exact = evaluate_single(
+                product, [*exact, *product_in_pairs(product, evaluate_single(transition, columns))]
+            )
+            if normalization:
+                exact = evaluate_single(normalization.program, exact)
         yield exact
 
 
@@ -247,20 +254,20 @@ def column_of(integers: Sequence[int]) -> Any:
     return column
 
 
-def outcome(program: Program, values: Sequence[Any]) -> list[Any]:
+def evaluate_single(program: Program, values: Sequence[Any]) -> list[Any]:
     """Return the elements of a program's only output."""
-    (elements,) = outcomes(program, values)
+    (elements,) = evaluate(program, values)
     return elements
 
 
-def outcomes(program: Program, values: Sequence[Any]) -> list[list[Any]]:
-    """Return the elements of each output of a program, see `outcome`."""
+def evaluate(program: Program, values: Sequence[Any]) -> list[list[Any]]:
+    """Return the elements of each output of a program, see `evaluate_single`."""
     names = [name for signal in program.inputs for name in signal.elements]
     results = program.run(dict(zip(names, values, strict=True)), ball, _operations())
     return [results[result.signal.name] for result in program.outputs]
 
 
-def multiplied(product: Program, turns: Sequence[Any]) -> list[Any]:
+def product_in_pairs(product: Program, turns: Sequence[Any]) -> list[Any]:
     """Return the product of transitions."""
     while len(turns[0]) > 1:
         odd = len(turns[0]) % 2
@@ -268,7 +275,7 @@ def multiplied(product: Program, turns: Sequence[Any]) -> list[Any]:
         last = [column[len(column) - odd :] for column in turns]
         turns = [
             np.concatenate(parts)
-            for parts in zip(outcome(product, [*pairs[0], *pairs[1]]), last, strict=True)
+            for parts in zip(evaluate_single(product, [*pairs[0], *pairs[1]]), last, strict=True)
         ]
     return [column[0] for column in turns]
 

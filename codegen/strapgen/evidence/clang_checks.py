@@ -1,4 +1,8 @@
-"""What clang-tidy and clang find in generated C, where every check is on but those that are named here."""
+"""What clang finds in generated C: warnings, findings of clang-tidy, and calls that its fuzzer breaks under sanitizers.
+
+Every check and warning is on but those that are named here. The fuzzer runs a driver that checks every call against the
+contract: ranges of inputs and outputs, range checks, error feedback, and the loops over samples and runs.
+"""
 
 from __future__ import annotations
 
@@ -173,7 +177,7 @@ def fuzzing(subject: Subject, folder: Path) -> list[Verdict]:
 
     def judge() -> tuple[Result, str]:
         write_files(place, fuzz_files(subject))
-        said = built(place, subject.sources)
+        said = compile_driver(place, subject.sources)
         if said:
             return "fails", said
         report = run_fuzzer(place, [f"-runs={INPUTS}", f"-seed={SEED}"])
@@ -195,7 +199,7 @@ def _build(sources: Sources) -> list[str]:
     return ["clang", *_FLAGS, *code, driver_name(sources), "-o", _PROGRAM]
 
 
-def built(folder: Path, sources: Sources) -> str:
+def compile_driver(folder: Path, sources: Sources) -> str:
     """Compile the driver in its folder; return the error that there is, otherwise nothing."""
     done = subprocess.run(_build(sources), cwd=folder, capture_output=True, text=True, check=False)
     if not done.returncode:
@@ -208,13 +212,13 @@ def run_fuzzer(folder: Path, options: Sequence[str]) -> str:
     """Let the fuzzer run; return what it reports, with the input that it reports it of, otherwise nothing."""
     command = [_PROGRAM, f"-max_len={LONGEST}", "-len_control=0", "-timeout=10", *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False)
-    return reported(done.stderr.decode(errors="replace")) if done.returncode else ""
+    return fuzzer_report(done.stderr.decode(errors="replace")) if done.returncode else ""
 
 
-def reported(said: str) -> str:
+def fuzzer_report(said: str) -> str:
     r"""Return what a fuzzer's messages report: the contract's line, or that of a sanitizer, and the input.
 
-    >>> reported("f: an input is changed\nartifact_prefix='./'; Test unit written to ./crash-1\nBase64: AQ==\n")
+    >>> fuzzer_report("f: an input is changed\nartifact_prefix='./'; Test unit written to ./crash-1\nBase64: AQ==\n")
     'f: an input is changed; input in base 64: AQ=='
     """
     lines = [line.strip() for line in said.splitlines()]

@@ -1,4 +1,7 @@
-"""Collects evidence: every check on every kernel, side by side on the cores of the machine."""
+"""Collects evidence: every check on every kernel, side by side on the cores of the machine.
+
+A subject is a kernel in fixed point with its C; a tool gives a verdict on a claim of its header.
+"""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ def _subjects(kernels: list[str], method: MethodOptions, fixed: FixedOptions) ->
 def _stages(name: str, method: MethodOptions, fixed: FixedOptions) -> Iterator[Subject]:
     """Yield the stages of a described system."""
     from strapgen.evidence import collection
-    from strapgen.navigation.systems.simulate_system import refuse_options
+    from strapgen.navigation.systems.system_simulation import refuse_options
     from strapgen.navigation.systems.wiring import described
 
     refuse_options(method, fixed, ["--constant"] if method.constant else [])

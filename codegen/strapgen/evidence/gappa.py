@@ -1,4 +1,9 @@
-"""Has Gappa prove the error bounds of a call: how far the outputs are from exact arithmetic on the same inputs."""
+"""Has Gappa prove the error bounds of a call, and Coq check its proof, so that nobody has to trust Gappa.
+
+A bound says how far the outputs are from exact arithmetic on the same inputs. Gappa takes the rules of a script as
+hypotheses of the theorem that it writes for Coq. Here they are lemmas, which Coq proves as identities of polynomials:
+what is left of hypotheses are the ranges of the inputs.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +59,7 @@ def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Sc
         try:
             for script in write():
                 file.write_text(f"# Run: gappa -Eprecision={PRECISION} {file.name}\n{script.question()}")
-                outcome = judged(script, *answered(file))
+                outcome = compare_bounds(script, *proved_bounds(file))
                 if outcome[0] == "proved":
                     break
         except CannotFollowError as reason:
@@ -64,7 +69,7 @@ def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Sc
     return verdict(kernel, f"error bound: {case}", GAPPA, judge)
 
 
-def answered(file: Path) -> tuple[list[Fraction], str]:
+def proved_bounds(file: Path) -> tuple[list[Fraction], str]:
     """Return the bound that Gappa proves of each expression of a script, and its complaint.
 
     There are fewer bounds where it has none. It complains of a rule that is no identity, or says why it gave up.
@@ -84,7 +89,7 @@ def answered(file: Path) -> tuple[list[Fraction], str]:
     return bounds, ""
 
 
-def judged(script: Script, bounds: Sequence[Fraction], complaint: str) -> tuple[Result, str]:
+def compare_bounds(script: Script, bounds: Sequence[Fraction], complaint: str) -> tuple[Result, str]:
     """Compare the bounds that Gappa proves with those that the header states.
 
     With the result come the bounds that are the closest to the header's, or farthest above.

@@ -1,7 +1,9 @@
 """Scripts for Gappa: what a program computes with roundings, beside the same program in exact numbers.
 
-In a script ``c_x`` is the computed value of x and ``x_x`` the exact one. Gappa follows sums, products, quotients and
-square roots; it checks that the rules by which a script rewrites one expression as another are identities.
+Gappa follows sums, products, quotients and square roots; it checks that the rules by which a script rewrites one
+expression as another are identities. In fixed point ``c_x`` is the number that the integer in the C stands for, ``e_x``
+the same sum in exact arithmetic, and ``x_x`` the value of the exact program. In floating point the operations are
+numbered in the order of the C: ``c_3`` is the computed value of the third and ``e_3`` its exact one.
 """
 
 from __future__ import annotations
@@ -51,11 +53,11 @@ class Script:
         """Give an expression a name."""
         self.definitions.append(f"{name} = {text};")
 
-    def suppose(self, name: str, low: Fraction, high: Fraction) -> None:
+    def assume(self, name: str, low: Fraction, high: Fraction) -> None:
         """State the range of an input, or of a value that the code checks."""
         self.hypotheses.append(f"{name} in [{number(low)},{number(high)}]")
 
-    def aim(self, text: str, bound: Fraction) -> None:
+    def add_goal(self, text: str, bound: Fraction) -> None:
         """Add a goal; of two outputs that are the same, the smaller bound is claimed."""
         self.goals[text] = min(bound, self.goals.get(text, bound))
 
@@ -171,7 +173,7 @@ class _FixedScriptWriter:
         unit = Fraction(2) ** -fraction
         self.fractions[name], self.limits[name] = fraction, (low * unit, high * unit)
         self.exact.add(name)
-        self.script.suppose(f"c_{name}", *self.limits[name])
+        self.script.assume(f"c_{name}", *self.limits[name])
         self.script.hypotheses.append(f"@FIX(c_{name},{-fraction})")
 
     def _goal(self, name: str, exact: str, offset: Fraction, bound: Fraction) -> None:
@@ -183,7 +185,7 @@ class _FixedScriptWriter:
             computed, twin = shifted
         if exact != twin:
             self._rewrite(exact, twin)
-        self.script.aim(f"{computed} - {exact}", bound)
+        self.script.add_goal(f"{computed} - {exact}", bound)
 
     def _exact(self, name: str) -> str:
         return f"c_{name}" if name in self.exact else f"e_{name}"
@@ -211,7 +213,7 @@ class _FixedScriptWriter:
                 raise CannotFollowError(f"{name} is chosen by a comparison, which is a branch")
         self.fractions[name], self.limits[name] = value.fraction, (value.low * unit, value.high * unit)
         if value.range_checked:
-            self.script.suppose(f"c_{name}", *self.limits[name])
+            self.script.assume(f"c_{name}", *self.limits[name])
         if name not in self.exact:
             self.script.rules.append(f"c_{name} ~ e_{name};")
 
@@ -386,7 +388,7 @@ class _FloatingScriptWriter:
         for result in program.outputs:
             places = self.expressions.results[result.signal.name]
             for place, bound in zip(places, rounding.errors[result.signal.name], strict=True):
-                self.script.aim(f"c_{place} - {self.exact[place]}", bound)
+                self.script.add_goal(f"c_{place} - {self.exact[place]}", bound)
 
     def _used(self, places: Sequence[int]) -> set[int]:
         """Return the operations that some others need, and these."""
@@ -419,7 +421,7 @@ class _FloatingScriptWriter:
         factor = self._factor(expression)
         if factor:  # the exponent changes alone, but below the smallest normal number
             lost = self.number.underflow if factor < 1 else Fraction(0)
-            self.script.suppose(f"c_{place} - ({computed})", -lost, lost)
+            self.script.assume(f"c_{place} - ({computed})", -lost, lost)
         self.script.rules.append(f"c_{place} ~ e_{place};")
         self._range(place, expression)
 
@@ -428,7 +430,7 @@ class _FloatingScriptWriter:
             raise CannotFollowError("the program looks at the resolution of its numbers")
         largest = self.largest[name]
         self.script.define(f"c_{place}", f"{self.format}({name})")
-        self.script.suppose(f"c_{place}", -largest, largest)
+        self.script.assume(f"c_{place}", -largest, largest)
         self.exact[place] = f"c_{place}"
         self.ranges[place] = Interval.symmetric(largest)
         self.expansions[place] = {(place,): Fraction(1)}

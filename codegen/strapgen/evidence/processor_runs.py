@@ -1,4 +1,8 @@
-"""Runs generated C on processors, and compares every integer that it returns with the model in Python integers."""
+"""Runs generated C on emulated processors, and compares what it returns with the model and with ball arithmetic.
+
+Every integer of a run must be that of the model in Python integers. A million steps with error feedback must end near
+the exact states of the same integers.
+"""
 
 from __future__ import annotations
 
@@ -82,7 +86,7 @@ def same_bits(subject: Subject, folder: Path) -> list[Verdict]:
     expected: list[Part] = []
 
     def judged(runner: Runner) -> tuple[Result, str]:
-        expected.extend(() if expected else of_model(subject, run))
+        expected.extend(() if expected else model_parts(subject, run))
         return _judged(runner, place, [*_code(subject), f"run_{subject.name}.c"], expected)
 
     return [
@@ -108,7 +112,7 @@ def _judged(runner: Runner, place: Path, sources: Sequence[str], expected: list[
         said = runner.run(folder, [f"../{source}" for source in sources])
     except CompilerError as error:
         return "fails", str(error)
-    reported = parts_of(said)
+    reported = read_parts(said)
     for part in expected:
         if part.accepted < NEEDED:
             return "fails", f"{part.name}: {part.accepted} of {part.calls} calls are accepted"
@@ -121,10 +125,10 @@ def _judged(runner: Runner, place: Path, sources: Sequence[str], expected: list[
     return "agrees", f"{NEEDED} calls of coning and {NEEDED} of random input"
 
 
-def parts_of(said: str) -> list[Part]:
+def read_parts(said: str) -> list[Part]:
     """Return the parts of a run that a program reports.
 
-    >>> parts_of("coning 000003e9 000003e8 00c0ffee")
+    >>> read_parts("coning 000003e9 000003e8 00c0ffee")
     [Part(name='coning', calls=1001, accepted=1000, checksum=12648430)]
     """
     digits = " ".join(["([0-9a-f]{8})"] * 3)
@@ -186,7 +190,7 @@ class _ModelRun:
         self.accepted += not refused
         return result
 
-    def goes_on(self) -> bool:
+    def needs_more_calls(self) -> bool:
         """Return whether another call follows."""
         return self.accepted < NEEDED and self.calls < MOST
 
@@ -196,7 +200,7 @@ class _ModelRun:
         return Part(name, self.calls, self.accepted, zlib.crc32(octets))
 
 
-def of_model(subject: Subject, run: CallRun) -> Iterator[Part]:
+def model_parts(subject: Subject, run: CallRun) -> Iterator[Part]:
     """Yield what each part of a run must report, from the model in Python integers."""
     model = ModelEvaluator(pipeline.compile(subject.choice, MODEL, subject.settings))
     yield _coning(_ModelRun(subject, run, model))
@@ -210,7 +214,7 @@ def _coning(part: _ModelRun) -> Part:
     places = run.places
     outputs = [signal.name for signal in run.sources.function.outputs]
     last: CallVector | None = None
-    while part.goes_on():
+    while part.needs_more_calls():
         elements = list(run.rows[part.calls % len(run.rows)])
         feedback = fresh
         if last is not None:
@@ -227,7 +231,7 @@ def _random(part: _ModelRun) -> Part:
     run, draws = part.run, Draws()
     assert run.sources.fixed is not None
     words, mask = len(run.sources.fixed.residuals), (1 << run.sources.fixed.settings.word) - 1
-    while part.goes_on():
+    while part.needs_more_calls():
         row = run.rows[draws.draw() % len(run.rows)]
         shift = 2 + draws.draw() % NOISE
         elements = [
@@ -291,7 +295,7 @@ def million_steps(subject: Subject, folder: Path) -> list[Verdict]:
         except CompilerError as error:
             return "fails", str(error)
         exact = exact_states(fed_back, noisy_integers(run), len(run.rows))
-        return compared(states_of(said), [*exact], run)
+        return compared(read_states(said), [*exact], run)
 
     return [verdict(subject.name, f"error of a million steps: {runner.name}", tool, judge)]
 
@@ -304,10 +308,10 @@ def noisy_run(subject: Subject, rows: int, passes: int) -> LongRun:
     return LongRun(subject.sources, motion, passes, int(samples.high * _NOISE))
 
 
-def states_of(said: str) -> list[list[int]]:
+def read_states(said: str) -> list[list[int]]:
     """Return the states that a program reports, up to the first call that is refused.
 
-    >>> states_of("state 00000001 ffffffff")
+    >>> read_states("state 00000001 ffffffff")
     [[1, -1]]
     """
     rows = re.findall(r"^state((?: [0-9a-f]{8})+)", said, flags=re.MULTILINE)

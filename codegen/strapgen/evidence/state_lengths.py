@@ -136,22 +136,22 @@ def stretch_of(transition: Program, limit: Fraction) -> Stretch | None:
     from flint import Ordering, fmpq_mpoly_ctx
 
     whole = fmpq_mpoly_ctx.get([f"d{k}" for k in range(2 * _SPACE)], Ordering.lex)
-    if not turns_alone(_excess(transition, whole.gens(), whole)):
+    if not is_covariant(_excess(transition, whole.gens(), whole)):
         return None
     plane = fmpq_mpoly_ctx.get(["x", "y", "z"], Ordering.lex)
     x, y, z = plane.gens()
-    radius, zero = exact(_root_above(_SPACE * limit**2)), plane.constant(0)
+    radius, zero = to_rational(_root_above(_SPACE * limit**2)), plane.constant(0)
     longer, shorter = [radius * x, zero, zero], [radius * x * y, radius * x * z, zero]
     excess = [_excess(transition, increments, plane) for increments in (longer + shorter, shorter + longer)]
     lack = [[[-element for element in row] for row in matrix] for matrix in excess]
-    return Stretch(-largest(lack), largest(excess))
+    return Stretch(-eigenvalue_bound(lack), eigenvalue_bound(excess))
 
 
 def _excess(transition: Program, increments: Any, context: Any) -> Matrix:
     """Return T T' - 1 as polynomials; of a quaternion one element."""
     names = [name for signal in transition.inputs for name in signal.elements]
     (elements,) = transition.run(
-        dict(zip(names, increments, strict=True)), lambda value: context.constant(exact(value))
+        dict(zip(names, increments, strict=True)), lambda value: context.constant(to_rational(value))
     ).values()
     width = _SPACE if len(elements) == _SPACE**2 else len(elements)
     rows = [elements[k : k + width] for k in range(0, len(elements), width)]
@@ -179,14 +179,14 @@ Matrix = list[list[Any]]
 _Box = tuple[tuple[Fraction, Fraction], ...]
 
 
-def exact(number: Fraction) -> Any:
+def to_rational(number: Fraction) -> Any:
     """Return a number of FLINT."""
     from flint import fmpq
 
     return fmpq(number.numerator, number.denominator)
 
 
-def turns_alone(matrix: Matrix) -> bool:
+def is_covariant(matrix: Matrix) -> bool:
     """Tell whether rotations of all vectors turn a symmetric matrix of polynomials, and leave one element as it is."""
     gens = matrix[0][0].context().gens()
     size = len(matrix)
@@ -206,7 +206,7 @@ def turns_alone(matrix: Matrix) -> bool:
     return True
 
 
-def largest(matrices: list[Matrix]) -> Fraction:
+def eigenvalue_bound(matrices: list[Matrix]) -> Fraction:
     """Return an upper bound of 0 and of all eigenvalues for x and z from 0 to 1, y from -1 to 1, y^2 + z^2 up to 1."""
     power = min(
         (int(powers[0]) for m in matrices for row in m for p in row for powers in p.to_dict()), default=0
@@ -255,7 +255,7 @@ def _eigenvalues(matrix: Matrix, box: _Box) -> tuple[float, float]:
 
     ring = matrix[0][0].context()
     moved = [
-        exact((low + high) / 2) + exact((high - low) / 2) * gen
+        to_rational((low + high) / 2) + to_rational((high - low) / 2) * gen
         for gen, (low, high) in zip(ring.gens(), box, strict=True)
     ]
     size = len(matrix)
@@ -296,7 +296,7 @@ def _above(matrix: Any) -> float:
     """Return a number that is above all eigenvalues."""
     about = _largest_eigenvalue(matrix)
     margin = 1e-9 * abs(about) + 1e-30
-    while not _exceeds(exact(Fraction(about + margin)), matrix):
+    while not _exceeds(to_rational(Fraction(about + margin)), matrix):
         margin *= 16
     return about + margin
 

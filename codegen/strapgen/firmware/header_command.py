@@ -1,4 +1,8 @@
-"""Reads the command in the header of a generated file as data: nothing that it says is run or written."""
+"""Reads the command in the header of a generated file as data: nothing that it says is run or written.
+
+Generated files are back ends of comparisons too: `file_backend` of one function, `runner_of_file` of a described system
+or of two speeds.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +47,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
     *("algorithm", "file", "window", "target", "targets"),
-    *("sculling", "sample_hz", "cpu", "name", "prefix"),
+    *("sculling", "sample_hz", "cpu", "name", "prefix", "variant"),
     *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 
@@ -225,7 +229,7 @@ def _of_system(
     algorithms: Iterable[str],
     run_differing: bool,
 ) -> tuple[RunsSamples, Settings | None]:
-    from strapgen.navigation.systems.compiled_system import CompiledSystem
+    from strapgen.navigation.systems.system_runner import CompiledSystem
     from strapgen.run.backends import BACKENDS
 
     fit, sources = command.system(algorithms)
@@ -248,9 +252,7 @@ def _of_loops(
     run_differing: bool,
 ) -> tuple[RunsSamples, Settings | None]:
     from strapgen.navigation.two_speed import two_speed_sources
-    from strapgen.navigation.two_speed.loop_files import LoopFiles
-    from strapgen.navigation.two_speed.loops import LoopSources
-    from strapgen.navigation.two_speed.two_speed_runner import TwoSpeed
+    from strapgen.navigation.two_speed.two_speed_runner import LoopFiles, LoopSources, TwoSpeed
 
     request, system = command.two_speed(), description.system
     kernels = two_speed_sources.kernels(request.algorithm, request.sculling)

@@ -1,4 +1,4 @@
-"""Returns the files of a project that builds, runs and tests generated C on any machine with CMake."""
+"""The files of a project that builds, runs and tests generated C on any machine with CMake."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.sources import Sources
-from strapgen.navigation.two_speed.two_speed_c import Wiring
+from strapgen.navigation.two_speed.two_speed_sources import Wiring
 from strapgen.run.kernel_sources import StepSources
 from strapgen.targets.c_numbers import numbers_of, types_of
 from strapgen.targets.contract import options

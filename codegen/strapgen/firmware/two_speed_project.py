@@ -21,8 +21,8 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.navigation.two_speed.loops import Cycles, Loops, LoopSources
-from strapgen.navigation.two_speed.two_speed_c import wiring
+from strapgen.navigation.two_speed.two_speed_runner import Cycles, Loops, LoopSources
+from strapgen.navigation.two_speed.two_speed_sources import wiring
 from strapgen.run.compiled_code import ModelEvaluator
 from strapgen.run.evaluators import Array
 from strapgen.run.kernel_sources import sources_of_program

@@ -1,6 +1,7 @@
-"""Prints test vectors of a generated C function: a header with the table, the table as CSV, and a test in C99.
+"""Prints test vectors of generated C: calls of a function, or a run of an algorithm in two speeds.
 
-The test prints how many vectors passed and how many failed. It needs `printf` alone, and runs on any processor.
+A header has the table, a file of CSV has it too, and a test in C99 prints how many vectors passed and how many failed.
+It needs `printf` alone, and runs on any processor.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.ir.sources import Sources
-from strapgen.navigation.two_speed.two_speed_c import LOOPS, Wiring
+from strapgen.navigation.two_speed.two_speed_sources import LOOPS, Wiring
 from strapgen.targets.c_numbers import NumberText, numbers_of, types_of
 from strapgen.targets.printer import fill_arguments
 from strapgen.targets.rendering import render

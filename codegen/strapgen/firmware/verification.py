@@ -1,4 +1,4 @@
-"""Holds a generated C file to what its header says: its text, and what the compiled file itself computes."""
+"""Holds generated C files to what their headers say: their text, and what the compiled files themselves compute."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def _derived(
         for assignment in program.body:
             _assign(context, assignment)
         for result in program.outputs:
-            context.quantities.results[result.signal.name] = _held_whole(context, result)
+            context.quantities.results[result.signal.name] = _output_quantities(context, result)
     if program.transition is not None:
         context.quantities.results[program.transition.signal.name] = tuple(
             node.name if isinstance(node, Reference) else node.value
@@ -137,7 +137,7 @@ def _assign(context: DerivationContext, assignment: Assignment) -> None:
         store(context, name, terms_of(context, node, name), assignment.meaning, whole=name in context.outputs)
 
 
-def _held_whole(context: DerivationContext, result: Result) -> tuple[Operand, ...]:
+def _output_quantities(context: DerivationContext, result: Result) -> tuple[Operand, ...]:
     """Return the quantities of the elements of an output: each has one to itself, stored whole."""
     names: list[Operand] = []
     for element, node in zip(result.signal.elements, result.nodes, strict=True):

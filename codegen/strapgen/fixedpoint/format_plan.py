@@ -128,7 +128,7 @@ def _result_fraction(
     """Return the fraction bits that the elements of a result share."""
     signal, word = result.signal, settings.word
     is_output = result in program.outputs
-    text = stated_format(settings, signal) if is_output else settings.formats.get(signal.name)
+    text = _stated_format(settings, signal) if is_output else settings.formats.get(signal.name)
     if text is not None:
         return Format.parse(text, word).fraction
     carried = carried_input(program, inputs, signal) if is_output else None
@@ -202,7 +202,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
         if signal in counted(program) and settings.input_bits is not None:
             stated.append(_counted(signal, largest, settings, settings.input_bits))
             continue
-        text = stated_format(settings, signal)
+        text = _stated_format(settings, signal)
         if text is not None:
             fraction = Format.parse(text, word).fraction
             if largest * Fraction(2) ** fraction < 1:
@@ -246,7 +246,7 @@ def ranges_of_copies(program: Program, settings: Settings, copied: Mapping[str, 
     return {state: accepted[name] for state, name in copied.items() if name in accepted}
 
 
-def stated_format(settings: Settings, signal: Signal) -> str | None:
+def _stated_format(settings: Settings, signal: Signal) -> str | None:
     """Return the format that the user states for an argument, if any; "state" stands for every attitude."""
     if settings.state and signal.constraint:
         return str(Format(settings.word, settings.word - 1))

@@ -183,7 +183,7 @@ class Aligned:
 
     def fits(self, word: int, values: Mapping[str, Value], added: int = 0) -> bool:
         """Tell whether every term, and every partial sum with so much added, fits into a wide number."""
-        return self.peak + added <= largest_wide(word) and terms_fit(self.terms, word, values)
+        return self.peak + added <= largest_wide(word) and _terms_fit(self.terms, word, values)
 
 
 def largest_wide(word: int) -> int:
@@ -247,7 +247,7 @@ def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str,
     return Aligned(tuple(shifted), peak, on_grid + up(error) if error else on_grid)
 
 
-def terms_fit(terms: Iterable[Term], word: int, values: Mapping[str, Value]) -> bool:
+def _terms_fit(terms: Iterable[Term], word: int, values: Mapping[str, Value]) -> bool:
     """Tell whether every term fits into a wide number."""
     room = largest_wide(word)
     return all(_bound(term, values) <= room for term in terms)

@@ -9,11 +9,11 @@ from typing import Any
 import sympy as sp
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.kernel_info import AttitudeStep, KernelInfo
+from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import counted_shape, notebook_latex, short_repr
 from strapgen.ir.program import RESOLUTION
 from strapgen.ir.renamed import current, renamed
-from strapgen.ir.signals import Signal
+from strapgen.ir.signals import Signal, after
 from strapgen.kernel import reading
 from strapgen.kernel.algebra import evaluate
 
@@ -258,6 +258,8 @@ class KernelBuilder:
         self.stages: list[Stage] = []
         self.outputs: list[Stage] = []
         self.unknowns: dict[sp.Symbol, sp.Symbol] = {}
+        self.states: dict[str, str] = {}
+        self.reset: set[str] = set()
 
     def parameter(self, *names: str | sp.Symbol) -> Any:
         """Declare coefficients that are not known yet, by name or as symbols, and return their symbols.
@@ -300,6 +302,36 @@ class KernelBuilder:
         self.outputs.append(Stage(signal, _expressions(expressions)))
         return symbols(signal)
 
+    def feedback(
+        self, signal: Signal, expressions: Iterable[Any], output: Signal | None = None, reset: bool = False
+    ) -> sp.Matrix:
+        """Declare the output that takes the place of an input in the next call, and return its symbols.
+
+        Parameters
+        ----------
+        signal : Signal
+            The input.
+        expressions : iterable of Expr
+            Its elements in the next call.
+        output : Signal, optional
+            By default the input's signal with "next_" before its names.
+        reset : bool, optional
+            Whether the input is zero again at the start of each cycle of a slower loop.
+
+        Examples
+        --------
+        >>> build = KernelBuilder()
+        >>> x = build.scalar(Signal.scalar("x"))
+        >>> _ = build.feedback(Signal.scalar("x"), [x / 2])
+        >>> build.kernel("lag", "a lag", "this example").recursion.states
+        (('x', 'next_x'),)
+        """
+        output = output or after(signal)
+        self.states[signal.name] = output.name
+        if reset:
+            self.reset.add(signal.name)
+        return self.output(output, expressions)
+
     def kernel(self, name: str, title: str, source: str, **rest: Any) -> Kernel:
         """Return the kernel; `rest` are further fields of `Kernel`.
 
@@ -311,6 +343,9 @@ class KernelBuilder:
             If its `attitude_step` states other numbers.
         """
         rest = current(rest, _RENAMED)
+        if self.states:
+            retained = tuple(state for state in self.states if state not in self.reset)
+            rest.setdefault("recursion", Recursion(tuple(self.states.items()), retained))
         step = rest.get("attitude_step")
         if isinstance(step, AttitudeStep):
             stated = {what: rest.pop(what) for what in ("previous", "ahead") if rest.get(what)}

@@ -17,7 +17,7 @@ from strapgen.kernel.kernel import Kernel, Stage, rationalized
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
 from strapgen.lowering.passes import PASSES, cost, optimize
-from strapgen.lowering.passes.rewriting import rewritten
+from strapgen.lowering.trees import rewritten
 
 __all__ = ["PASSES", "candidates", "lower"]
 

@@ -1,12 +1,14 @@
 """The gate turns SymPy expressions into the nodes of a program; SymPy goes no further.
 
-A sum ends with its constant, so that the constant is rounded once. Terms with the same coefficient are summed before
-they are multiplied by it, and negative terms are subtracted.
+Common subexpressions of a kernel are named across all its stages and outputs. A sum ends with its constant, so that the
+constant is rounded once. Terms with the same coefficient are summed before they are multiplied by it, and negative
+terms are subtracted.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import count
 
@@ -17,9 +19,7 @@ from strapgen.ir.program import Assignment, Constant, Node, Operation, Program, 
 from strapgen.ir.signals import Signal
 from strapgen.kernel.algebra import Direction, Wrapped
 from strapgen.kernel.kernel import Kernel
-from strapgen.lowering.arithmetic import chain, gathered, plain, with_constant
-from strapgen.lowering.names import FACTOR
-from strapgen.lowering.share import share
+from strapgen.lowering.trees import FACTOR, SHARED, chain, gathered, plain, with_constant
 
 _FUNCTIONS = {
     sp.sin: "sin",
@@ -168,3 +168,60 @@ class _Writer:
         else:
             raise NotImplementedError(f"no operation for the condition {condition}")
         return Operation("select", (test, yes, no))
+
+
+@dataclass(frozen=True)
+class _Definition:
+    """One line of a computation: ``symbol = expression``."""
+
+    symbol: sp.Symbol
+    expression: sp.Expr
+    meaning: str = ""
+
+
+def share(kernel: Kernel, common: bool = True) -> tuple[list[_Definition], dict[sp.Symbol, sp.Expr]]:
+    """Name the common subexpressions of a kernel, unless its formulas shall stay as they are.
+
+    Returns the definitions of stages, outputs and common subexpressions, each before its first use, and the elements
+    that need none: they are numbers, or other symbols, inside the kernel possibly negated.
+
+    Elements are visited in the order of their names, so that two kernels that differ only in the order in
+    which they store a state get the same arithmetic.
+    """
+    values: dict[sp.Symbol, sp.Expr] = {}
+    definitions: list[_Definition] = []
+    for stage in (*kernel.stages, *kernel.outputs):
+        meaning = stage.signal.meaning
+        result = stage in kernel.outputs or stage.signal.name == kernel.transition
+        for name, expression in sorted(zip(stage.signal.elements, stage.expressions, strict=True)):
+            symbol, expression = sp.Symbol(name, real=True), expression.xreplace(values)
+            if expression.is_Symbol or expression.is_Rational or (not result and (-expression).is_Symbol):
+                values[symbol] = expression
+            else:
+                definitions.append(_Definition(symbol, expression, meaning))
+                meaning = ""
+    if not common:
+        return definitions, values
+    elements = (name for signal in kernel.signals for name in signal.elements)
+    excluded = [sp.Symbol(name, real=True) for name in elements]
+    names = sp.numbered_symbols(SHARED, start=1, exclude=excluded, real=True)
+    common_parts, reduced = sp.cse([d.expression for d in definitions], symbols=names, order="canonical")
+    # A program cannot assign a condition to a name, so each condition goes back to where it is used.
+    conditions = {symbol: expression for symbol, expression in common_parts if expression.is_Relational}
+    pending = {s: e.xreplace(conditions) for s, e in common_parts if s not in conditions}
+    reduced = [expression.xreplace(conditions) for expression in reduced]
+    ordered: list[_Definition] = []
+
+    def needed(expression: sp.Expr) -> Iterator[_Definition]:
+        for symbol in sorted(
+            expression.free_symbols & pending.keys(), key=lambda s: int(s.name[len(SHARED) :])
+        ):
+            if symbol in pending:
+                definition = pending.pop(symbol)
+                yield from needed(definition)
+                yield _Definition(symbol, definition)
+
+    for definition, expression in zip(definitions, reduced, strict=True):
+        ordered.extend(needed(expression))
+        ordered.append(_Definition(definition.symbol, expression, definition.meaning))
+    return ordered, values

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from strapgen.lab.runs_report import ANGLES, AXES
-from strapgen.navigation.courses import course_plot, course_report
-from strapgen.navigation.courses.courses import Course
+from strapgen.navigation.courses import Course, course_figure, course_table
 from strapgen.results.display.frames import VECTOR, Variables, table, variables
 from strapgen.results.display.objects import figure
 from strapgen.results.table import TextTable
@@ -16,7 +15,7 @@ from strapgen.results.table import TextTable
 
 @table.register
 def _(course: Course) -> TextTable:
-    return course_report.course_table(course)
+    return course_table(course)
 
 
 @variables.register
@@ -32,4 +31,4 @@ def _(course: Course) -> tuple[Variables, dict[str, Any]]:
 
 @figure.register
 def _(course: Course, title: str) -> Any:
-    return course_plot.course_figure(course, title)
+    return course_figure(course, title)

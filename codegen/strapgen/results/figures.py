@@ -1,4 +1,7 @@
-"""Common parts of all plots: matplotlib without a display, kinds of image files, the look of axes and legends."""
+"""Common parts of all plots: matplotlib without a display, kinds of image files, axes, legends, and colours.
+
+In SVG each colour has a counterpart for dark pages.
+"""
 
 from __future__ import annotations
 

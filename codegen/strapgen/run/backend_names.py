@@ -16,32 +16,17 @@ if TYPE_CHECKING:
 
 
 class Entry(NamedTuple):
-    """A back end of the table.
+    """A back end of the table."""
 
-    Parameters
-    ----------
-    title : str
-        One line that says what it is.
-    target : str
-        The target whose text it runs; a name that is no target where it runs the program itself.
-    evaluator : str
-        The class that runs a kernel, and the loop over its steps, "module:name".
-    word : int or None
-        Bits of a word in fixed point; None where the user chooses them, or in floating point.
-    slow : bool
-        Whether Python executes every single operation. A run on all back ends leaves such a one out by default.
-    many_digits : bool
-        Whether it computes in so many digits that rounding cannot be seen; the class then has methods that return them.
-    by_default : bool
-        Whether a run on all back ends takes it by default; not those that compute the bits of another back end.
-    """
-
-    title: str
-    target: str
-    evaluator: str
-    word: int | None = None
+    title: str  # one line that says what it is
+    target: str  # the target whose text it runs; a name that is no target where it runs the program itself
+    evaluator: str  # the class that runs a kernel, and the loop over its steps, "module:name"
+    word: int | None = None  # bits in fixed point; None where the user chooses them, or in floating point
+    #: Whether Python executes every single operation. A run on all back ends leaves such a one out by default.
     slow: bool = False
+    #: Whether it computes in so many digits that rounding cannot be seen; the class has methods that return them.
     many_digits: bool = False
+    #: Whether a run on all back ends takes it by default; not those that compute the bits of another back end.
     by_default: bool = True
 
     @property
@@ -125,20 +110,16 @@ BACKENDS = _Backends("backends", Entry)
 DEFAULT_BACKENDS = tuple(name for name, entry in BACKENDS.own.items() if entry.by_default and not entry.slow)
 
 
-def _of_target(target: str) -> Entry:
+def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
+    """Return the class that runs a kernel for a target."""
     for entry in BACKENDS.values():
         if entry.target == target:
-            return entry
+            loaded: Callable[[Sources], Evaluator] = registration.load(entry.evaluator)
+            return loaded
     runnable = ", ".join(
         dict.fromkeys(e.target for e in BACKENDS.own.values() if e.target in targets.BUILT_IN)
     )
     raise InputError(f"no back end runs code for target {target}; those for these targets run: {runnable}")
-
-
-def evaluator_class(target: str) -> Callable[[Sources], Evaluator]:
-    """Return the class that runs a kernel for a target."""
-    loaded: Callable[[Sources], Evaluator] = registration.load(_of_target(target).evaluator)
-    return loaded
 
 
 def of_sources(sources: Sources) -> Evaluator:

@@ -56,12 +56,6 @@ def number(value: Fraction) -> Any:
 class Interpreter:
     """Runs a program on numbers of mpmath, whose precision the caller sets.
 
-    Parameters
-    ----------
-    program : Program
-
-    Examples
-    --------
     >>> from strapgen import derive, lower
     >>> with mpmath.workdps(DIGITS):
     ...     state = Interpreter(lower(derive("euler-normalize")))([mpmath.mpf(x) for x in (1, 2, 4, 2)])
@@ -96,16 +90,9 @@ class Interpreter:
 
 
 def states(program: Program, increments: Iterable[Sequence[Any]], initial: Sequence[Any]) -> list[list[Any]]:
-    """Return all states of a run in the digits that mpmath is set to, the initial one first.
+    """Return all states of a run of an attitude step in the digits that mpmath is set to, the initial one first.
 
-    Parameters
-    ----------
-    program : Program
-        An attitude step.
-    increments : iterable of sequence of mpf
-        Angle increments of each step, row-major.
-    initial : sequence of mpf
-        The first state, row-major.
+    Angle increments of each step, and states, are row-major.
     """
     return list(itertools.accumulate(increments, Interpreter(program), initial=list(initial)))
 

@@ -91,7 +91,7 @@ class NumpyEvaluator(Evaluator):
         history[:, 0] = state = loop.state.reshape(runs, *shape)
         assert self.sources.attitude_step is not None, "only an attitude step has a product"
         identity = np.array([float(x) for x in self.sources.attitude_step.identity])
-        scan = BlockedScan(self._transition, loop.product._product, identity)
+        scan = _BlockedScan(self._transition, loop.product._product, identity)
         for first, length, segments in _spans(steps, loop.restore_every, max(1, _SPAN // max(runs, 1))):
             span = samples[:, first : first + length * segments]
             complete = loop.restore_every and (first + length) % loop.restore_every == 0
@@ -114,7 +114,7 @@ class NumpyEvaluator(Evaluator):
 
 
 def _run_span(
-    scan: BlockedScan,
+    scan: _BlockedScan,
     product: Callable[..., Array],
     restore: Callable[..., Array] | None,
     samples: Array,
@@ -187,7 +187,7 @@ _WIDTH = 8000
 _PASS = 12_000
 
 
-class BlockedScan:
+class _BlockedScan:
     """Turns the increments of many steps into their states, by the transition of a step and the product of two.
 
     It holds the memory in which it works; calls in several threads need one scan each.

@@ -106,7 +106,7 @@ def _power(fraction: int, unit: str) -> str:
     return f"2^{-fraction}" if unit == "1" else f"2^{-fraction} {unit}"
 
 
-def accumulation_text(accumulation: RoundingAccumulation, program: Program, state: str = "") -> str:
+def _accumulation_text(accumulation: RoundingAccumulation, program: Program, state: str = "") -> str:
     """Return the bound of a run of N steps in words; `state` names a state that saturates."""
     what = "in the length of a row" if len(program.inputs[0].shape) == 2 else "in the length of the state"
     growth = accumulation.growth - 1
@@ -221,7 +221,7 @@ def run_paragraphs(interface: Interface, program: Program) -> list[str]:
     if interface.accumulation is not None:
         return [
             "Over a run of N steps without orthonormalization the distance from exact arithmetic on the same "
-            f"increments is at most {accumulation_text(interface.accumulation, program, interface.settings.state)}."
+            f"increments is at most {_accumulation_text(interface.accumulation, program, interface.settings.state)}."
         ]
     return []
 

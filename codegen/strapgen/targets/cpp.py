@@ -53,7 +53,7 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "check": CHECK,
         "constants": constants(macros_of_program(program, name, printer), printer.real.name),
         "digits": 53 if printer.real.bytes == 8 else 24,
-        "result": result_of(name, outputs),
+        "result": _result_of(name, outputs),
         "outputs": outputs,
         "arguments_text": ", ".join(
             f"const std::array<{printer.real.name}, {s.size}> &{s.name}"
@@ -186,7 +186,7 @@ def standard(kind: str) -> str:
     return f"std::{kind}" if kind.endswith("_t") else kind
 
 
-def result_of(name: str, outputs: Sequence[tuple[str, str]]) -> str:
+def _result_of(name: str, outputs: Sequence[tuple[str, str]]) -> str:
     """Return the return type of a function: that of its output, or a structure of several (type, name)."""
     return outputs[0][0] if len(outputs) == 1 else f"{name}_result"
 

@@ -187,6 +187,7 @@ class Naming:
 
     name: str | None = None  # the whole name
     prefix: str | None = None  # in front of the target's name
+    variant: str | None = None  # of strapgen.toml, which the header names
 
     def __post_init__(self) -> None:
         if self.name is not None and self.prefix is not None:
@@ -194,6 +195,10 @@ class Naming:
         if self.option and not re.fullmatch(r"[A-Za-z]\w*", self._text, re.ASCII):
             raise InputError(
                 f"{self.option} is {self._text!r}; letters, digits and underscores are needed, a letter first"
+            )
+        if self.variant is not None and not re.fullmatch(r"[A-Za-z][\w-]*", self.variant, re.ASCII):
+            raise InputError(
+                f"--variant is {self.variant!r}; letters, digits, - and _ are needed, a letter first"
             )
 
     @property
@@ -207,10 +212,13 @@ class Naming:
 
     def of(self, program: _P) -> _P:
         """Return a program with the name."""
+        if isinstance(program, FixedProgram):
+            return program if self == UNNAMED else replace(program, program=self.of(program.program))
+        if self.variant is not None:
+            arguments = f"{program.arguments} --variant {self.variant}"
+            program = replace(program, info=replace(program.info, arguments=arguments))
         if not self.option:
             return program
-        if isinstance(program, FixedProgram):
-            return replace(program, program=self.of(program.program))
         chosen = replace(
             program,
             function=self._text if self.prefix is None else f"{self._text}{{}}",

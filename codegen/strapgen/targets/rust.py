@@ -81,8 +81,8 @@ def _files(program: Program, name: str, target: str, rounding: RoundingBounds) -
         "check": CHECK,
         "constants": constants(macros_of_program(program, name, printer), printer.real.name),
         "rounding": rounding_text(rounding, program, flag=""),
-        "structure": structure_name(name),
-        "result": structure_name(name) if several else outputs[0][0],
+        "structure": _structure_name(name),
+        "result": _structure_name(name) if several else outputs[0][0],
         "outputs": outputs,
         "rust_arguments": ", ".join(
             f"{s.name}: &{array(kind, s.size)}" if s.shape else f"{s.name}: {kind}" for s in program.inputs
@@ -176,7 +176,7 @@ def _fixed_files(fixed: FixedProgram, name: str, target: str) -> dict[str, str]:
     parameters = [f"{printer.memory(s)}: &{array(kind, size)}" for kind, size, s in inputs]
     if interface.residuals:
         parameters.append(f"residuals: &mut {array(printer.word.residual, len(interface.residuals))}")
-    structure = structure_name(name)
+    structure = _structure_name(name)
     result = structure if len(outputs) > 1 else array(*outputs[0][:2])
     values = c_fixed.values_of(fixed, name, target, printer)
     code = dict(values["code"])  # type: ignore[call-overload]
@@ -245,10 +245,10 @@ def module_name(name: str) -> str:
     return name if _allows(name) else f"{name}_Kernel"
 
 
-def structure_name(name: str) -> str:
+def _structure_name(name: str) -> str:
     """Return the name of the structure with the outputs of a function.
 
-    >>> structure_name("imu_compensate")
+    >>> _structure_name("imu_compensate")
     'ImuCompensateOutputs'
     """
     return "".join(word[:1].upper() + word[1:] for word in name.split("_")) + "Outputs"

@@ -23,9 +23,9 @@ import npm
 
 import strapgen
 from strapgen import pipeline
-from strapgen.catalogue.method_names import ALGORITHMS, INTEGRATORS, METHODS
 from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS
 from strapgen.catalogue.methods.tableaux import TITLES
+from strapgen.catalogue.names import ALGORITHMS, INTEGRATORS, METHODS
 from strapgen.fixedpoint.floating import proved, rounding_bounds
 from strapgen.ir.exceptions import InputError
 from strapgen.storage import cache, resources

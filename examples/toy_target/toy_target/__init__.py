@@ -1,4 +1,4 @@
-"""A target of one's own: Python on lists of numbers, without numpy, as small boards run it."""
+"""A target of your own: Python on lists of numbers, without numpy, as small boards run it."""
 
 from __future__ import annotations
 

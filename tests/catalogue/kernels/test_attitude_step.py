@@ -7,16 +7,17 @@ from fractions import Fraction
 from itertools import pairwise
 from random import Random
 
+import numpy as np
 import pytest
 import sympy as sp
 
+import strapgen
 from strapgen import catalogue, derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS
-from strapgen.catalogue.methods.rate_fit import step_order
-from strapgen.catalogue.methods.runge_kutta import method
-from strapgen.catalogue.methods.samples import increments_signal, label, labels, turns_signal
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX, read
+from strapgen.catalogue.methods.method import increments_signal, label, labels, turns_signal
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read
+from strapgen.catalogue.methods.windows import WINDOWS
+from strapgen.design.commit_late.late_filters import LateFilters
 from strapgen.ir.kernel_info import Order
 from strapgen.kernel.kernel import Kernel
 
@@ -141,19 +142,6 @@ def test_an_order_in_words(order, text, limited):
 )
 def test_orders_of_steps(method, count, previous, expected):
     assert derive("euler", method, count, previous=previous).order == expected
-
-
-def test_the_order_of_a_step_is_that_of_the_weaker_part():
-    for count in range(1, MOST_INCREMENTS + 1):
-        for previous, ahead in ((0, 0), (0, 1), (1, 0), (1, 1), (3, 0)):
-            order = method(TABLEAUX["rk3"]).step_order(count, previous, ahead)
-            assert order.step == min(3, step_order(count, previous, ahead))
-
-
-def test_a_sixth_order_method_on_three_increments_is_told_to_be_of_fourth():
-    assert str(derive("euler", "butcher6", 3).order) == (
-        "method order 6, rate extraction order 3: the step is of order 4"
-    )
 
 
 @pytest.mark.long
@@ -284,29 +272,28 @@ def test_with_previous_increments_a_step_is_that_of_the_rates_they_fit(algorithm
 
 
 @pytest.mark.long
-@ALGORITHM
-def test_previous_increments_are_of_use_only_where_the_rate_changes(algorithm):
-    # On a rate of degree K - 1 the step without them is the same step.
-    rate = [[1, -2, 3], [2, 5, -1]]
-    ring, h = sp.ring("h", sp.QQ)
+@pytest.mark.parametrize("name", ["dcm", "euler"])
+@pytest.mark.parametrize("previous", [0, 3, 5, 6])
+def test_filters_before_it_give_the_step_of_each_window_of_a_family(name, previous):
+    family = WINDOWS["window-3-3"]
+    window = family.one_sided_with(6 - previous)
+    backend = strapgen.backend(name, window.name)
+    samples = np.random.default_rng(previous).uniform(-0.1, 0.1, (20, 7, 3))
+    rows = np.array(LateFilters(family, calm_start=True).sets[previous], float)
+    coefficients = np.moveaxis(rows @ samples, -2, 0)
+    state = backend.step(backend.identity, samples[0])
+    ours = strapgen.evaluator(f"{name}-legendre-4")(state, *coefficients)
+    theirs = np.array([backend.step(state, each) for each in samples])
+    # Some hundred operations on numbers up to 1.
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=3e-15)
 
-    def increments(previous: int, ahead: int) -> list:
-        times = [sp.Rational(k, 2) for k in range(-previous, 3 + ahead)]
-        return [
-            sum(
-                (
-                    ring(sp.Rational(c[axis], k + 1) * (end ** (k + 1) - begin ** (k + 1))) * h ** (k + 1)
-                    for k, c in enumerate(rate)
-                ),
-                ring(0),
-            )
-            for begin, end in pairwise(times)
-            for axis in range(3)
-        ]
 
-    results = []
-    for previous, ahead in ((0, 0), (1, 0), (0, 1), (2, 2)):
-        step = derive(algorithm, "rk4", 2, previous=previous, ahead=ahead)
-        state = [ring(k + 1) for k in range(step.inputs[0].size)]
-        results.append(step.expand(values_of(step, state, increments(previous, ahead)))["next"])
-    assert all(result == results[0] for result in results)
+@pytest.mark.long
+def test_the_exact_rotation_is_that_of_the_window():
+    family = WINDOWS["window-9-9"]
+    backend = strapgen.backend("euler", family.name)
+    samples = np.random.default_rng(9).uniform(-0.1, 0.1, (5, 19, 3))
+    coefficients = np.moveaxis(np.array(family.filters, float) @ samples, -2, 0)
+    ours = strapgen.evaluator("euler-legendre-exact-5")(backend.identity, *coefficients)
+    theirs = np.array([backend.step(backend.identity, each) for each in samples])
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=3e-15)

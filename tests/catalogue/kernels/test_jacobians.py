@@ -199,11 +199,3 @@ def test_jacobians_of_vectors_are_the_limits_of_differences(name, rng):
                 # Both are rounded to double, once.
                 assert np.abs(next(derived) - expected).max() <= 2.0**-52 * np.abs(expected).max()
     assert next(derived, None) is None
-
-
-def test_numpy_computes_those_of_a_vector(rng):
-    choice = choose("sculling-jacobian", *VECTORS["sculling"][:2])
-    inputs = [rng.normal(size=signal.shape) * 0.1 for signal in kernel(choice).inputs]
-    computed, expected = strapgen.evaluator(choice)(*inputs), in_many_digits(kernel(choice), inputs)
-    for one, other in zip(computed, expected, strict=True):
-        assert np.abs(one - other).max() <= 1e-15

@@ -13,20 +13,18 @@ import numpy as np
 import pytest
 import sympy as sp
 from derived import program as lowered
-from peano_baker import generic_rate, local_error
-from tolerances import one_call
+from derived import turns
+from scipy.spatial.transform import Rotation
 
 import strapgen
-from strapgen import derive
-from strapgen.catalogue import MOST_INCREMENTS, Choice, choose
+from strapgen import choose, derive
+from strapgen.catalogue import MOST_INCREMENTS, Choice
 from strapgen.catalogue.methods import coning_coefficients
-from strapgen.catalogue.methods import rotation_series as series
-from strapgen.catalogue.methods.coning import method, sample_terms
+from strapgen.catalogue.methods.coning import by_form, sample_terms
 from strapgen.catalogue.methods.coning_coefficients import FORMS, design
-from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.exceptions import InputError
 from strapgen.kernel.algebra import cross_elements
 from strapgen.run import exact
-from strapgen.run.backends import BACKENDS, evaluator
 
 #: Every number of samples, and of those kept.
 ALL = [(n, p) for n in range(1, MOST_INCREMENTS + 1) for p in range(4)]
@@ -112,26 +110,6 @@ def test_the_residual_is_that_of_coning(samples, previous, form):
     assert sp.expand((stated - computed + true).rewrite(sp.exp)).expand() == 0
 
 
-@pytest.mark.parametrize(
-    ("samples", "previous"), [pytest.param(n, p, marks=pytest.mark.long if n + p > 3 else ()) for n, p in FEW]
-)
-def test_the_series_is_that_of_the_expression(samples, previous):
-    residual = design(samples, previous, "uncompressed").residual()
-    omega, T, alpha = sp.symbols("omega T alpha")
-    power, c = residual.leading
-
-    def sine(x: sp.Expr) -> sp.Expr:
-        """Return the series of a sine beyond the power that is looked at."""
-        return sp.Add(*((-1) ** k * x ** (2 * k + 1) / sp.factorial(2 * k + 1) for k in range(power)))
-
-    expansion = sp.expand(sp.sympify(residual.expression).subs(omega, 1).replace(sp.sin, sine))
-    leading = sp.sympify(residual.leading_expression)
-    assert sp.Add(*(expansion.coeff(T, k) * T**k for k in range(-1, power))) == leading.subs(omega, 1)
-    assert leading == sp.Rational(c.numerator, c.denominator * samples) * alpha**2 * omega**power * T ** (
-        power - 1
-    )
-
-
 def polynomials(count: int) -> list[list[Fraction]]:
     random = Random(1984)
     return [[Fraction(random.randint(-9, 9), random.randint(1, 5)) for _ in range(count)] for _ in range(3)]
@@ -201,35 +179,19 @@ def test_combined_coefficients_are_the_nearest_to_uncompressed_ones(samples, pre
 
 @MANY
 def test_orders_of_the_forms(many):
-    assert [method("compressed").step_order(n, 0).step for n in range(1, 9)] == [
+    assert [by_form("compressed").step_order(n, 0).step for n in range(1, 9)] == [
         2,
         4,
         *[3] * 6,
     ]
-    assert [method("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
-    combined = method("combined")
+    assert [by_form("uncompressed").step_order(n, 0).step for n in range(1, 9)] == [2, *[4] * 7]
+    combined = by_form("combined")
     alone = [n for n, previous in many if previous == 0]
     assert [combined.step_order(n, 0).step for n in alone] == [2, 4, 4, *[6] * (len(alone) - 3)]
     assert [combined.step_order(1, p).step for p in range(4)] == [2, 3, 4, 5]
-    polynomial = method("polynomial")
+    polynomial = by_form("polynomial")
     for samples, previous in many:
         assert polynomial.step_order(samples, previous) == combined.step_order(samples, previous)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("form", "count", "previous"),
-    [
-        *(("compressed", n, p) for n, p in FEW),
-        *(("uncompressed", n, p) for n, p in FEW),
-        *(("combined", n, p) for n, p in [*FEW, (1, 3), (6, 0), (7, 0)]),
-        *(("polynomial", n, p) for n, p in [(3, 0), (4, 0), (7, 0)]),
-    ],
-)
-def test_the_local_error_is_one_order_above_the_stated_one(form, count, previous):
-    kernel = derive("euler", f"coning-{form}", count, previous=previous)
-    order = kernel.order.step
-    assert local_error(kernel, generic_rate(count + previous + 1), order + 2) == order + 1
 
 
 # Kernels
@@ -263,33 +225,6 @@ def test_a_kernel_is_its_design(form, count, previous):
         second = [x + c * y for x, y in zip(second, cross_elements(d[a], d[b]), strict=True)]
     assert coefficient(phi, 2) == second
     assert max(x.degree() for x in phi) == (4 if form == "combined" else 2)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("method", "count", "previous"),
-    [("combined", 2, 0), ("combined", 4, 0), ("combined", 2, 2), ("polynomial", 3, 0), ("polynomial", 1, 2)]
-    + [pytest.param("polynomial", n, 0, marks=pytest.mark.long) for n in (5, 6)],
-)
-def test_terms_are_those_of_the_polynomial_through_the_samples(method, count, previous):
-    d, phi = scaled(method, count, previous)
-    fit = strapgen.catalogue.methods.rate_fit.from_increments(count, previous)
-    rate = [
-        [
-            sum(series.fraction(w) * v[axis] for w, v in zip(fit.taylor(power), d, strict=True))
-            for axis in range(3)
-        ]
-        for power in range(count + previous)
-    ]
-    for order, words in enumerate(series.terms(count + previous, 4), 1):
-        if order > 2 or method == "polynomial":
-            total = [Fraction(0)] * 3
-            for word, c in words.items():
-                nested = rate[word[-1]]
-                for letter in reversed(word[:-1]):
-                    nested = cross_elements(rate[letter], nested)
-                total = [x + c * y for x, y in zip(total, nested, strict=True)]
-            assert coefficient(phi, order) == total
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -328,19 +263,6 @@ def test_sculling_is_the_dual_of_coning(form, count, previous):
     assert [ring(x) for x in found] == [ring(x.coeff(e)) for x in total]
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (3, 0), (2, 2)])
-@pytest.mark.parametrize("method", [*FORMS, "polynomial"])
-def test_about_one_axis_the_rotation_vector_is_the_sum_of_the_increments(method, count, previous):
-    # Whatever the sizes are, those before the step too: no product of second, third or fourth order is left.
-    kernel = derive("rotation-vector", f"coning-{method}", count, previous=previous)
-    ring, *axis = sp.ring("x y z", sp.QQ)
-    random = Random(19)
-    sizes = [sp.QQ(random.randint(-9, 9), random.randint(1, 5)) for _ in range(count + previous)]
-    turns = [size * x for size in sizes for x in axis]
-    (phi,) = kernel.expand(dict(zip(kernel.inputs[0].elements, turns, strict=True))).values()
-    assert [ring(x) for x in phi] == [sum(sizes[previous:]) * x for x in axis]
-
-
 def test_a_method_without_rotation_vector_is_refused():
     from strapgen.catalogue.kernels.attitude_step import rotation_vector
     from strapgen.catalogue.methods.runge_kutta import method
@@ -348,39 +270,6 @@ def test_a_method_without_rotation_vector_is_refused():
 
     with pytest.raises(ValueError, match="rk4 has no rotation vector"):
         rotation_vector(method(TABLEAUX["rk4"]), 2)
-
-
-KERNELS = [
-    ("rotation-vector", "coning-compressed", 4, 0),
-    ("rotation-vector", "coning-uncompressed", 2, 1),
-    ("sculling", "coning-compressed", 3, 0),
-    pytest.param("rotation-vector", "coning-polynomial", 6, 0, marks=pytest.mark.long),
-    ("rotation-vector", "coning-combined", 3, 0),
-    pytest.param("rotation-vector", "coning-combined", 5, 0, marks=pytest.mark.long),
-    pytest.param("sculling", "coning-combined", 3, 1, marks=pytest.mark.long),
-    pytest.param("rotation-vector", "magnus4", 2, 0, marks=pytest.mark.long),
-]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "method", "count", "previous"), KERNELS)
-def test_vectors_of_a_step_on_every_back_end(backend_name, name, method, count, previous, rng):
-    choice = choose(name, method, count, previous=previous)
-    settings = None
-    if BACKENDS[backend_name].fixed:
-        settings = Settings(ranges={"velocity_increments": Fraction(1, 8)} if name == "sculling" else {})
-    run = evaluator(choice, backend_name, settings)
-    made = lowered(choice)
-    inputs = [rng.uniform(-0.12, 0.12, (20, *signal.shape)) for signal in made.inputs]
-    found = np.array(run(*inputs))
-    with mpmath.workdps(exact.DIGITS):
-        step = exact.Interpreter(made)
-        wanted = [
-            [float(x) for x in step(*([mpmath.mpf(float(x)) for x in part[k].flat] for part in inputs))]
-            for k in range(20)
-        ]
-    # Sums of up to 8 increments of 0.12 rad: 4 units of 1 each in double; velocities, which count as angles.
-    assert np.abs(found - wanted).max() <= one_call(run, 8)
 
 
 # Drift on coning
@@ -408,25 +297,6 @@ def measured(
 def stated(form: str, samples: int, previous: int, alpha, omega, T):
     residual = sp.sympify(design(samples, previous, form).residual().expression)
     return residual.subs({"alpha": alpha, "omega": omega, "T": T})
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("form", "samples", "previous"),
-    [
-        *(("compressed", n, p) for n, p in [(1, 0), (1, 1), (4, 0), (2, 2)]),
-        *(("uncompressed", n, p) for n, p in [(3, 0), (1, 2)]),
-        *(("combined", n, p) for n, p in [(3, 0), (1, 2)]),
-        *(pytest.param("combined", n, p, marks=pytest.mark.long) for n, p in [(4, 0), (5, 0), (2, 2)]),
-    ],
-)
-def test_measured_drift_in_double_is_the_residual(form, samples, previous):
-    # At 1/100 degree what is of fourth order in the cone is below a hundredth.
-    alpha = math.radians(0.01)
-    duration = 60 if 60 * 100 % samples == 0 else 59.85
-    found = measured(form, samples, previous, alpha, duration)[-1]
-    wanted = float(stated(form, samples, previous, alpha, 20 * sp.pi, sp.Rational(1, 100)))
-    assert found == pytest.approx(wanted, rel=0.01)
 
 
 @pytest.mark.long
@@ -511,19 +381,88 @@ def test_with_the_terms_a_cone_of_one_degree_leaves_the_residual(samples):
     assert largest("compressed", samples) > 1.5 * wanted
 
 
+#: Motion and its parameters, with the drift in deg/h at 100 Hz over 60 s of 8 samples and 3 before, and of 5 and 3,
+#: which others computed from the formulas.
+DRIFTS = [
+    ("cone", {"half_angle_deg": 1, "frequency_hz": 10}, 1.4e-6, 5.1e-6),
+    ("cone", {"half_angle_deg": 1, "frequency_hz": 20}, 4.7e-3, 0.71),
+    ("cone", {"half_angle_deg": 5, "frequency_hz": 5}, 3.2e-8, 6.3e-6),
+    ("cone", {"half_angle_deg": 5, "frequency_hz": 10}, 7.0e-4, 5.7e-3),
+    ("cone", {"half_angle_deg": 15, "frequency_hz": 2}, 1.9e-9, 2.6e-8),
+    ("cone", {"half_angle_deg": 15, "frequency_hz": 5}, 1.5e-6, 5.0e-4),
+    ("cone", {"half_angle_deg": 15, "frequency_hz": 10}, 5.4e-2, 0.46),
+    ("cone", {"half_angle_deg": 15, "frequency_hz": 20}, 2.5e2, 2.2e3),
+    ("slew", {"onset_s": 0.05}, 7.4e-6, 2.3e-5),
+    ("random", {"rate_deg_s": 200}, 2.5, 1.8),
+]
+#: Below it the drift is round-off, which the published runs have more of.
+ROUND_OFF = 1e-8
+#: Cones on which 8 samples and 3 before them drift less than published; with half the parts, or two terms fewer, the
+#: drift is the same to two digits.
+BETTER = [("cone", 5, 5), ("cone", 15, 5)]
+
+
+def drift(choice, motion, duration):
+    """Return the largest angle from the true attitude in deg/h, divided by the duration in s.
+
+    The exact formulas are computed on all steps at once; code of them would say no more.
+    """
+    step = Fraction(choice.increments, 100)
+    count = int(duration / step)
+    samples = motion.increments(step, count, choice.increments, choice.previous)
+    attitude = Rotation.from_matrix(motion.attitude(0.0))
+    computed = [attitude := attitude * turn for turn in turns(choice, samples)]
+    true = Rotation.from_matrix(motion.attitude(np.arange(1, count + 1) * float(step)))
+    angles = (true * Rotation.concatenate(computed).inv()).magnitude()
+    return np.degrees(angles.max()) / float(count * step) * 3600
+
+
 @pytest.mark.long
-def test_more_samples_leave_less():
-    assert largest("combined", 5) < 0.01
-    assert largest("combined", 6) < 0.001
+@pytest.mark.parametrize(("increments", "column"), [(8, 0), (5, 1)])
+def test_drifts_are_within_a_factor_of_three_of_those_published(increments, column):
+    choice = choose("euler", "coning-exact-rest", increments, previous=3)
+    wrong = {}
+    for name, settings, *published in DRIFTS:
+        computed = drift(choice, strapgen.motion(name, **settings), 60)
+        expected = published[column]
+        better = increments == 8 and (name, *settings.values()) in BETTER
+        least = 0 if better or expected < 4 * ROUND_OFF else expected / 3
+        if not least <= computed <= max(3 * expected, ROUND_OFF):
+            wrong[name, *settings.values()] = computed, expected
+    assert not wrong
 
 
-def test_a_cone_of_one_degree_on_every_back_end(backend_name):
-    alpha, omega = math.radians(1), 20 * math.pi
-    profile = strapgen.motion("coning", **{f"{k}_rad_s": v for k, v in cone(alpha, omega).items()})
-    settings = Settings(largest_angle=Fraction(1, 64)) if BACKENDS[backend_name].fixed else None
-    ready = strapgen.backend("euler", "coning-compressed", 4, backend_name, settings=settings)
-    reference = strapgen.backend("euler", "coning-compressed", 4)
-    increments = profile.increments(Fraction(1, 25), 25, 4)
-    bound = ready.rounding_bound(25, rounded_inputs=True)
-    allowed = 16 * 25 * ready.unit if bound is None else bound
-    assert np.abs(ready.propagate(increments) - reference.propagate(increments)).max() <= allowed + ready.unit
+#: A step on three samples and two before them.
+CHOICE = choose("euler", "coning-exact-rest", 3, previous=2)
+
+
+@pytest.mark.long
+def test_a_polynomial_through_the_samples_is_turned_by_exactly():
+    """A rate about one axis, or along one direction, has no cross products: the step turns by the sum."""
+    samples = np.outer(np.array([0.3, -0.2, 0.15, 0.4, -0.1]), [0.6, 0.0, 0.8])[None]
+    expected = samples[0, 2:].sum(axis=0)
+    np.testing.assert_allclose(turns(CHOICE, samples).as_rotvec()[0], expected, atol=2e-15)
+
+
+def test_small_samples_are_crossed_with_the_combined_coefficients():
+    """The part of second order in the samples, odd in one of two directions, is that of the coefficients."""
+    pairs = coning_coefficients.design(3, 2, "combined").pairs
+    size = 1e-4
+    rows, columns = np.array([1.0, -2.0, 0.5, 3.0, 1.5]), np.array([0.4, 1.0, -1.0, 2.0, -3.0])
+    samples = size * np.stack([rows, columns, 0 * rows], axis=1)
+    mirrored = samples * [1, -1, 1]
+    turned = turns(CHOICE, np.stack([samples, mirrored])).as_rotvec()
+    expected = size**2 * sum(
+        float(c) * (rows[i] * columns[j] - columns[i] * rows[j]) for (i, j), c in pairs.items()
+    )
+    # Half the difference is odd in y; terms of fourth order are 1e-8 of it.
+    assert (turned[0, 2] - turned[1, 2]) / 2 == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_order_is_that_of_the_polynomial():
+    assert derive(choose("euler", "coning-exact-rest", 3)).order.step == 4
+
+
+def test_increments_ahead_do_not_go_with_it():
+    with pytest.raises(InputError, match="coning-exact-rest takes no increments ahead"):
+        choose("euler", "coning-exact-rest", 2, ahead=1)

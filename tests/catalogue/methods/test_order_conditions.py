@@ -28,8 +28,7 @@ from strapgen.catalogue.methods.order_conditions import (
     word_coefficient,
     words,
 )
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long
@@ -96,32 +95,6 @@ def test_trees_of_fourth_order_as_in_the_books():
     assert "sum b_i a_ij c_j a_ik c_k" in map(weight_text, trees(5))
 
 
-@pytest.mark.parametrize("p", range(1, 7))
-def test_a_weight_in_words_is_the_weight(p):
-    """The text is evaluated as it stands, every index over all stages."""
-    tableau = TABLEAUX["nystrom5"]
-    stages = range(len(tableau.nodes))
-
-    def value(factors: list[str], at: dict[str, int]) -> Fraction:
-        if not factors:
-            return Fraction(1)
-        kind, indices = factors[0].split("_")
-        indices, _, power = indices.partition("^")
-        unknown = [letter for letter in indices if letter not in at]
-        if unknown:
-            return sum((value(factors, at | {unknown[0]: k}) for k in stages), Fraction(0))
-        place = [at[letter] for letter in indices]
-        if kind == "a":
-            here = tableau.matrix[place[0]][place[1]] if place[1] < place[0] else Fraction(0)
-        else:
-            here = {"b": tableau.weights, "c": tableau.nodes}[kind][place[0]] ** int(power or 1)
-        return here * value(factors[1:], at) if here else here
-
-    for tree, residual in residuals(tableau, p):
-        summed = value(weight_text(tree).removeprefix("sum ").split(), {})
-        assert summed - Fraction(1, density(tree)) == residual
-
-
 # Orders
 
 
@@ -155,25 +128,6 @@ def test_exact_coefficients_leave_nothing(name):
 )
 def test_embedded_orders(name, expected):
     assert embedded_order(TABLEAUX[name]) == expected
-
-
-def test_pairs_on_the_same_stages():
-    assert {name for name in TABLEAUX if TABLEAUX[name].embedded_weights} == {
-        "fehlberg4",
-        "fehlberg5",
-        "fehlberg7",
-        "fehlberg8",
-        "dormand-prince5",
-        "dormand-prince8",
-    }
-    for low, high in (("fehlberg4", "fehlberg5"), ("fehlberg7", "fehlberg8")):
-        lower, higher = TABLEAUX[low], TABLEAUX[high]
-        assert (lower.nodes, lower.matrix) == (higher.nodes, higher.matrix)
-        assert (lower.weights, lower.embedded_weights) == (higher.embedded_weights, higher.weights)
-
-
-def test_the_search_for_an_order_stops_where_it_is_told():
-    assert order(TABLEAUX["cooper-verner8"], most=3) == 3
 
 
 def test_the_first_failure_is_told_with_its_size():
@@ -316,14 +270,6 @@ def test_the_attitude_order_of_high_orders(name):
     assert order_in_series(tableau, found + 1, found, "general") == found == tableau.order
 
 
-@pytest.mark.parametrize("representation", ["direction cosines", "Euler parameters"])
-@pytest.mark.parametrize("name", SHORT)
-def test_rotations_are_no_exception(name, representation):
-    # Their matrices satisfy relations of their own, which could raise an order: here they do not.
-    found = attitude_order(TABLEAUX[name])
-    assert order_in_series(TABLEAUX[name], found + 2, found + 1, representation) == found
-
-
 def test_the_attitude_order_can_exceed_the_classical_one():
     assert (order(LINEAR), attitude_order(LINEAR)) == (4, 5)
     assert all(r == 0 for r in row_residuals(LINEAR))
@@ -338,8 +284,3 @@ def test_a_constant_rate_can_be_followed_to_a_higher_order():
     low = Tableau("low3", "-", "-", 2, fractions("0 1/3 1/2"), tuple(rows), fractions("0 0 1"))
     assert [attitude_order(low, k) for k in (None, 0, 1, 2)] == [2, 3, 2, 2]
     assert [order_in_series(low, 4, k, "general") for k in (0, 1, 2)] == [3, 2, 2]
-
-
-def test_only_trees_without_two_branches_are_words():
-    # With x' = x A all words are written the other way round, and the conditions are the same set.
-    assert {word_coefficient(word) for word in words(4)} == {Fraction(1, density(tree)) for tree in trees(4)}

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from peano_baker import Series, angle, generic_rate, lowest_difference, rotation, true_rotation
 
 from strapgen.catalogue import MOST_INCREMENTS
-from strapgen.catalogue.methods.magnus import method as magnus
 from strapgen.catalogue.methods.rate_fit import Fit, from_increments, from_rates, step_order
+from strapgen.catalogue.methods.rotation_series import magnus
 
 RATIONALS = st.fractions(min_value=-3, max_value=3, max_denominator=20)
 
@@ -45,25 +45,6 @@ def test_two_increments_give_the_printed_formulas(node, printed):
     assert tuple(from_increments(2).at(node)) == printed
 
 
-@settings(derandomize=True, database=None, deadline=None)
-@given(node=RATIONALS)
-def test_one_increment_gives_a_constant_rate(node):
-    assert from_increments(1).at(node) == [1]
-
-
-@pytest.mark.long
-@settings(derandomize=True, database=None, deadline=None)
-@given(
-    coefficients=st.integers(1, MOST_INCREMENTS).flatmap(
-        lambda count: st.lists(RATIONALS, min_size=count, max_size=count)
-    ),
-    node=RATIONALS,
-    h=st.fractions(min_value=Fraction(1, 50), max_value=5, max_denominator=50),
-)
-def test_k_increments_are_exact_on_rates_of_degree_k_minus_1(coefficients, node, h):
-    assert extracted(coefficients, len(coefficients), node, h) == rate(coefficients, node * h)
-
-
 @pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_every_count_is_exact_at_the_nodes_of_the_methods(count):
     coefficients = [Fraction((-1) ** k * (k + 2), k + 1) for k in range(count)]
@@ -82,13 +63,6 @@ def test_an_irrational_node_is_exact_too(count):
     increments = [after - before for before, after in pairwise(angles)]
     found = sum(w * d for w, d in zip(from_increments(count).at(node), increments, strict=True))
     assert sp.expand(found - sum(c * node**k for k, c in enumerate(coefficients))) == 0
-
-
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
-def test_k_increments_are_not_exact_on_degree_k(count):
-    # At a sample the derivative of the interpolation's remainder is not zero.
-    coefficients = [Fraction(0)] * count + [Fraction(1)]
-    assert extracted(coefficients, count, Fraction(0), Fraction(1)) != rate(coefficients, Fraction(0))
 
 
 # With previous increments
@@ -142,37 +116,10 @@ def test_k_and_m_increments_are_exact_on_rates_of_degree_k_plus_m_minus_1(case, 
     assert weighed(fit.moment(power), given_) == expected
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
-def test_a_fit_tells_the_same_as_weights_taylor_and_moments(count, previous):
-    fit, number = from_increments(count, previous), count + previous
-    assert len(fit.basis) == len(fit.at(Fraction(0))) == number
-    assert fit.at(Fraction(0)) == fit.taylor(0)
-    assert fit.taylor(number) == [0] * number
-    coefficients = [[Fraction(int(c.p), int(c.q)) for c in fit.taylor(k)] for k in range(number)]
-    for node in (Fraction(1, 3), Fraction(-2), Fraction(1)):
-        expected = [rate([c[row] for c in coefficients], node) for row in range(number)]
-        assert fit.at(node) == list(map(exactly, expected))
-    for power in range(4):
-        weights = [midpoint_moment(k, power) for k in range(number)]
-        expected = [
-            sum(w * c[row] for w, c in zip(weights, coefficients, strict=True)) for row in range(number)
-        ]
-        assert fit.moment(power) == list(map(exactly, expected))
-
-
 @pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
 @pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
 def test_the_integral_of_the_rate_is_the_sum_of_the_increments_of_the_step(count, previous):
     assert from_increments(count, previous).moment(0) == [0] * previous + [1] * count
-
-
-@pytest.mark.parametrize("previous", range(1, FEW_PREVIOUS + 1))
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
-def test_k_and_m_increments_are_not_exact_on_degree_k_plus_m(count, previous):
-    given_ = samples([Fraction(0)] * (count + previous) + [Fraction(1)], count, previous)
-    assert weighed(from_increments(count, previous).at(Fraction(0)), given_) != 0
 
 
 def test_previous_increments_give_the_formulas_of_backward_differences():
@@ -248,25 +195,9 @@ def test_the_step_order_is_that_of_the_exact_rotation_of_the_fitted_rate(count, 
         assert lowest_difference(found, true_rotation("euler", true, order + 1)) == order + 1
 
 
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (2, 0), (1, 2), (3, 1)])
-def test_a_rate_of_the_fit_s_degree_is_followed_exactly(count, previous):
-    true = generic_rate(count + previous - 1)
-    found = rotation("dcm", fitted_rate(true, count, previous, 7), 7)
-    assert lowest_difference(found, true_rotation("dcm", true, 7)) is None
-
-
 def test_step_orders_as_the_literature_has_them():
     # Even numbers of increments gain two orders, as closed Newton-Cotes rules do; odd ones, or with history, one.
     assert [step_order(count) for count in range(1, MOST_INCREMENTS + 1)] == [2, 4, 4, 6, 6, 8, 8, 10]
     for count in range(1, MOST_INCREMENTS + 1):
         for previous in range(1, FEW_PREVIOUS + 1):
             assert step_order(count, previous) == count + previous + 1
-
-
-@pytest.mark.parametrize("previous", range(FEW_PREVIOUS + 1))
-@pytest.mark.parametrize("count", range(1, MOST_INCREMENTS + 1))
-def test_equal_increments_give_a_constant_rate(count, previous):
-    # Methods see the samples through the fit alone, so at a constant rate none depends on how many there are.
-    fit = from_increments(count, previous)
-    assert sum(fit.taylor(0)) == count
-    assert all(sum(fit.taylor(power)) == 0 for power in range(1, count + previous))

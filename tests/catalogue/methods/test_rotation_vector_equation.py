@@ -9,7 +9,7 @@ import sympy as sp
 
 from strapgen import derive
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods.munthe_kaas import bortz
+from strapgen.catalogue.methods.runge_kutta import bortz
 from strapgen.kernel import algebra
 from strapgen.kernel.algebra import cross_elements
 
@@ -44,34 +44,6 @@ def vanishes(expression: sp.Expr) -> bool:
     return bool(sp.rem(sp.Poly(numerator, COSINE), sp.Poly(COSINE**2 + SINE**2 - 1, COSINE)).is_zero)
 
 
-def test_the_quaternion_is_that_of_the_derivation():
-    # h = f3 alpha + f4 with f3 = sin(alpha/2)/alpha, f4 = cos(alpha/2): algebra.quaternion along one axis.
-    h = algebra.quaternion(sp.Matrix([A, 0, 0]))
-    assert sp.simplify(h[0].rewrite(sp.sin) - sp.sin(A / 2)) == 0
-    assert (h[1], h[2], h[3]) == (0, 0, sp.cos(A / 2))
-
-
-def test_bortz_equation_follows_from_the_quaternions():
-    # h' = h w / 2, appendix A. Vectors by their coefficients along w, alpha x w, alpha; alpha x (alpha x w) is
-    # alpha (alpha . w) - alpha^2 w. With the derivative D = X w + Y alpha x w + Z alpha, alpha . D = X P + Z alpha^2.
-    f3, f4 = sp.sin(A / 2) / A, sp.cos(A / 2)
-    along = X * P + Z * A**2
-    angle_rate = along / A
-    vector = {  # f3' alpha + f3 D - (f4 w + f3 alpha x w)/2
-        "w": f3 * X - f4 / 2,
-        "alpha x w": f3 * Y - f3 / 2,
-        "alpha": sp.diff(f3, A) * angle_rate + f3 * Z,
-    }
-    (solution,) = sp.solve(list(vector.values()), [X, Y, Z], dict=True)
-    # The scalar part then holds too: f4' = -alpha . w f3 / 2.
-    scalar = (sp.diff(f4, A) * angle_rate + f3 * P / 2).subs(solution)
-    assert vanishes(scalar) and not vanishes(scalar + P * BRACKET)
-    # (20): w + alpha x w / 2 + bracket alpha x (alpha x w).
-    assert solution[Y] == sp.Rational(1, 2)
-    assert vanishes(solution[X] - (1 - BRACKET * A**2))
-    assert vanishes(solution[Z] - BRACKET * P)
-
-
 def test_bortz_equation_is_that_of_the_codes_quaternions():
     # Component by component: the derivative of the quaternion of alpha, where alpha obeys (20), is the product h w / 2
     # of the kinematics, its order and signs included.
@@ -88,16 +60,6 @@ def test_bortz_equation_is_that_of_the_codes_quaternions():
         square = sp.Poly(algebra.dot(alpha, alpha) - A**2, *alpha, *w)
         rest = sp.rem(polynomial, square, alpha[2])
         assert all(map(vanishes, sp.Poly(rest, *alpha, *w).coeffs()))
-
-
-def test_the_slip_of_the_appendix_vanishes_in_the_limit():
-    # (A5) prints cos(alpha/2) = 1 - alpha^2/2 for small angles; it is alpha^2/8. Either goes to 1.
-    half = sp.series(sp.cos(A / 2), A, 0, 4).removeO()
-    printed = 1 - A**2 / 2
-    assert sp.expand(half - (1 - A**2 / 8)) == 0
-    assert sp.limit(half, A, 0) == sp.limit(printed, A, 0) == 1
-    assert sp.limit((half - printed) / A**2, A, 0) == sp.Rational(3, 8)
-    assert sp.limit(BRACKET, A, 0) == sp.Rational(1, 12)
 
 
 @cache
@@ -193,37 +155,6 @@ def test_the_coefficients_are_those_of_the_bracket():
     assert [series.coeff(A, 0), -series.coeff(A, 2)] == [WHOLE[2], WHOLE[4]]
 
 
-def test_third_order_is_exact_to_the_fifth_power_of_time():
-    # (21), the bracket cut off after 1/12, errs by the sixth power.
-    made = solved(WHOLE[:3])
-    assert all(difference(made, power) == ZERO for power in range(ORDER + 1))
-
-
-def test_two_integrals_are_as_good_as_third_order():
-    # (22) against (20): nothing up to the fourth power, and in the fifth
-    # -w0 x (w0 x w2)/720 + w1 x (w0 x w1)/240 + w0 x (w0 x (w0 x w1))/720.
-    made = second()
-    assert all(difference(made, power) == ZERO for power in range(ORDER))
-    w0, w1, w2 = W[:3]
-    inner = cross_elements(w0, w1)
-    wanted = combination(
-        (-sp.Rational(1, 720), cross_elements(w0, cross_elements(w0, w2))),
-        (sp.Rational(1, 240), cross_elements(w1, inner)),
-        (sp.Rational(1, 720), cross_elements(w0, cross_elements(w0, inner))),
-    )
-    assert difference(made, 5) == wanted != ZERO
-
-
-def test_without_its_third_term_the_equation_is_worse_than_two_integrals():
-    # (21) without 1/12 misses -w0 x (w0 x w1)/96 in the fourth power, which (22) has: beta x w takes no alpha.
-    made = solved(WHOLE[:2])
-    assert all(difference(made, power) == ZERO for power in range(4))
-    w0, w1 = W[:2]
-    assert difference(made, 4) == combination(
-        (-sp.Rational(1, 96), cross_elements(w0, cross_elements(w0, w1)))
-    )
-
-
 TIMED, TIME = sp.ring("T", RING.to_domain())
 
 
@@ -270,3 +201,59 @@ def test_the_recursion_leaves_the_fifth_power_of_two_integrals():
     for cycles in (1, 2):
         found, wanted = difference(recursion(cycles), 5), difference(second(), 5)
         assert [sum((RING({m: c}) for m, c in x.terms() if sum(m) > 2), RING(0)) for x in found] == wanted
+
+
+ANGLE = sp.Symbol("x", positive=True)
+
+
+def across(products: int) -> list[sp.Expr]:
+    """Return Bortz's series where the rotation vector is x about z and the rate 1 about x."""
+    return [sp.expand(e) for e in bortz(sp.Matrix([0, 0, ANGLE]), sp.Matrix([1, 0, 0]), products)]
+
+
+@pytest.mark.long
+def test_the_coefficients_of_bortz_are_bernoulli_s():
+    # phi x w is x about y, phi x (phi x w) is -x^2 about x: each product has a power of its own.
+    along, beside, none = across(4)
+    assert none == 0
+    found = [sp.Poly(beside, ANGLE).coeff_monomial(ANGLE), -sp.Poly(along, ANGLE).coeff_monomial(ANGLE**2)]
+    found += [
+        -sp.Poly(beside, ANGLE).coeff_monomial(ANGLE**3),
+        sp.Poly(along, ANGLE).coeff_monomial(ANGLE**4),
+    ]
+    assert found == [sp.Rational(1, 2), sp.Rational(1, 12), 0, -sp.Rational(1, 720)]
+    # (-1)^k B_k/k! with B_1 = -1/2, which SymPy gives either sign by its release.
+    numbers = [-sp.Rational(1, 2), *(sp.bernoulli(k) for k in (2, 3, 4))]
+    assert found == [(-1) ** k * b / sp.factorial(k) for k, b in enumerate(numbers, 1)]
+
+
+@pytest.mark.long
+def test_the_series_is_that_of_bortz_s_closed_form():
+    # w + phi x w/2 + (1 - (x/2) cot(x/2))/x^2 phi x (phi x w).
+    along, beside, _ = across(10)
+    closed = sp.series(ANGLE / 2 * sp.cot(ANGLE / 2), ANGLE, 0, 12).removeO()
+    assert sp.expand(along - closed) == 0
+    assert beside == ANGLE / 2
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("products", [0, 1, 2])
+def test_the_series_solves_the_equation_of_rotation(products):
+    # The rotation vector p t + q t^2 turns at the rate w with dR/dt = R skew(w): its series has that derivative.
+    t = sp.Symbol("t")
+    p, q = sp.Matrix([1, 2, -1]) / 3, sp.Matrix([2, -1, 1]) / 5
+    phi = p * t + q * t**2
+
+    def skew(v: sp.Matrix) -> sp.Matrix:
+        return sp.Matrix([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+    K, R, power = skew(phi), sp.eye(3), sp.eye(3)
+    for n in range(1, 7):
+        power = (power * K).applyfunc(sp.expand) / n
+        R += power
+    W = (R.T * R.diff(t)).applyfunc(sp.expand)  # skew(w) up to t^5
+    w = sp.Matrix([W[2, 1], W[0, 2], W[1, 0]])
+    left = (bortz(phi, w, products) - phi.diff(t)).applyfunc(sp.expand)
+    lowest = min(min(m[0] for m in sp.Poly(e, t).monoms()) for e in left if e != 0)
+    # Of p t + q t^2 the first product with its own derivative is t^2 p x q, every further one brings a power.
+    assert lowest == products + 2 if products < 2 else lowest >= 5

@@ -1,5 +1,7 @@
 """Runge-Kutta steps: the fused kernels are the staged formulas of the thesis (chapter 3 A and B), exactly."""
 
+from __future__ import annotations
+
 from fractions import Fraction
 from functools import cache
 from random import Random
@@ -7,16 +9,14 @@ from random import Random
 import numpy as np
 import pytest
 import sympy as sp
-from peano_baker import generic_rate, local_error
 
 from strapgen import derive
-from strapgen.catalogue import ALGORITHMS, MOST_INCREMENTS, STANDARD_METHODS
+from strapgen.catalogue import ALGORITHMS, STANDARD_METHODS
 from strapgen.catalogue.kernels.attitude_step import step
 from strapgen.catalogue.kinematics import KINEMATICS
-from strapgen.catalogue.methods.runge_kutta import method
-from strapgen.catalogue.methods.samples import increments_signal
+from strapgen.catalogue.methods.method import increments_signal
+from strapgen.catalogue.methods.runge_kutta import _NODES, _WEIGHTS, method
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.ir.exceptions import InputError
 
 ALGORITHM = pytest.mark.parametrize("algorithm", ALGORITHMS)
 METHOD = pytest.mark.parametrize("method", STANDARD_METHODS)
@@ -119,14 +119,6 @@ def test_other_counts_of_increments(algorithm, method, increments):
 
 @ALGORITHM
 @METHOD
-def test_the_step_is_linear_in_the_state(algorithm, method):
-    size = 9 if algorithm == "dcm" else 4
-    for polynomial in polynomials(algorithm, method):
-        assert {sum(monomial[:size]) for monomial in polynomial.itermonoms()} == {1}
-
-
-@ALGORITHM
-@METHOD
 def test_the_step_is_the_product_with_the_step_of_the_identity(algorithm, method):
     step, result = kernel(algorithm, method), polynomials(algorithm, method)
     ring = result[0].ring
@@ -137,70 +129,6 @@ def test_the_step_is_the_product_with_the_step_of_the_identity(algorithm, method
     product = derive(step.attitude_step.product)
     elements = [name for signal in product.inputs for name in signal.elements]
     assert product.expand(dict(zip(elements, [*x.flat, *transition], strict=True)))["next"] == result
-
-
-@ALGORITHM
-def test_transitions_may_be_multiplied_in_any_grouping(algorithm):
-    size = 9 if algorithm == "dcm" else 4
-    product = derive(f"{algorithm}-product")
-    names = [name for signal in product.inputs for name in signal.elements]
-    _, *generators = sp.ring(" ".join(f"x{k}" for k in range(3 * size)), sp.QQ)
-    x, y, z = (generators[k * size : (k + 1) * size] for k in range(3))
-
-    def times(a, b):
-        return product.expand(dict(zip(names, [*a, *b], strict=True)))["next"]
-
-    assert times(times(x, y), z) == times(x, times(y, z))
-    assert times(x, y) != times(y, x)
-
-
-@pytest.mark.long
-@METHOD
-def test_cayley_klein_equals_euler_after_renaming(method):
-    # a1 = e4, a2 = e1, a3 = e2, a4 = e3
-    euler = polynomials("euler", method)
-    ring = euler[0].ring
-    e, d = ring.gens[:4], ring.gens[4:]
-    step = kernel("cayley-klein", method)
-    names = [name for signal in step.inputs for name in signal.elements]
-    renamed = step.expand(dict(zip(names, [e[3], *e[:3], *d], strict=True)))["next"]
-    assert renamed == [euler[3], *euler[:3]]
-
-
-#: Of third degree, on which two increments are not exact.
-RATE = generic_rate(3)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("increments", [2, 3, 5, MOST_INCREMENTS])
-@ALGORITHM
-@METHOD
-def test_the_local_error_is_one_order_above_the_method(algorithm, method, increments):
-    assert local_error(kernel(algorithm, method, increments), RATE, 6) == int(method[2:]) + 1
-
-
-@pytest.mark.parametrize("method", ["rk2", "rk3", "rk4"])
-def test_one_increment_cannot_see_coning(method):
-    # The commutator of rates at two instants, of power 3, is lost, whatever the method.
-    assert local_error(kernel("euler", method, 1), RATE, 6) == 3
-
-
-@pytest.mark.parametrize("count", [1, 2, 8])
-def test_increments_are_rows_oldest_first(count):
-    signal = increments_signal(count)
-    assert signal.shape == (count, 3)
-    assert signal.unit == "rad"
-    assert signal.elements[:3] == ("d1_x", "d1_y", "d1_z")
-    assert signal.elements[-3:] == (f"d{count}_x", f"d{count}_y", f"d{count}_z")
-
-
-@ALGORITHM
-@METHOD
-def test_the_transition_is_a_stage_of_the_kernel(algorithm, method):
-    step = kernel(algorithm, method)
-    assert step.transition in [stage.signal.name for stage in step.stages]
-    assert step.name == f"{algorithm}-{method}-2"
-    assert step.attitude_step.attitude == (None if algorithm == "dcm" else f"dcm-from-{algorithm}")
 
 
 @ALGORITHM
@@ -253,11 +181,17 @@ def test_a_step_with_irrational_coefficients_has_its_order():
     assert result[1] == result[2] == 0
 
 
-def test_rates_are_named_after_their_nodes():
-    kernel = derive("dcm", "rk3", rates=True)
-    assert kernel.name == "dcm-rk3-rates"
-    assert kernel.arguments == "dcm --method rk3 --rates"
-    assert kernel.inputs[1].shape == (3, 3)
-    assert "nodes 0, 1/2, 1" in kernel.inputs[1].meaning
-    with pytest.raises(InputError, match="increments or rates, not both"):
-        derive("dcm", "rk3", 2, rates=True)
+def test_the_coefficients_meet_the_conditions_of_third_order_in_time():
+    for power in range(3):
+        total = sum((w * c**power for w, c in zip(_WEIGHTS, _NODES, strict=True)), Fraction(0))
+        assert total == Fraction(1, power + 1)
+
+
+def test_the_coefficients_meet_the_condition_of_the_order_of_the_exponentials():
+    """The commutators of the product are those of the Magnus series: sum_(i<j) b_i b_j (c_j - c_i) is 1/6."""
+    nodes = range(len(_NODES))
+    total = sum(
+        (_WEIGHTS[i] * _WEIGHTS[j] * (_NODES[j] - _NODES[i]) for i in nodes for j in nodes if i < j),
+        Fraction(0),
+    )
+    assert total == Fraction(1, 6)

@@ -15,8 +15,7 @@ import strapgen
 from strapgen.catalogue import METHODS, STANDARD_METHODS
 from strapgen.catalogue.methods import tableaux
 from strapgen.catalogue.methods.order_conditions import largest_residual
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.methods.tableaux import TABLEAUX, read, verify
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read, verify
 from strapgen.ir.exceptions import InputError
 from strapgen.storage import resources
 
@@ -254,33 +253,6 @@ def test_what_is_wrong_is_told_in_one_line(said, written):
     message = str(caught.value)
     assert message.startswith("mine.toml: ") and said in message
     assert "\n" not in message and len(message) < 250
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"name = ", "mine.toml is not TOML (Invalid value"),
-        (b'name = "\xff"', "mine.toml is not UTF-8 (byte 8)"),
-        (b"nodes = " + b"[" * 5000, "mine.toml is not TOML ("),
-        (b"order = " + b"9" * 5000, "mine.toml is not TOML ("),
-        (b"#" * 10**6, "mine.toml is over 200000 bytes long"),
-        (b"", "mine.toml: name is missing"),
-        (b"\0", "mine.toml is not TOML ("),
-    ],
-)
-def test_what_is_no_such_file_at_all(content, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("mine.toml").write_bytes(content)
-    with pytest.raises(InputError) as caught:
-        read("mine.toml")
-    assert said in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_what_cannot_be_read(tmp_path):
-    with pytest.raises(InputError, match=r"none\.toml cannot be read \(No such file or directory\)"):
-        read(tmp_path / "none.toml")
-    with pytest.raises(InputError, match=r"cannot be read \(Is a directory\)"):
-        read(tmp_path)
 
 
 def test_tableau_that_misses_a_condition_is_refused_where_it_is_used():

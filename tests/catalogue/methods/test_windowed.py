@@ -12,13 +12,13 @@ import strapgen
 from strapgen import choose, derive, lower
 from strapgen.analysis.series.series import series
 from strapgen.catalogue.methods.window import GyroResponse, Window
-from strapgen.catalogue.methods.windows import WINDOWS, named_window, read
+from strapgen.catalogue.methods.windows import WINDOWS, read
 from strapgen.design.family import FamilyBrief, design
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Truncation
-from strapgen.lab.runs import angles, drift, largest_increment, steady_drift
+from strapgen.lab.runs import angles, drift, steady_drift
 
 Vector = list[Fraction]
 
@@ -101,14 +101,6 @@ def test_operations_of_a_window_are_few():
         assert multiply <= 12 * ahead + 121 and add <= 18 * ahead + 74
         assert not any(step[kind] for kind in ("divide", "sqrt", "function", "select"))
     assert (multiply, add) <= (205, 200)
-
-
-@pytest.mark.long
-def test_operations_of_combined_coning_coefficients_counted_alike():
-    step = lower(derive("euler", "coning-combined", 3, previous=3)).operations
-    normalize = lower(derive("euler-normalize-first-order")).operations
-    # For three samples, with sine and cosine.
-    assert step["multiply"] + normalize["multiply"] > 2.4 * 205 and step["function"] == 2
 
 
 # What the series leaves out
@@ -203,11 +195,6 @@ def test_a_file_of_ones_own_goes_wherever_a_method_goes(tmp_path):
     assert kernel.expand(values) == derive("euler", "window-5-1").expand(values)
 
 
-def test_names_without_a_window():
-    assert named_window("rk4") is None and named_window("window-99-99") is None
-    assert named_window("window-9-9-exact").terms == named_window("window-9-9").terms
-
-
 # Accuracy
 
 CONES = {f"cone {angle}/{hertz}": (angle, hertz) for angle, hertz in ((1, 10), (1, 20), (5, 5), (15, 20))}
@@ -243,25 +230,6 @@ def test_drift_of_the_exact_rotation(motions):
         run = strapgen.simulate(backend, motions[name], "0.01", 60)
         # Below 1e-8 deg/h rounding counts.
         assert drift(run) == pytest.approx(expected, rel=0.1) or max(drift(run), expected) < 1e-8, name
-
-
-@pytest.mark.long
-def test_drift_of_a_window_in_words_of_32_bits(motions):
-    choice = choose("euler", "window-7-7")
-    for name, expected in zip(MOTIONS, DRIFTS["window-7-7"], strict=True):
-        if expected < 1e-4:
-            continue
-        motion = motions[name]
-        # Formats for the increments of the run, as the command simulate chooses them.
-        largest = largest_increment(motion, "0.01", 60, 1, beside=(7, 7))
-        settings = Settings(carry="full").fitted(largest)
-        backend = strapgen.backend(choice, backend="c-fixed32", settings=settings)
-        # The gyro delivers differences of rounded angles, to the unit of the increments.
-        pulse = Fraction(backend.increment_unit)
-        run = strapgen.simulate(backend, motion, "0.01", 60, pulse=pulse)
-        assert drift(run) < 2 * expected, name
-        if expected > 1e-3:  # below it the rounding of words may also make up for the error of the window
-            assert drift(run) > expected / 2, name
 
 
 @pytest.mark.long

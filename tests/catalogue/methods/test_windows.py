@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tomllib
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -329,33 +328,3 @@ def test_a_wrong_file_is_refused_in_one_line(changes, message, written):
         read(written(**changes))
     assert str(error.value).startswith("mine.toml: ") and message in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_a_file_that_is_none_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"none.toml cannot be read \(No such file or directory\)"):
-        read(tmp_path / "none.toml")
-    (tmp_path / "long.toml").write_text("#" * (windows.WINDOW.most_bytes + 1))
-    with pytest.raises(InputError, match="is over 4000000 bytes long; a family of filters is shorter"):
-        read(tmp_path / "long.toml")
-
-
-@FAMILIES
-def test_taps_are_short(name):
-    # Free taps are multiples of 2^-60; inner ones have the small factors of the conditions besides.
-    data = tomllib.loads((FOLDER / f"{name}.toml").read_text())
-    texts = [tap for table in (data, *data["one_sided"]) for row in table["filters"] for tap in row]
-    assert max(map(len, texts)) < 70
-    window = WINDOWS[name]
-    for row in window.filters[1:]:
-        assert all((tap * 2**60).denominator == 1 for tap in row[:1])
-
-
-def test_gyro_series_is_the_inverse_of_its_denominator_to_every_power():
-    gyro = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
-    series = window_conditions.gyro_series(gyro, 12)
-    x = gyro.sample_hz / (2 * window_conditions.PI * gyro.bandwidth_hz)
-    denominator = [Fraction(1), 2 * gyro.damping * x, x**2]
-    product = [
-        sum((denominator[j] * series[k - j] for j in range(min(k, 2) + 1)), Fraction(0)) for k in range(12)
-    ]
-    assert product == [1, *[0] * 11]

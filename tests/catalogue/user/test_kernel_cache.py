@@ -5,20 +5,17 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from fractions import Fraction
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
-import sympy as sp
 from commands import run
 from users_files import STEP, beside, written
 
 import strapgen
 from strapgen.catalogue import choose
-from strapgen.catalogue.user import kernel_cache, loading
+from strapgen.catalogue.user import loading
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.signals import Signal
 from strapgen.storage import cache
 
 #: Says on stderr that the file runs.
@@ -228,34 +225,6 @@ def test_an_entry_point_is_derived_once_and_again_after_a_change(derives, file, 
     assert [derives("gyro"), derives("gyro")] == [(True, "two"), (False, "two")]
 
 
-class Marked(sp.AtomicExpr):
-    """An expression that shows more than SymPy compares."""
-
-    def __new__(cls, mark: str) -> Marked:
-        made = super().__new__(cls)
-        made.mark = mark
-        return made
-
-    def _sympystr(self, printer) -> str:
-        return self.mark
-
-
-def test_what_pickle_does_not_restore_in_every_part_is_not_kept():
-    x = sp.Symbol("x", real=True)
-
-    def whole(part: object) -> list:
-        return [(Fraction(1, 2), Signal.scalar("x")), (sp.sin(sp.sqrt(x)), part)]
-
-    assert kernel_cache._alike(whole(sp.Integer(3)), whole(sp.Integer(3)))
-    assert kernel_cache._alike(whole(Marked("!")), whole(Marked("!")))
-    assert not kernel_cache._alike(whole(sp.sin(x + 1)), whole(sp.sin(x + 2)))
-    for other in (sp.Integer(4), sp.Float(3), sp.Symbol("x"), sp.pi, Marked("!")):
-        assert not kernel_cache._alike(whole(other), whole(sp.Integer(3)))
-    assert not kernel_cache._alike(whole(Marked("!")), whole(Marked("?")))
-    assert not kernel_cache._alike((1, 2.0), (1, 2)) and not kernel_cache._alike((1,), (1, 2))
-    assert not kernel_cache._alike(Signal.scalar("x"), Signal.scalar("x", meaning="another"))
-
-
 def test_text_in_the_cache_is_written_again_without_sympy(file, tmp_path, capsys):
     targets = ("c", "numpy")
     for target in targets:
@@ -292,5 +261,5 @@ def test_choices_of_a_kernel_at_hand_and_in_the_cache_are_equal(file):
 def test_a_kernel_that_no_longer_restores_is_derived_again(file, monkeypatch):
     derived = choose(file).user_kernel.kernel
     stored = choose(file)
-    monkeypatch.setattr(kernel_cache.pickle, "loads", lambda data: 1 / 0)
+    monkeypatch.setattr(loading.pickle, "loads", lambda data: 1 / 0)
     assert stored.user_kernel.kernel == derived

@@ -4,8 +4,8 @@ from fractions import Fraction
 
 import sympy as sp
 
+from strapgen.catalogue.methods.method import Samples
 from strapgen.catalogue.methods.runge_kutta import advance
-from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.signals import Signal

@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods.samples import increments_signal
+from strapgen.catalogue.methods.method import increments_signal
 from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.signals import Signal
 from strapgen.kernel.algebra import cross

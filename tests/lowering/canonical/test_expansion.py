@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from random import Random
 
 import pytest
 import sympy as sp
 from derived import kernel, program
 
-from strapgen import catalogue
 from strapgen.catalogue import Choice
 from strapgen.kernel.kernel import evaluate_stages
 from strapgen.lowering import canonical
 from strapgen.lowering.canonical.core import decompose
-
-#: Exact series of many methods: with the long tests.
-pytestmark = pytest.mark.long
 
 #: Cayley-Klein parameters are Euler parameters by other names.
 ALGORITHM = pytest.mark.parametrize("algorithm", ["dcm", "euler"])
@@ -34,6 +29,7 @@ def core(algorithm: str, method: str, count: int, previous: int) -> canonical.Co
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chosen", EXPANDED)
 @ALGORITHM
 def test_the_estimate_bounds_the_terms_of_the_decomposition(algorithm, chosen, monkeypatch):
@@ -47,6 +43,7 @@ def test_the_estimate_bounds_the_terms_of_the_decomposition(algorithm, chosen, m
     assert terms <= estimate * (2 if algorithm == "dcm" else 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chosen", STAGED)
 @ALGORITHM
 def test_long_transitions_are_computed_by_their_stages_and_say_so(algorithm, chosen):
@@ -63,24 +60,6 @@ def test_long_transitions_are_computed_by_their_stages_and_say_so(algorithm, cho
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("chosen", [*STAGED, ("fehlberg5", 4, 0), *EXPANDED])
-@ALGORITHM
-def test_a_program_is_its_kernel_exactly(algorithm, chosen):
-    choice, random = Choice(algorithm, *chosen), Random(1969)
-    made, exact = program(choice), kernel(choice)
-    names = [name for signal in exact.inputs for name in signal.elements]
-    for _ in range(3):
-        # Two polynomials that differ agree at three random points of this size next to never.
-        values = {name: Fraction(random.randint(-99, 99), random.randint(1, 99)) for name in names}
-        expected = exact.expand({n: sp.QQ(v.numerator, v.denominator) for n, v in values.items()}, _rational)
-        found = made.run(values)
-        assert [sp.QQ(x.numerator, x.denominator) for x in found["next"]] == expected["next"]
-
-
-def _rational(number: sp.Rational) -> object:
-    return sp.QQ(int(number.p), int(number.q))
-
-
 @pytest.mark.parametrize("chosen", [*EXPANDED, ("rk3", 8, 0), ("dormand-prince5", 3, 0)])
 @ALGORITHM
 def test_the_degree_is_that_of_the_transition(algorithm, chosen):
@@ -94,23 +73,3 @@ def test_the_degree_is_that_of_the_transition(algorithm, chosen):
     known = evaluate_stages([*stages, last], values)
     degree = max(ring(known[name]).degree() for name in last.signal.elements)
     assert degree == found.degree()
-
-
-def test_other_than_polynomials_have_no_core():
-    for method in ("magnus2", "magnus4", "munthe-kaas4"):
-        assert canonical.extract_core(kernel(Choice("euler", method, 2))) is None
-    assert canonical.extract_core(kernel(Choice("euler-normalize"))) is None
-
-
-@pytest.mark.parametrize(("count", "previous"), [(1, 0), (2, 0), (1, 2), (2, 1), (3, 3)])
-def test_the_whole_is_the_sum_of_the_increments_of_the_step_alone(count, previous):
-    found = core("euler", "rk2", count, previous)
-    assert found.inputs == [f"past{k}" for k in range(previous, 0, -1)] + [
-        f"d{k}" for k in range(1, count + 1)
-    ]
-    assert found.whole == tuple(Fraction(int(k >= previous)) for k in range(previous + count))
-
-
-def test_a_step_from_rates_has_no_whole():
-    made = catalogue.derive(catalogue.choose("euler", "rk4", rates=True))
-    assert canonical.extract_core(made).whole is None

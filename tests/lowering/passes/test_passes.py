@@ -20,8 +20,8 @@ from strapgen.ir.program import (
     walk,
 )
 from strapgen.ir.signals import Signal
-from strapgen.lowering.names import FACTOR, SHARED, is_temporary
 from strapgen.lowering.passes import PASSES, cost, optimize, remove_unused
+from strapgen.lowering.trees import FACTOR, SHARED, is_temporary
 
 INPUTS = ("x", "y", "z")
 EVERY = pytest.mark.parametrize("run", PASSES, ids=lambda run: run.__name__)

@@ -25,7 +25,7 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.analysis.series import motion_rates
 from strapgen.analysis.series.invariants import invariants, sum_text, vector_texts
-from strapgen.analysis.series.motion_rates import TIME, is_plain, parameters
+from strapgen.analysis.series.motion_rates import TIME, in_powers_of_the_step, is_plain, parameters
 from strapgen.analysis.series.series import MOST_TERMS, STEP
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
@@ -74,27 +74,16 @@ def error_rate(choice: Choice, motion: str, terms: int = 2) -> ErrorRate:
     """
     attitude_step = one_step.linear_step(choice)
     order = attitude_step.kernel.order
-    try:
+    with in_powers_of_the_step(attitude_step.kernel.name):
         if choice.user_kernel is not None:
             _require_covariance(attitude_step)
         top = 1 + (order.step if order else 1) + terms
         most = top + one_step.PATIENCE
         while True:
             rates = _rate(attitude_step, motion, top)
-            if rates.order is not None and rates.order + terms <= top:
-                break
-            if top >= most:
+            if top >= most or (rates.order is not None and rates.order + terms <= top):
                 break
             top += 1
-    except ArithmeticError as error:
-        raise InputError(
-            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
-        ) from None
-    except NotCovariantError:
-        raise InputError(
-            f"kernel {attitude_step.kernel.name} does not turn with its inputs: "
-            "what it loses in a run depends on the axes"
-        ) from None
     if rates.order is None:
         return rates
     last = rates.order + terms
@@ -181,8 +170,14 @@ def _require_covariance(attitude_step: Step) -> None:
     count = 2 + (attitude_step.kernel.order.step if attitude_step.kernel.order else 1)
     frame, ring, rate = one_step.general_rate(attitude_step, count)
     computed = one_step.computed_matrix(attitude_step, ring, rate, count)
-    for power in range(1, count + 1):
-        invariants(frame, [element.parts.get(power, ring.zero) for element in computed])
+    try:
+        for power in range(1, count + 1):
+            invariants(frame, [element.parts.get(power, ring.zero) for element in computed])
+    except NotCovariantError:
+        raise InputError(
+            f"kernel {attitude_step.kernel.name} does not turn with its inputs: "
+            "what it loses in a run depends on the axes"
+        ) from None
 
 
 def _square(elements: Sequence[Powers]) -> _Matrix:

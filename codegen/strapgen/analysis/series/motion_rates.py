@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,7 @@ import sympy as sp
 from strapgen import catalogue
 from strapgen.catalogue.kernels.motion_models import MOTIONS, MotionModel
 from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.rate_expressions import time_symbol
 
@@ -47,6 +49,15 @@ class MotionRate:
         return sum(
             (element.diff(generator) * change for generator, change in self.changes.items()), self.ring.zero
         )
+
+
+@contextmanager
+def in_powers_of_the_step(kernel: str) -> Iterator[None]:
+    """Refuse a kernel, by its name, that has no series in the step length."""
+    try:
+        yield
+    except ArithmeticError as error:
+        raise InputError(f"kernel {kernel} has no series in the step length: {error}") from None
 
 
 def require(motion: str) -> None:

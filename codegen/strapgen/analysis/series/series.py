@@ -16,6 +16,7 @@ import sympy as sp
 from strapgen import catalogue, pipeline
 from strapgen.analysis.series import motion_rates
 from strapgen.analysis.series.invariants import Invariants, covariant_text, invariants, matrix, vector_texts
+from strapgen.analysis.series.motion_rates import in_powers_of_the_step
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -182,7 +183,7 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
     # At a constant rate every other power is missing.
     top = 1 + (order.step if order else 0) + terms * (2 if motion == "constant" else 1)
     most = top + one_step.PATIENCE
-    try:
+    with in_powers_of_the_step(attitude_step.kernel.name):
         while True:
             if motion == "general":
                 candidate = _general(attitude_step, terms, top)
@@ -195,10 +196,6 @@ def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeri
             if top >= most or (enough and any(parts[:2])):
                 return candidate
             top = top + 1 if any(parts) else most
-    except ArithmeticError as error:
-        raise InputError(
-            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
-        ) from None
 
 
 def _general(attitude_step: Step, terms: int, top: int) -> ErrorSeries:

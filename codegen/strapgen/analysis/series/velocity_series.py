@@ -16,6 +16,7 @@ import sympy as sp
 from strapgen import pipeline
 from strapgen.analysis.series import invariants
 from strapgen.analysis.series.invariants import LATEX, TEXT, covariant_text, with_forces
+from strapgen.analysis.series.motion_rates import in_powers_of_the_step
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -200,14 +201,12 @@ def series(choice: Choice, terms: int = 1) -> VelocitySeries:
         )
     top = 1 + (kernel.order.step if kernel.order else 0) + terms
     most = top + one_step.PATIENCE if kernel.order else _MOST_POWER
-    try:
+    with in_powers_of_the_step(kernel.name):
         while True:
             candidate = _series(kernel, terms, top)
             if top >= most or all(len(candidate.coefficients(part)) >= terms for part in candidate.parts):
                 return candidate
             top += 1
-    except ArithmeticError as error:
-        raise InputError(f"kernel {kernel.name} has no series in the step length: {error}") from None
 
 
 def parts_of(kernel: Kernel) -> tuple[str, ...]:

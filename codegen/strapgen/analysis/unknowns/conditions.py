@@ -28,6 +28,7 @@ from strapgen.analysis.series.invariants import (
     vector_invariants,
     with_forces,
 )
+from strapgen.analysis.series.motion_rates import in_powers_of_the_step
 from strapgen.analysis.unknowns.elimination import Equation
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -79,7 +80,7 @@ def attitude_conditions(attitude_step: Step, demand: Demand, more: int = 0) -> l
     """
     demand.require(velocity=False)
     top = demand.order + more
-    try:
+    with in_powers_of_the_step(attitude_step.kernel.name):
         if demand.motion == "general":
             frame, ring, rate = one_step.general_rate(attitude_step, top)
             error = one_step.errors(attitude_step, ring, rate, top)["error"]
@@ -88,10 +89,6 @@ def attitude_conditions(attitude_step: Step, demand: Demand, more: int = 0) -> l
         else:
             degree = len(attitude_step.intervals) - 1 if demand.motion == "polynomial" else top - 1
             vanish = _of_second_order(attitude_step, min(degree, top - 1) + 1, top)
-    except ArithmeticError as error:
-        raise InputError(
-            f"kernel {attitude_step.kernel.name} has no series in the step length: {error}"
-        ) from None
     if demand.motion == "coning":
         return [equation for power, one in vanish.items() for equation in _on_coning(power, one)]
     return [equation for power, one in vanish.items() for equation in _of_attitude_error(power, one)]
@@ -192,15 +189,13 @@ def velocity_conditions(kernel: Kernel, demand: Demand, more: int = 0) -> list[E
             f"kernel {kernel.name} returns no {part}_change, on which {demand.motion} sets conditions"
         )
     top = demand.order + more
-    try:
+    with in_powers_of_the_step(kernel.name):
         if demand.motion in ("polynomial", "sculling"):
             degree = kernel.inputs[0].shape[0] - 1 if demand.motion == "polynomial" else top - 1
             count = min(degree, top - 1) + 1
             rows = _of_small_motion(kernel, count, top)
         else:
             count, rows = top, velocity_series.coefficients(kernel, top)
-    except ArithmeticError as error:
-        raise InputError(f"kernel {kernel.name} has no series in the step length: {error}") from None
     state = _on_sculling if demand.motion == "sculling" else _of_change_error
     return [
         equation

@@ -16,7 +16,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
 if TYPE_CHECKING:
-    from strapgen.catalogue.methods.tableau import Tableau
+    from strapgen.catalogue.methods.tableaux import Tableau
 
 
 _Text = str | None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -18,6 +18,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel.kernel import Kernel
 from strapgen.lab import one_step
+from strapgen.results.records import entry
 
 #: States the conditions of a demand, and of some orders beyond it.
 State: TypeAlias = Callable[[Demand, int], list[Equation]]
@@ -25,6 +26,10 @@ State: TypeAlias = Callable[[Demand, int], list[Equation]]
 _PATIENCE = 3
 #: Most terms of a sum of squares that is minimised.
 _MOST_TERMS = 400
+
+
+def _terms(terms: Sequence[Equation]) -> dict[str, sp.Expr]:
+    return {each.label: each.value for each in terms}
 
 
 @dataclass(frozen=True)
@@ -47,9 +52,9 @@ class LeadingError:
 
     motion: str
     power: int
-    terms: tuple[Equation, ...]
-    square: sp.Expr
-    least: dict[sp.Symbol, sp.Expr]
+    terms: tuple[Equation, ...] = field(metadata=entry(write=_terms, kind=dict[str, str]))
+    square: sp.Expr = field(metadata=entry(key="sum_of_squares", kind=str))
+    least: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex

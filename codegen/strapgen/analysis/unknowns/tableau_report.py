@@ -17,7 +17,7 @@ from strapgen.analysis.unknowns.unknowns_report import (
     unknown_tableau_latex,
 )
 from strapgen.catalogue.methods import order_conditions
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.results.display.objects import method_latex
 from strapgen.results.records import INTERNAL, entry
 from strapgen.results.result import Result

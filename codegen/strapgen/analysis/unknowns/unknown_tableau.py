@@ -15,9 +15,8 @@ from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialS
 from strapgen.catalogue.methods import coefficient_files, tableaux
 from strapgen.catalogue.methods.coefficient_files import Source, Title
 from strapgen.catalogue.methods.order_conditions import Stages, symmetry, trees, weight_text, word_text, words
-from strapgen.catalogue.methods.tableau import Tableau
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, parse, refused
+from strapgen.catalogue.methods.tableaux import Tableau
+from strapgen.catalogue.toml_models import Key, UserFile, parse, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -185,7 +184,7 @@ class UnknownTableauFile:
 
     name: Title
     source: Source
-    order: Annotated[int, Key("Order that the method is to have", "1", least=1, most=MOST_ORDER)]
+    order: Annotated[int, Key("Required order of the method", "1", least=1, most=MOST_ORDER)]
     unknowns: Annotated[
         tuple[str, ...], Key("Names; where there is a choice, the first ones express the last", least=1)
     ]

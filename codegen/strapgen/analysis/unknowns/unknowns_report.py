@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import sympy as sp
 
@@ -29,9 +28,6 @@ def text_of(expression: sp.Expr) -> str:
     return str(sp.sstr(expression))
 
 
-# Families
-
-
 def family_lines(number: int, family: Family) -> list[str]:
     """Return a family as text."""
     names = ", ".join(symbol.name for symbol in family.free)
@@ -53,39 +49,12 @@ def condition_lines(conditions: Sequence[Equation]) -> Iterator[str]:
         yield f"  and {len(conditions) - _MOST_CONDITIONS} more, which --format json shows"
 
 
-# Steps
-
-
-def _texts(values: Mapping[Any, sp.Expr]) -> dict[str, str]:
-    return {str(name): text_of(value) for name, value in values.items()}
-
-
-@dataclass(frozen=True)
-class LeadingTerms:
-    """The first error that a family leaves on a motion."""
-
-    motion: str
-    #: Power of the step at which it stands
-    power: int
-    #: Its coefficients as functions of the free parameters
-    terms: dict[str, str]
-    sum_of_squares: str
-    #: Free parameters at which the sum of squares is least; empty where it does not depend on them
-    least: dict[str, str]
-
-    @staticmethod
-    def of(error: LeadingError) -> LeadingTerms:
-        """Return a leading error as text."""
-        terms = {each.label: text_of(each.value) for each in error.terms}
-        return LeadingTerms(error.motion, error.power, terms, text_of(error.square), _texts(error.least))
-
-
 @dataclass(frozen=True)
 class SolvedFamily:
     """Solutions with free parameters, and the errors that they leave."""
 
     family: Family = field(metadata=entry(spread=True))
-    leading_errors: list[LeadingTerms]
+    leading_errors: Sequence[LeadingError]
 
 
 @dataclass(frozen=True)
@@ -107,7 +76,7 @@ class SolvedResult(Result):
     def of(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None = None) -> SolvedResult:
         """Return what a step was solved to."""
         families = [
-            SolvedFamily(family, list(map(LeadingTerms.of, errors)))
+            SolvedFamily(family, errors)
             for family, errors in zip(solved.families, solved.leading, strict=True)
         ]
         name, demands, conditions = solved.kernel.name, solved.demands, solved.conditions

@@ -1,7 +1,12 @@
-"""Attitude steps in transition form from a kinematics, a method and samples of the rate."""
+"""Attitude steps in transition form from a kinematics, a method and samples of the rate, and vectors of a step.
+
+A step from the Legendre coefficients of the rate takes what any filters of samples estimate. The sculling term of a
+step follows from its coning term, to which it is dual.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import count
@@ -9,11 +14,18 @@ from itertools import count
 import sympy as sp
 
 from strapgen.catalogue.kinematics import KINEMATICS, Kinematics
-from strapgen.catalogue.methods.method import Method
-from strapgen.catalogue.methods.samples import Samples
+from strapgen.catalogue.methods import rate_fit, windowed
+from strapgen.catalogue.methods.method import (
+    Method,
+    Samples,
+    increments_signal,
+    sample_names,
+    velocities_signal,
+)
+from strapgen.catalogue.methods.window import Window
 from strapgen.ir.kernel_info import AttitudeStep, Order, Truncation
 from strapgen.ir.signals import Signal
-from strapgen.kernel.algebra import dot
+from strapgen.kernel.algebra import cross, dot, exact
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
@@ -139,3 +151,113 @@ def product(name: str) -> Kernel:
     state, transition = build.input(kinematics.state), build.input(kinematics.transition)
     build.output(kinematics.next, kinematics.product(state, transition))
     return build.kernel(f"{name}-product", f"{kinematics.title}: state after a transition", kinematics.source)
+
+
+_SOURCE = "the rate as a Legendre series"
+
+
+def legendre_step(name: str, degree: int, terms: int = 0) -> Kernel:
+    """Derive the step of a window after its filters: from Legendre coefficients of the rate times the step, in rad.
+
+    `terms` of the power series give the exact rotation; with 0 the rotation vector is to fourth order.
+    """
+    kinematics = KINEMATICS[name]
+    build = KernelBuilder()
+    state = build.input(kinematics.state)
+    samples = Coefficients(build, [build.input(_coefficient_signal(m)) for m in range(degree + 1)])
+    method = windowed.method(unfiltered(degree, terms))
+    transition = method.transition(build, kinematics, samples)
+    build.output(kinematics.next, kinematics.product(state, build.stage(kinematics.transition, transition)))
+    return build.kernel(
+        f"{name}-legendre-{'exact-' if terms else ''}{degree}",
+        f"{kinematics.title}: step from the Legendre coefficients of the rate to degree {degree}"
+        + (", exact rotation" if terms else ""),
+        f"{kinematics.source}; {method.source}",
+    )
+
+
+def coefficient_name(m: int) -> str:
+    """Return the name of the input for a Legendre coefficient."""
+    return f"legendre_{m}"
+
+
+class Coefficients(Samples):
+    """Legendre coefficients of the rate times the step as the samples of a step."""
+
+    def __init__(self, build: KernelBuilder, vectors: Sequence[sp.Matrix]) -> None:
+        self._build = build
+        self._labels = {}
+        self._symbols = sp.Matrix.vstack(*(vector.T for vector in vectors))
+        self.increments, self.previous, self.ahead = len(vectors), 0, 0
+        self.fit = rate_fit.from_legendre(unfiltered(len(vectors) - 1).filters)
+
+
+def _coefficient_signal(m: int) -> Signal:
+    return Signal.vector(
+        coefficient_name(m),
+        f"c{m}",
+        unit="rad",
+        meaning=f"Legendre coefficient {m} of the body rate times the step, body axes",
+        bound=Fraction(1),
+        frame="b",
+        over="cycle",
+    )
+
+
+def unfiltered(degree: int, terms: int = 0) -> Window:
+    """Return the window whose samples are the Legendre coefficients themselves."""
+    count = degree + 1
+    filters = tuple(tuple(Fraction(row == column) for column in range(count)) for row in range(count))
+    window = Window("legendre", "", _SOURCE, 1, 0, degree, count, Fraction(1), "minimax", filters)
+    return replace(window, rotation="exact", terms=terms) if terms else window
+
+
+def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
+    """Derive the sculling term of a step in m/s, body axes, by duality with the coning coefficients of a method.
+
+    The term is half the integral of (integral of w) x a + (integral of a) x w.
+    """
+    if method.coning is None:
+        raise ValueError(f"{method.name} has no coning coefficients")
+    pairs = method.coning(increments, previous)
+    build = KernelBuilder()
+    angles = increments_signal(increments, previous)
+    names = [sample_names(increments, previous, letter=letter) for letter in "dv"]
+    velocities = velocities_signal(increments, previous)
+    d, v = build.input(angles), build.input(velocities)
+    rows = [d[k, :].T for k in range(d.rows)], [v[k, :].T for k in range(v.rows)]
+    total = sp.zeros(3, 1)
+    for newer in range(1, d.rows):
+        for levered, crossed, what in ((0, 1, "angle"), (1, 0, "velocity")):
+            weights = {older: c for (older, other), c in pairs.items() if other == newer and c}
+            if not weights:
+                continue
+            name = f"{what}_lever_{names[crossed][newer]}"
+            signal = Signal.vector(
+                name,
+                name,
+                unit=(angles, velocities)[levered].unit,
+                meaning=f"sum of older {what} increments that is crossed with {names[crossed][newer]}",
+            )
+            terms = (exact(c) * rows[levered][older] for older, c in weights.items())
+            lever = build.stage(signal, sum(terms, sp.zeros(3, 1)))
+            total += cross(lever, rows[crossed][newer])
+    build.output(
+        Signal.vector(
+            "sculling",
+            "sculling",
+            unit="m/s",
+            meaning="sculling term of the velocity change, body axes",
+            frame="b",
+            over="cycle",
+        ),
+        total,
+    )
+    suffix, option, samples_text = chosen(method, increments, previous)
+    samples_text = samples_text.replace("angle ", "angle and velocity ")
+    return build.kernel(
+        f"sculling-{suffix}",
+        f"Sculling term of a step by {method.title.partition(',')[0]} from {samples_text}",
+        f"{method.source.partition('; ')[0]}; by duality: K. M. Roscoe, J. Guid. Control Dyn. 24 (2001) 201-205",
+        arguments=f"sculling {option}",
+    )

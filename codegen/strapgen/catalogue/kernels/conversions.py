@@ -1,18 +1,30 @@
-"""Conversions between direction cosine matrix, Euler parameters and Cayley-Klein parameters."""
+"""Conversions between attitude representations, and the error matrix of a computed attitude."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
 
-from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM, EULER, SAVAGE, THESIS, Kinematics
+from strapgen.catalogue.kinematics import (
+    CAYLEY_KLEIN,
+    DCM,
+    DCM_MEANING,
+    EULER,
+    KINEMATICS,
+    SAVAGE,
+    THESIS,
+    UNIT,
+    Kinematics,
+)
 from strapgen.ir.kernel_info import Recursion
-from strapgen.ir.signals import Signal
+from strapgen.ir.signals import ANY, Signal
 from strapgen.kernel import algebra
-from strapgen.kernel.kernel import Kernel, KernelBuilder
+from strapgen.kernel.algebra import Direction, Wrapped
+from strapgen.kernel.kernel import EPSILON, Kernel, KernelBuilder
 
 _CONVERTED = Signal.matrix(
     "attitude", "C", meaning=DCM.state.meaning, bound=DCM.state.bound, constraint="rotation", frame="b to n"
@@ -25,7 +37,16 @@ def _result(kinematics: Kinematics) -> Signal:
     return replace(state, name="converted", elements=elements)
 
 
-def dcm_from_euler() -> Kernel:
+def converted(to: str, source: str) -> Kernel:
+    """Derive the conversion between two attitude representations."""
+    if to == "dcm":
+        return _dcm_from_euler() if source == "euler" else _dcm_from_cayley_klein()
+    if source == "dcm":
+        return _from_dcm(KINEMATICS[to])
+    return _reordered(KINEMATICS[source], KINEMATICS[to])
+
+
+def _dcm_from_euler() -> Kernel:
     """Derive the direction cosine matrix from v -> e v e*."""
     build = KernelBuilder()
     e = build.input(EULER.state)
@@ -38,7 +59,7 @@ def dcm_from_euler() -> Kernel:
     )
 
 
-def dcm_from_cayley_klein() -> Kernel:
+def _dcm_from_cayley_klein() -> Kernel:
     """Derive the direction cosine matrix from C_jk = 1/2 tr(s_j U' s_k U), U' the conjugate transpose."""
     build = KernelBuilder()
     U = algebra.cayley_klein_matrix(build.input(CAYLEY_KLEIN.state))
@@ -93,8 +114,8 @@ def _sign(expression: sp.Expr) -> sp.Piecewise:
     return sp.Piecewise((sp.Integer(1), expression >= 0), (sp.Integer(-1), True))
 
 
-def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
-    """Derive a unit quaternion whose scalar part is not negative."""
+def _from_dcm(kinematics: Kinematics) -> Kernel:
+    """Derive a unit quaternion whose scalar part is not negative, accurate at every attitude."""
     build = KernelBuilder()
     column, largest, _ = _largest_column(build)
     factor = build.value(
@@ -104,7 +125,7 @@ def _from_dcm(kinematics: Kinematics, name: str) -> Kernel:
     by_label = dict(zip("xyzs", column, strict=True))
     build.output(converted, [factor * by_label[element[-1]] for element in converted.elements])
     return build.kernel(
-        name,
+        f"{kinematics.name}-from-dcm",
         f"{kinematics.title} from a direction cosine matrix",
         f"{THESIS}, chapter 2, inverted; largest element first as in S. W. Shepperd, J. Guidance and Control"
         " 1 (1978) 223-224",
@@ -151,17 +172,8 @@ def euler_from_dcm_followed(rule: str) -> Kernel:
     )
 
 
-def euler_from_dcm() -> Kernel:
-    """Derive Euler parameters from a direction cosine matrix, accurate at every attitude."""
-    return _from_dcm(EULER, "euler-from-dcm")
-
-
-def cayley_klein_from_dcm() -> Kernel:
-    """Derive Cayley-Klein parameters from a direction cosine matrix, accurate at every attitude."""
-    return _from_dcm(CAYLEY_KLEIN, "cayley-klein-from-dcm")
-
-
-def _reorder(source: Kinematics, target: Kinematics) -> Kernel:
+def _reordered(source: Kinematics, target: Kinematics) -> Kernel:
+    """Derive one unit quaternion from another: the scalar moves to the other end."""
     build = KernelBuilder()
     x = build.input(source.state)
     by_label = {symbol.name[-1]: symbol for symbol in x}
@@ -174,11 +186,152 @@ def _reorder(source: Kinematics, target: Kinematics) -> Kernel:
     )
 
 
-def euler_from_cayley_klein() -> Kernel:
-    """Derive Euler parameters from Cayley-Klein parameters: the scalar moves to the end."""
-    return _reorder(CAYLEY_KLEIN, EULER)
+ANGLES = Signal(
+    "angles",
+    (3,),
+    ("roll", "pitch", "heading"),
+    unit="rad",
+    meaning="Euler angles: roll, pitch, heading",
+    bound=Fraction(355, 113),
+    frame=ANY,
+)
+#: Squared cosine of pitch below which heading is computed from its sum or difference with roll.
+_STEEP = sp.Rational(1, 4)
+#: Cosine of pitch, in units of the resolution, up to which the matrix does not determine roll and heading separately.
+_VERTICAL = 2
 
 
-def cayley_klein_from_euler() -> Kernel:
-    """Derive Cayley-Klein parameters from Euler parameters: the scalar moves to the front."""
-    return _reorder(EULER, CAYLEY_KLEIN)
+def dcm_from_euler_angles() -> Kernel:
+    """Derive the direction cosine matrix of Euler angles, equation (60)."""
+    build = KernelBuilder()
+    roll, pitch, heading = build.input(ANGLES)
+
+    def turned(angle: sp.Expr, name: str, axis: int) -> sp.Matrix:
+        c, s = build.value(f"cos_{name}", sp.cos(angle)), build.value(f"sin_{name}", sp.sin(angle))
+        matrix, (j, k) = sp.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
+        matrix[j, j] = matrix[k, k] = c
+        matrix[k, j], matrix[j, k] = s, -s
+        return matrix
+
+    product = turned(heading, "heading", 2) * turned(pitch, "pitch", 1) * turned(roll, "roll", 0)
+    build.output(replace(DCM.state, name="attitude", frame=ANY), product)
+    return build.kernel(
+        "dcm-from-euler-angles", "Direction cosine matrix from Euler angles", f"{SAVAGE}, equation (60)"
+    )
+
+
+def followed_angles(
+    build: KernelBuilder, C: sp.Matrix, before: sp.Symbol, names: tuple[str, str, str]
+) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
+    """Name roll, pitch and heading of a rotation in rad, equations (61) to (63); a vertical pitch keeps `before`."""
+    square = build.value("cosine_squared", C[0, 0] ** 2 + C[1, 0] ** 2, f"square of the cosine of {names[1]}")
+    pitch = build.value(f"next_{names[1]}", sp.atan2(-C[2, 0], sp.sqrt(square)), names[1])
+    vertical = (_VERTICAL * EPSILON) ** 2
+    roll = build.value(
+        f"next_{names[0]}",
+        sp.Piecewise((before, square <= vertical), (sp.atan2(C[2, 1], C[2, 2]), True)),
+        f"{names[0]}; held where {names[1]} is vertical",
+    )
+    up = C[2, 0] <= 0
+    sine = build.value(
+        "steep_sine",
+        sp.Piecewise((C[1, 2] - C[0, 1], up), (-C[1, 2] - C[0, 1], True)),
+        f"{names[2]} - {names[0]}, or +",
+    )
+    cosine = build.value("steep_cosine", sp.Piecewise((C[1, 1] + C[0, 2], up), (C[1, 1] - C[0, 2], True)))
+    apart = build.value("apart", Direction(sine, cosine), "the angle between or together")
+    heading = build.value(
+        f"next_{names[2]}",
+        sp.Piecewise(
+            (sp.atan2(C[1, 0], C[0, 0]), square >= _STEEP),
+            (Wrapped(apart + sp.Piecewise((roll, up), (-roll, True))), True),
+        ),
+        names[2],
+    )
+    return roll, pitch, heading
+
+
+def euler_angles_from_dcm() -> Kernel:
+    """Derive the Euler angles of a direction cosine matrix, equations (61) to (63).
+
+    Equation (63) holds at every pitch: C23 - C12 and C13 + C22 are 1 + sin(pitch) times the sine and cosine of
+    heading - roll. It is used at steep pitch, so that heading - roll (or their sum) is as accurate as the matrix even
+    where neither angle is by itself. If the pitch is vertical to the last digit, roll does not change.
+    """
+    build = KernelBuilder()
+    C = build.input(replace(DCM.state, frame=ANY))
+    before = build.input(
+        replace(
+            ANGLES,
+            name="previous",
+            elements=tuple(f"last_{e}" for e in ANGLES.elements),
+            meaning="the angles before",
+        )
+    )
+    roll, pitch, heading = followed_angles(build, C, before[0], ("roll", "pitch", "heading"))
+    build.output(
+        replace(ANGLES, name="next", elements=tuple(f"found_{e}" for e in ANGLES.elements)),
+        [roll, pitch, heading],
+    )
+    return build.kernel(
+        "euler-angles-from-dcm",
+        "Euler angles from a direction cosine matrix",
+        f"{SAVAGE}, equations (61) to (63), the root of (61) of C11^2 + C21^2",
+        recursion=Recursion((("previous", "next"),), retained=("previous",)),
+        notes=(
+            "Heading - roll at pitch up, heading + roll at pitch down, are as good as the matrix at every pitch.",
+            "Errors of angles are told without whole turns.",
+        ),
+    )
+
+
+def error_matrix() -> Kernel:
+    """Derive E = C_computed C_true' - I and its parts, reference axes, in rad.
+
+    Scale is the diagonal, skew the symmetric part off the diagonal, and drift the skew-symmetric part. If
+    C_computed = exp(skew(eps)) C_true, the drift is -eps to first order.
+    """
+    build = KernelBuilder()
+    computed = build.input(
+        Signal.matrix(
+            "computed",
+            "C",
+            meaning=f"{DCM_MEANING}, computed",
+            bound=UNIT,
+            constraint="rotation",
+            frame="b to n",
+        )
+    )
+    truth = build.input(
+        Signal.matrix(
+            "truth", "T", meaning=f"{DCM_MEANING}, true", bound=UNIT, constraint="rotation", frame="b to n"
+        )
+    )
+    E = build.output(
+        Signal.matrix("error", "E", meaning="error matrix, reference axes", frame="n"),
+        computed * truth.T - sp.eye(3),
+    )
+    symmetric, turning = (E + E.T) / 2, (E - E.T) / 2
+    build.output(
+        Signal.vector("scale", "scale", meaning="scale errors, reference axes", frame="n"), E.diagonal()
+    )
+    build.output(
+        Signal.vector("skew", "skew", unit="rad", meaning="skew errors, reference axes", frame="n"),
+        [symmetric[1, 2], symmetric[0, 2], symmetric[0, 1]],
+    )
+    build.output(
+        Signal.vector(
+            "drift",
+            "drift",
+            unit="rad",
+            meaning="drift errors, reference axes: the rotation from the computed frame to the true one",
+            frame="n",
+        ),
+        [-turning[2, 1], -turning[0, 2], -turning[1, 0]],
+    )
+    return build.kernel(
+        "error-matrix",
+        "Error matrix of a computed attitude: scale, skew and drift",
+        f"{THESIS}, chapter 4 A",
+        notes=("The true matrix is a rotation.",),
+    )

@@ -1,26 +1,26 @@
-"""Exact Jacobians of an attitude step, for Kalman filters and least squares.
+"""Exact Jacobians of an attitude step, for Kalman filters and least squares, and of the vectors of a step.
 
 The step is bilinear in state and transition, so its Jacobian by the state holds the elements of the transition. That by
 the increments follows from the covariant form of the transition: a polynomial transition of few vectors is
 differentiated as a function of those; of a rotation vector that is one, the exponential follows by the chain rule;
-every other transition is differentiated stage by stage.
+every other transition is differentiated stage by stage, as are rotation vector, sculling term, velocity and position.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from strapgen.catalogue.kernels import attitude_step, velocity_position
 from strapgen.catalogue.kernels.attitude_step import chosen, smooth
 from strapgen.catalogue.kinematics import DCM, EULER, KINEMATICS, Kinematics
-from strapgen.catalogue.methods.method import PHI, Method
-from strapgen.catalogue.methods.samples import Samples, increments_signal
+from strapgen.catalogue.methods.method import PHI, Method, Samples, increments_signal
 from strapgen.ir.signals import Signal
 from strapgen.kernel import algebra
 from strapgen.kernel.covariants import Decomposition, Frame, NotCovariantError
-from strapgen.kernel.derivatives import CovariantFunction, add_tangents
+from strapgen.kernel.derivatives import CovariantFunction, add_tangents, tangent
 from strapgen.kernel.kernel import Kernel, KernelBuilder, Stage, degree, evaluate_stages
 
 #: Most vectors of a transition that is differentiated as a function of them, and of a rotation vector.
@@ -338,3 +338,59 @@ def _matrix(name: str, shape: tuple[int, int], what: str, unit: str) -> Signal:
 def _side_by_side(columns: Sequence[sp.Matrix]) -> list[sp.Expr]:
     """Return the elements of a matrix of columns, row by row."""
     return [column[row] for row in range(len(columns[0])) for column in columns]
+
+
+def rotation_vector(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:
+    """Derive the Jacobian of the rotation vector of a step, see `jacobian`."""
+    return jacobian(attitude_step.rotation_vector(method, increments, previous, ahead))
+
+
+def sculling(method: Method, increments: int, previous: int = 0) -> Kernel:
+    """Derive the Jacobians of the sculling term of a step, see `jacobian`."""
+    return jacobian(attitude_step.sculling(method, increments, previous))
+
+
+def velocity_and_position(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> Kernel:
+    """Derive the Jacobians of the velocity and position change of a step, see `jacobian`."""
+    return jacobian(velocity_position.step(method, increments, previous, ahead))
+
+
+def jacobian(kernel: Kernel) -> Kernel:
+    """Derive ``<output>_by_<input>`` for every pair: rows are elements of the output, columns of the input.
+
+    The expressions of the kernel must have derivatives everywhere.
+    """
+    build = KernelBuilder()
+    for signal in kernel.inputs:
+        build.input(signal)
+    build.stages = list(kernel.stages)
+    outputs = []
+    for signal in kernel.inputs:
+        rows: dict[str, list[list[sp.Expr]]] = {stage.signal.name: [] for stage in kernel.outputs}
+        for element in signal.elements:
+            along = {sp.Symbol(element, real=True): sp.Integer(1)}
+            known = add_tangents(build, kernel.stages, along, f"by_{element}", "1")
+            for stage in kernel.outputs:
+                symbols = (sp.Symbol(name, real=True) for name in stage.signal.elements)
+                pairs = zip(symbols, stage.expressions, strict=True)
+                rows[stage.signal.name].append([tangent(*pair, known) for pair in pairs])
+        for stage in kernel.outputs:
+            outputs.append((_derivatives_signal(stage.signal, signal), rows[stage.signal.name]))
+    for matrix, columns in outputs:
+        build.output(matrix, [column[row] for row in range(matrix.shape[0]) for column in columns])
+    first, _, rest = kernel.arguments.partition(" ")
+    return replace(
+        build.kernel(
+            kernel.name.replace(first, f"{first}-jacobian", 1), f"Jacobians of: {kernel.title}", kernel.source
+        ),
+        order=kernel.order,
+        arguments=f"{first}-jacobian {rest}",
+    )
+
+
+def _derivatives_signal(output: Signal, by: Signal) -> Signal:
+    name = f"{output.name}_by_{by.name}"
+    elements = tuple(f"{name}_{row}_{column}" for row in range(output.size) for column in range(by.size))
+    unit = "1" if output.unit == by.unit else f"({output.unit})/{by.unit}" if by.unit != "1" else output.unit
+    meaning = f"derivatives of {output.name} by {by.name}, row by row"
+    return Signal(name, (output.size, by.size), elements, unit=unit, meaning=meaning)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from strapgen.catalogue.method_names import ALGORITHMS
+from collections.abc import Callable
+
 from strapgen.catalogue.methods.windows import EXACT_TERMS
+from strapgen.catalogue.names import ALGORITHMS
 from strapgen.ir.kernel_info import Recipe
 
 #: Motions with a closed-form attitude, and the unit of each of their parameters.
@@ -26,47 +28,48 @@ _STANDARD_TWO_SPEED = (
     *("euler-from-dcm-sheppard", "dcm-from-euler-angles", "euler-angles-from-dcm"),
 )
 
+
+def _recipes(module: str) -> Callable[..., Recipe]:
+    """Return what makes a recipe of a title, a function of a module of this folder, and its arguments."""
+    return lambda title, function, *arguments: Recipe(title, f"{__package__}.{module}", function, arguments)
+
+
+_step, _loop, _conversion, _orthonormalization, _motion = map(
+    _recipes, ("attitude_step", "two_speed_kernels", "conversions", "orthonormal", "motion_models")
+)
+
 #: Kernels of algorithms in two speeds.
 _TWO_SPEED = {
     **{
-        f"{algorithm}-update": Recipe(
-            f"{title}: update by a rotation vector", "updates", "update", (algorithm,)
-        )
+        f"{algorithm}-update": _loop(f"{title}: update by a rotation vector", "update", algorithm)
         for algorithm, title in ALGORITHMS.items()
     },
     **{
-        f"{algorithm}-update-{order}": Recipe(
-            f"{title}: update by a rotation vector, order {order}",
-            "updates",
-            "update",
-            (algorithm, order),
+        f"{algorithm}-update-{order}": _loop(
+            f"{title}: update by a rotation vector, order {order}", "update", algorithm, order
         )
         for algorithm, title in ALGORITHMS.items()
         for order in UPDATE_ORDERS
     },
     **{
-        f"{algorithm}-navigation-update{suffix}": Recipe(
+        f"{algorithm}-navigation-update{suffix}": _loop(
             f"{title}: update by the rotation of the navigation frame{words}",
-            "updates",
             "navigation_update",
-            (algorithm, order),
+            algorithm,
+            order,
         )
         for algorithm, title in ALGORITHMS.items()
         for order, suffix, words in ((1, "-1", ", order 1"), (2, "-2", ", order 2"), (None, "", ""))
     },
-    "navigation-rotation": Recipe(
-        "rotation of the navigation frame, trapezoidal", "updates", "navigation_rotation"
-    ),
-    "coning-fast": Recipe("rotation vector by recursion: fast loop", "coning_sculling", "coning"),
-    "coning-slow": Recipe("rotation vector by recursion: slow loop", "coning_sculling", "rotation_vector"),
+    "navigation-rotation": _loop("rotation of the navigation frame, trapezoidal", "navigation_rotation"),
+    "coning-fast": _loop("rotation vector by recursion: fast loop", "coning"),
+    "coning-slow": _loop("rotation vector by recursion: slow loop", "rotation_vector"),
     **{
-        f"sculling-fast-{form}": Recipe(
-            f"sculling integral S{form} by recursion: fast loop", "coning_sculling", "sculling", (form,)
-        )
+        f"sculling-fast-{form}": _loop(f"sculling integral S{form} by recursion: fast loop", "sculling", form)
         for form in (1, 2)
     },
     **{
-        f"{name}-{what}": Recipe(title, "acceleration", function, (name, *more))
+        f"{name}-{what}": _loop(title, function, name, *more)
         for name in ("dcm", "euler")
         for what, title, function, *more in (
             ("acceleration", "acceleration transformation", "transformation"),
@@ -74,37 +77,31 @@ _TWO_SPEED = {
             ("velocity-2", "velocity increment in navigation axes with S2", "velocity", 2),
         )
     },
-    "navigation-velocity": Recipe(
-        "velocity correction for the rotation of the navigation frame", "acceleration", "navigation_velocity"
+    "navigation-velocity": _loop(
+        "velocity correction for the rotation of the navigation frame", "navigation_velocity"
     ),
-    "dcm-rows-orthogonalize": Recipe(
-        "rows made orthogonal, to first order", "orthonormal", "rows_orthogonalized"
+    "dcm-rows-orthogonalize": _orthonormalization(
+        "rows made orthogonal, to first order", "rows_orthogonalized"
     ),
-    "dcm-rows-normalize": Recipe("rows made of length 1, to first order", "orthonormal", "rows_normalized"),
-    "dcm-third-row": Recipe("third row from the first two", "orthonormal", "third_row"),
+    "dcm-rows-normalize": _orthonormalization("rows made of length 1, to first order", "rows_normalized"),
+    "dcm-third-row": _orthonormalization("third row from the first two", "third_row"),
     **{
-        f"{name}-normalize-first-order": Recipe(
-            "normalization to first order", "orthonormal", "normalized_first_order", (name,)
+        f"{name}-normalize-first-order": _orthonormalization(
+            "normalization to first order", "normalized_first_order", name
         )
         for name in ("euler", "cayley-klein")
     },
-    "euler-from-dcm-sheppard": Recipe(
-        "conversion: the largest parameter keeps its sign",
-        "conversions",
-        "euler_from_dcm_followed",
-        ("element",),
+    "euler-from-dcm-sheppard": _conversion(
+        "conversion: the largest parameter keeps its sign", "euler_from_dcm_followed", "element"
     ),
-    "euler-from-dcm-continuous": Recipe(
-        "conversion: the nearer sign to the call before",
-        "conversions",
-        "euler_from_dcm_followed",
-        ("product",),
+    "euler-from-dcm-continuous": _conversion(
+        "conversion: the nearer sign to the call before", "euler_from_dcm_followed", "product"
     ),
-    "dcm-from-euler-angles": Recipe(
-        "conversion: direction cosine matrix from Euler angles", "euler_angles", "dcm_from_euler_angles"
+    "dcm-from-euler-angles": _conversion(
+        "conversion: direction cosine matrix from Euler angles", "dcm_from_euler_angles"
     ),
-    "euler-angles-from-dcm": Recipe(
-        "conversion: Euler angles from direction cosine matrix", "euler_angles", "euler_angles_from_dcm"
+    "euler-angles-from-dcm": _conversion(
+        "conversion: Euler angles from direction cosine matrix", "euler_angles_from_dcm"
     ),
 }
 
@@ -112,66 +109,49 @@ TWO_SPEED = {
     name: recipe._replace(standard=name in _STANDARD_TWO_SPEED) for name, recipe in _TWO_SPEED.items()
 }
 
-#: The others, each with the module of this folder and the function that derive it.
-_KERNELS = {
+#: Kernels that take no method.
+KERNELS = {
     **{
-        f"{algorithm}-product": Recipe(
-            f"{title}: state after a transition", "attitude_step", "product", (algorithm,)
-        )
+        f"{algorithm}-product": _step(f"{title}: state after a transition", "product", algorithm)
         for algorithm, title in ALGORITHMS.items()
     },
     **{
-        f"{name}-legendre-{exact}{degree}": Recipe(
+        f"{name}-legendre-{exact}{degree}": _step(
             f"{ALGORITHMS[name]}: step from the Legendre coefficients of the rate to degree {degree}"
             + (", exact rotation" if exact else ""),
             "legendre_step",
-            "step",
-            (name, degree, EXACT_TERMS) if exact else (name, degree),
-            False,
-        )
+            *((name, degree, EXACT_TERMS) if exact else (name, degree)),
+        )._replace(standard=False)
         for name in ("dcm", "euler")
         for exact, degrees in (("", LEGENDRE_DEGREES), ("exact-", EXACT_DEGREES))
         for degree in degrees
     },
-    "dcm-orthonormalize": Recipe(
-        "orthonormalization by dual rows, the thesis's scheme", "orthonormal", "dcm"
+    "dcm-orthonormalize": _orthonormalization("orthonormalization by dual rows, the thesis's scheme", "dcm"),
+    "dcm-orthonormalize-optimal": _orthonormalization("the nearest rotation", "dcm_optimal"),
+    "dcm-orthonormalize-first-order": _orthonormalization(
+        "the nearest rotation to first order", "dcm_expansion", 1
     ),
-    "dcm-orthonormalize-optimal": Recipe("the nearest rotation", "orthonormal", "dcm_optimal"),
-    "dcm-orthonormalize-first-order": Recipe(
-        "the nearest rotation to first order", "orthonormal", "dcm_first_order"
+    "dcm-orthonormalize-second-order": _orthonormalization(
+        "the nearest rotation to second order", "dcm_expansion", 2
     ),
-    "dcm-orthonormalize-second-order": Recipe(
-        "the nearest rotation to second order", "orthonormal", "dcm_second_order"
-    ),
-    "euler-normalize": Recipe("exact normalization", "orthonormal", "euler"),
-    "cayley-klein-normalize": Recipe("exact normalization", "orthonormal", "cayley_klein"),
+    "euler-normalize": _orthonormalization("exact normalization", "normalized", "euler"),
+    "cayley-klein-normalize": _orthonormalization("exact normalization", "normalized", "cayley-klein"),
     **{
-        f"{to}-from-{source}": Recipe(
-            f"conversion: {ALGORITHMS[to]} from {ALGORITHMS[source]}",
-            "conversions",
-            f"{to}_from_{source}".replace("-", "_"),
+        f"{to}-from-{source}": _conversion(
+            f"conversion: {ALGORITHMS[to]} from {ALGORITHMS[source]}", "converted", to, source
         )
         for to in ALGORITHMS
         for source in ALGORITHMS
         if to != source
     },
-    "error-matrix": Recipe("scale, skew and drift of a computed attitude", "error_matrix", "error_matrix"),
+    "error-matrix": _conversion("scale, skew and drift of a computed attitude", "error_matrix"),
     **{
-        f"{motion}-truth": Recipe(
-            f"rate and true attitude of the {motion} motion", "motion_models", "truth", (motion,)
-        )
+        f"{motion}-truth": _motion(f"rate and true attitude of the {motion} motion", "truth", motion)
         for motion in MOTIONS
     },
     **{
-        f"{motion}-increments": Recipe(
-            f"exact increments of the {motion} motion", "motion_models", "increments", (motion,)
-        )
+        f"{motion}-increments": _motion(f"exact increments of the {motion} motion", "increments", motion)
         for motion in MOTIONS
     },
     **TWO_SPEED,
-}
-
-#: Kernels that take no method.
-KERNELS = {
-    name: recipe._replace(module=f"{__package__}.{recipe.module}") for name, recipe in _KERNELS.items()
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from strapgen.catalogue.kinematics import CAYLEY_KLEIN, DCM_MEANING, EULER, SAVAGE, THESIS, UNIT, Kinematics
+from strapgen.catalogue.kinematics import DCM_MEANING, KINEMATICS, SAVAGE, THESIS, UNIT
 from strapgen.ir.signals import Signal
 from strapgen.kernel import algebra
 from strapgen.kernel.kernel import Kernel, KernelBuilder
@@ -23,7 +23,9 @@ _RESULT = Signal.matrix(
 _NEAR = "Made for a matrix near a rotation: all products of its transpose and itself near the identity."
 
 
-def _normalize(kinematics: Kinematics) -> Kernel:
+def normalized(name: str) -> Kernel:
+    """Derive the exact normalization of Euler or Cayley-Klein parameters."""
+    kinematics = KINEMATICS[name]
     build = KernelBuilder()
     x = build.input(kinematics.state)
     factor = build.value("inverse_norm", 1 / sp.sqrt(algebra.dot(x, x)), "1/|state|")
@@ -36,16 +38,6 @@ def _normalize(kinematics: Kinematics) -> Kernel:
             "The state must not be zero, which has no direction: in floating point the result is then NaN.",
         ),
     )
-
-
-def euler() -> Kernel:
-    """Derive the exact normalization of Euler parameters."""
-    return _normalize(EULER)
-
-
-def cayley_klein() -> Kernel:
-    """Derive the exact normalization of Cayley-Klein parameters."""
-    return _normalize(CAYLEY_KLEIN)
 
 
 def dcm() -> Kernel:
@@ -131,7 +123,8 @@ def dcm_optimal() -> Kernel:
     )
 
 
-def _expansion(order: int) -> Kernel:
+def dcm_expansion(order: int) -> Kernel:
+    """Derive the nearest rotation to first order, C (I - S/2) with S = C'C - I, or to second, C (I - S/2 + 3/8 S^2)."""
     build = KernelBuilder()
     C = build.input(_COMPUTED)
     S = _symmetric(build, "excess", "C' C - I", C.T * C - sp.eye(3))
@@ -149,16 +142,6 @@ def _expansion(order: int) -> Kernel:
         f"{THESIS}, appendix B, equation {'(B.4)' if order == 1 else '(B.14)'} in terms of the computed matrix",
         notes=(_NEAR,),
     )
-
-
-def dcm_first_order() -> Kernel:
-    """Derive the optimal orthonormalization to first order, C (I - S/2) with S = C'C - I."""
-    return _expansion(1)
-
-
-def dcm_second_order() -> Kernel:
-    """Derive the optimal orthonormalization to second order, C (I - S/2 + 3/8 S^2) with S = C'C - I."""
-    return _expansion(2)
 
 
 def rows_orthogonalized() -> Kernel:
@@ -220,7 +203,7 @@ def third_row() -> Kernel:
 
 def normalized_first_order(name: str) -> Kernel:
     """Derive the normalization of a unit quaternion to first order, equations (41) and (42)."""
-    kinematics = {"euler": EULER, "cayley-klein": CAYLEY_KLEIN}[name]
+    kinematics = KINEMATICS[name]
     build = KernelBuilder()
     x = build.input(kinematics.state)
     error = build.value("error", algebra.dot(x, x) - 1, "|state|^2 - 1")

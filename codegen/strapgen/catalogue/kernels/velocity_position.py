@@ -19,12 +19,16 @@ from itertools import pairwise
 
 import sympy as sp
 
-from strapgen.catalogue.kernels.attitude_step import chosen, smooth
-from strapgen.catalogue.kernels.legendre_step import Coefficients, unfiltered
+from strapgen.catalogue.kernels.attitude_step import Coefficients, chosen, smooth, unfiltered
 from strapgen.catalogue.kinematics import EULER
-from strapgen.catalogue.methods import fit_exact, legendre_vector, rotation_series, windowed
-from strapgen.catalogue.methods.method import Method, exponential
-from strapgen.catalogue.methods.samples import Samples, increments_signal, velocities_signal
+from strapgen.catalogue.methods import polynomial_rotation, rotation_series, windowed
+from strapgen.catalogue.methods.method import (
+    Method,
+    Samples,
+    exponential,
+    increments_signal,
+    velocities_signal,
+)
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windowed import DEGREE
 from strapgen.ir.signals import Signal
@@ -138,7 +142,9 @@ def _of_coefficients(window: Window, degree: int) -> Method:
     terms = rotation_series.pairs(series[1]), third, fourth
 
     def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
-        return legendre_vector.rotation_vector(build, fit_exact.coefficients(samples), terms)
+        return rotation_series.rotation_vector(
+            build, polynomial_rotation.legendre_coefficients(samples), terms
+        )
 
     return exponential(window.name, window.title, rotation_series.SOURCE, _POWER, rotation_vector)
 

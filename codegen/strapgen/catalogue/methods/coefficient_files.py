@@ -29,7 +29,7 @@ Source = Annotated[str, Key("Where it comes from", pattern=r".*\S.*", form="a te
 Band = Annotated[
     Fraction, Key("Highest angular frequency; pi is half the sampling rate", "rad a sample", above=0, below=3)
 ]
-Gyro = Annotated[GyroResponse, Key("Gyro of second order whose response is taken out; ideal without it")]
+Gyro = Annotated[GyroResponse, Key("Gyro of second order whose response is compensated; ideal without it")]
 
 
 def slug(title: str) -> str:

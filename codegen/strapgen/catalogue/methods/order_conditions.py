@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from strapgen.catalogue.coefficients import Number
-    from strapgen.catalogue.methods.tableau import Tableau
+    from strapgen.catalogue.methods.tableaux import Tableau
 
 #: A rooted tree as the tuple of the subtrees of its root, in a fixed order.
 Tree: TypeAlias = "tuple[Tree, ...]"

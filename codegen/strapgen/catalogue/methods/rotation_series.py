@@ -3,6 +3,10 @@
 Bortz's equation is integrated term by term for a rate that is a sum of vectors, each times a function of time. The
 terms are sums of nested cross products a x (b x (c x d)). Such a product is a word: the tuple of the numbers of its
 vectors, from left to right.
+
+`magnus` is the Magnus series. That of order 2 is the integral of the rate; that of order 4 adds the complete term of
+second order in the rate; that of order 6 adds the terms of third and fourth order up to the sixth power of the step.
+Coning drift is of second order in the rate, so a step on more samples than its order needs gains from all of them.
 """
 
 from __future__ import annotations
@@ -14,7 +18,12 @@ from functools import cache
 import sympy as sp
 
 from strapgen.catalogue.methods import rate_fit
-from strapgen.catalogue.methods.munthe_kaas import bortz_coefficient
+from strapgen.catalogue.methods.method import PHI, Method, Samples, exponential
+from strapgen.catalogue.methods.runge_kutta import bortz_coefficient
+from strapgen.ir.signals import Signal
+from strapgen.kernel import algebra
+from strapgen.kernel.algebra import cross, dot, exact
+from strapgen.kernel.kernel import KernelBuilder
 
 SOURCE = "W. Magnus, Commun. Pure Appl. Math. 7 (1954) 649-673; K.-T. Chen, Ann. Math. 65 (1957) 163-178"
 
@@ -47,7 +56,7 @@ def terms(vectors: int, order: int) -> tuple[Words, ...]:
             part: Words = {}
             for a in range(1, m):
                 if m - a in nested[k - 1]:
-                    _add(part, cross(solved[a - 1], nested[k - 1][m - a]))
+                    _add(part, cross_words(solved[a - 1], nested[k - 1][m - a]))
             nested[k][m] = part
             b = bortz_coefficient(k)
             _add(derivative, part, Fraction(int(b.p), int(b.q)))
@@ -88,10 +97,10 @@ def in_samples(terms: Words, increments: int, previous: int = 0) -> Words:
     )
 
 
-def cross(left: Words, right: Words) -> Words:
+def cross_words(left: Words, right: Words) -> Words:
     """Return the cross product of two sums of words, as a sum of words.
 
-    >>> cross({(0, 1): Fraction(1)}, {(2,): Fraction(1)})  # (a x b) x c = a x (b x c) - b x (a x c)
+    >>> cross_words({(0, 1): Fraction(1)}, {(2,): Fraction(1)})  # (a x b) x c = a x (b x c) - b x (a x c)
     {(0, 1, 2): Fraction(1, 1), (1, 0, 2): Fraction(-1, 1)}
     """
     product: Words = {}
@@ -110,7 +119,7 @@ def pairs(words: Words) -> Scalars:
     return {(i, j): c for (i, j), c in sorted(collected.items()) if c}
 
 
-def third(words: Words) -> dict[int, Scalars]:
+def third_order(words: Words) -> dict[int, Scalars]:
     """Return words of three vectors as vectors r_k, each times a sum of scalar products r_i . r_j, i <= j.
 
     It uses a x (b x c) = b (a . c) - c (a . b). The coefficients are unique, since the vectors are arbitrary.
@@ -122,7 +131,7 @@ def third(words: Words) -> dict[int, Scalars]:
     return {k: weights for k, row in sorted(collected.items()) if (weights := _nonzero(row))}
 
 
-def fourth(words: Words) -> dict[tuple[int, int], Scalars]:
+def fourth_order(words: Words) -> dict[tuple[int, int], Scalars]:
     """Return words of four vectors as products r_k x r_l, k < l, each times a sum of scalar products r_i . r_j, i <= j.
 
     It uses a x (b x (c x d)) = (b . d) a x c - (b . c) a x d. The coefficients are unique, since the vectors are
@@ -172,3 +181,160 @@ def _collect(row: Scalars, i: int, j: int, weight: Fraction) -> None:
 
 def _nonzero(row: Scalars) -> Scalars:
     return {key: c for key, c in sorted(row.items()) if c}
+
+
+def rotation_vector(
+    build: KernelBuilder, vectors: Sequence[sp.Matrix], terms: tuple[Scalars, Words, Words]
+) -> sp.Matrix:
+    """Add stages for the rotation vector to fourth order from Legendre coefficients of the rate times the step, in rad.
+
+    The terms are the coefficients of the cross products of second order, and the words of third and of fourth order.
+    """
+    second = terms[0]
+    third, fourth = third_order(terms[1]), fourth_order(terms[2])
+    products: dict[tuple[int, int], sp.Symbol] = {}
+
+    def weight(constant: Fraction, row: Scalars) -> sp.Expr:
+        total = exact(constant)
+        for (i, j), c in row.items():
+            if (i, j) not in products:
+                products[i, j] = build.value(
+                    f"product_{i}_{j}",
+                    dot(vectors[i], vectors[j]),
+                    f"scalar product of Legendre coefficients {i} and {j}",
+                )
+            total += exact(c) * products[i, j]
+        return total
+
+    phi = sp.zeros(3, 1)
+    for k in range(len(vectors)):
+        value = weight(Fraction(int(k == 0)), third.get(k, {}))
+        if value.is_Rational:
+            phi += value * vectors[k]
+        else:
+            phi += build.value(f"weight_{k}", value, f"weight of Legendre coefficient {k}") * vectors[k]
+    for k, m in sorted({*second, *fourth}):
+        product = build.stage(
+            Signal.vector(
+                f"cross_{k}_{m}",
+                f"cross_{k}_{m}",
+                meaning=f"cross product of Legendre coefficients {k} and {m}",
+            ),
+            cross(vectors[k], vectors[m]),
+        )
+        value = weight(second.get((k, m), Fraction(0)), fourth.get((k, m), {}))
+        if value.is_Rational:
+            phi += value * product
+        else:
+            phi += build.value(f"weight_{k}_{m}", value, "weight of that cross product") * product
+    return build.stage(PHI, phi)
+
+
+_MAGNUS_SOURCE = "S. Blanes, F. Casas, J. A. Oteo, J. Ros, Phys. Rep. 470 (2009) 151-238, section 5.3"
+
+#: Gauss-Legendre nodes by their number, for steps that take rates.
+_GAUSS = {
+    1: (sp.Rational(1, 2),),
+    2: (sp.Rational(1, 2) - sp.sqrt(3) / 6, sp.Rational(1, 2) + sp.sqrt(3) / 6),
+    3: (sp.Rational(1, 2) - sp.sqrt(15) / 10, sp.Rational(1, 2), sp.Rational(1, 2) + sp.sqrt(15) / 10),
+}
+
+
+def magnus(order: int) -> Method:
+    """Return the Magnus series of order 2, 4 or 6: exact to its order for any rate, and always a rotation."""
+
+    def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
+        if order == 2:
+            return _moment(samples, 0)
+        return build.stage(PHI, (_fourth if order == 4 else _sixth)(build, samples))
+
+    return exponential(
+        f"magnus{order}",
+        f"Magnus series of order {order}",
+        _MAGNUS_SOURCE,
+        order,
+        rotation_vector,
+        nodes=_GAUSS[order // 2],
+    )
+
+
+def _moment(samples: Samples, power: int) -> sp.Matrix:
+    """Add a stage for the integral over the step of the rate times (t - 1/2)^power, t in steps."""
+    meaning = (
+        "integral of the rate over the step"
+        if power == 0
+        else "integral of the rate times t - 1/2, t in steps"
+    )
+    return samples.combination(f"moment_{power}", samples.fit.moment(power), meaning)
+
+
+def _legendre_moment(samples: Samples, degree: int) -> list[sp.Expr]:
+    """Return the weights of the samples in the integral over the step of the rate times a Legendre polynomial."""
+    return [weight / (2 * degree + 1) for weight in samples.fit.legendre(degree)]
+
+
+def _second_order(samples: Samples, first: int) -> sp.Matrix:
+    """Return the term of second order in the rate, for its Legendre polynomials from the even degree `first` on.
+
+    With the integrals m_k of the rate times the Legendre polynomial P_k the term is half the sum of m_k x m_(k+1):
+    the integral of P_k is a difference of P_(k+1) and P_(k-1), so that all other products vanish. Two products that
+    share the vector of odd degree are taken as one, (m_(k-1) - m_(k+1)) x m_k.
+    """
+    total = sp.zeros(3, 1)
+    for odd in range(first + 1, samples.fit.degree + 1, 2):
+        below, above = _legendre_moment(samples, odd - 1), _legendre_moment(samples, odd + 1)
+        polynomials, name = f"P{odd - 1}", f"moment_{odd - 1}"
+        if any(above):
+            polynomials, name = f"P{odd - 1} - P{odd + 1}", f"{name}_less_{odd + 1}"
+        even = samples.combination(
+            name,
+            [a - b for a, b in zip(below, above, strict=True)],
+            f"integral over the step of the rate times {polynomials}, Legendre polynomials",
+        )
+        half = samples.combination(
+            f"half_moment_{odd}",
+            [weight / 2 for weight in _legendre_moment(samples, odd)],
+            f"half the integral over the step of the rate times P{odd}, a Legendre polynomial",
+        )
+        total -= _commutator(even, half)
+    return total
+
+
+def _commutator(a: sp.Matrix, b: sp.Matrix) -> sp.Matrix:
+    """Return [a, b] for dC/dt = C skew(w): the source has dY/dt = A Y, whose transpose reverses every commutator."""
+    return algebra.cross(b, a)
+
+
+def _fourth(build: KernelBuilder, samples: Samples) -> sp.Matrix:
+    b0 = _moment(samples, 0)
+    if samples.fit.degree == 1:
+        return b0 - _commutator(b0, _moment(samples, 1))
+    return b0 + _second_order(samples, 0)
+
+
+def _sixth(build: KernelBuilder, samples: Samples) -> sp.Matrix:
+    def named(name: str, meaning: str, value: sp.Matrix) -> sp.Matrix:
+        return build.stage(Signal.vector(name, name, unit="rad", meaning=meaning), value)
+
+    def alpha(number: int, meaning: str, *factors: sp.Expr) -> sp.Matrix:
+        """Add a stage for a combination of the moments, which is linear in the samples."""
+        moments = [samples.fit.moment(power) for power in range(3)]
+        weights = [
+            sum((f * w for f, w in zip(factors, column, strict=True)), sp.S.Zero)
+            for column in zip(*moments, strict=True)
+        ]
+        return samples.combination(f"alpha_{number}", [sp.radsimp(sp.expand(w)) for w in weights], meaning)
+
+    b0 = _moment(samples, 0)
+    a1 = alpha(
+        1, "rate at the middle of the step, times the step", sp.Rational(9, 4), sp.S.Zero, sp.Integer(-15)
+    )
+    a2 = alpha(2, "its first derivative, times the step squared", sp.S.Zero, sp.Integer(12), sp.S.Zero)
+    a3 = alpha(
+        3, "half of its second derivative, times the step cubed", sp.Integer(-15), sp.S.Zero, sp.Integer(180)
+    )
+    c1 = named("commutator_1", "[alpha_1, alpha_2]", _commutator(a1, a2))
+    c2 = named("commutator_2", "-[alpha_1, 2 alpha_3 + commutator_1]/60", -_commutator(a1, 2 * a3 + c1) / 60)
+    left = named("left", "left side of the last commutator", c1 - 20 * a1 - a3)
+    # The three moments above hold the rate's Legendre polynomials up to the second degree.
+    return b0 + _commutator(left, a2 + c2) / 240 + _second_order(samples, 2)

@@ -1,8 +1,14 @@
-"""Explicit Runge-Kutta methods: the stages of a tableau for any differential equation."""
+"""Explicit Runge-Kutta methods: the stages of a tableau for any differential equation, and methods on rotations.
+
+Munthe-Kaas methods apply a tableau to the rotation vector of the step, and take its exponential. Crouch-Grossman
+methods are a product of exponentials of the rate at the nodes, each times a weight and the step; on attitude kinematics
+the rate does not depend on the attitude, so that nodes and weights are all that is left of the tableau.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from functools import cache
 
 import sympy as sp
@@ -10,12 +16,12 @@ import sympy as sp
 from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import tableaux
-from strapgen.catalogue.methods.method import Method, combination
+from strapgen.catalogue.methods.method import PHI, Method, Samples, combination, exponential
 from strapgen.catalogue.methods.order_conditions import attitude_order
-from strapgen.catalogue.methods.samples import Samples
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.signals import Signal
+from strapgen.kernel.algebra import cross, exact
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
@@ -154,3 +160,92 @@ def _used(tableau: Tableau) -> set[int]:
         if tableau.weights[place] or any(behind):
             used.add(place)
     return used
+
+
+def munthe_kaas(order: int) -> Method:
+    """Return the method of an order on the classical tableau `rk<order>`."""
+    tableau = TABLEAUX[f"rk{order}"]
+    nodes = tuple(dict.fromkeys(tableau.nodes))
+
+    def rotation_vector(build: KernelBuilder, samples: Samples) -> sp.Matrix:
+        end = advance(
+            build,
+            tableau,
+            {node: samples.turn(node) for node in nodes},
+            sp.zeros(3, 1),
+            lambda phi, turn: bortz(phi, turn, order - 2),
+            like=Signal.vector("phi", "phi"),
+            origin="zero",
+        )
+        return build.stage(PHI, end)
+
+    return exponential(
+        f"munthe-kaas{order}",
+        f"Runge-Kutta-Munthe-Kaas method of order {order}",
+        "H. Munthe-Kaas, Appl. Numer. Math. 29 (1999) 115-127",
+        order,
+        rotation_vector,
+        nodes=nodes,
+    )
+
+
+def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
+    """Return the derivative of the rotation vector by Bortz's equation, with so many nested cross products at most.
+
+    The equation is dphi/dt = sum_k (-1)^k B_k/k! phi x (phi x ... w) with Bernoulli's numbers B_k, B_1 = -1/2, which
+    begins w + phi x w/2 + phi x (phi x w)/12 (J. E. Bortz, IEEE Trans. Aerosp. Electron. Syst. 7 (1971) 61-66).
+    """
+    total, nested = turn, turn
+    for k in range(1, products + 1):
+        nested = cross(phi, nested)
+        total += bortz_coefficient(k) * nested
+    return total
+
+
+def bortz_coefficient(products: int) -> sp.Rational:
+    """Return the coefficient of a number of nested cross products in Bortz's equation."""
+    # B_1 of SymPy is +1/2 or -1/2, depending on its release.
+    if products == 1:
+        return abs(sp.bernoulli(1))
+    return sp.bernoulli(products) / sp.factorial(products)
+
+
+_CROUCH_GROSSMAN_SOURCE = (
+    "P. E. Crouch, R. Grossman, J. Nonlinear Sci. 3 (1993) 1-33; coefficients as in E. Hairer, C. Lubich, G. Wanner, "
+    "Geometric Numerical Integration, 2nd ed. (2006), IV.8"
+)
+#: Nodes and weights of the method of third order.
+_NODES = (Fraction(0), Fraction(3, 4), Fraction(17, 24))
+_WEIGHTS = (Fraction(13, 51), Fraction(-2, 3), Fraction(24, 17))
+
+
+def crouch_grossman(order: int) -> Method:
+    """Return the method of third order."""
+
+    def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
+        total = None
+        for number, (node, weight) in enumerate(zip(_NODES, _WEIGHTS, strict=True), 1):
+            exponential = kinematics.exponential(exact(weight) * samples.turn(node))
+            if total is not None:
+                exponential = kinematics.product(total, exponential)
+            if number == len(_NODES):
+                return exponential
+            elements = tuple(f"part{number}_{e.rsplit('_', 1)[1]}" for e in kinematics.transition.elements)
+            signal = Signal(
+                f"part{number}",
+                kinematics.transition.shape,
+                elements,
+                meaning=f"product of the first {number} exponentials",
+            )
+            total = build.stage(signal, exponential)
+        raise AssertionError("there are nodes")
+
+    return Method(
+        f"crouch-grossman{order}",
+        f"Crouch-Grossman method of order {order}",
+        _CROUCH_GROSSMAN_SOURCE,
+        order,
+        transition,
+        nodes=_NODES,
+        isometry=lambda count: True,
+    )

@@ -18,15 +18,14 @@ from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles,
 from strapgen.catalogue.methods.method_spec import Asked, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.registry import Merged, Registry, Titles
 
-#: What the coefficients are best at: the largest drift over a band, or the drift under a spectrum whose phases are
+#: Objective of the design: the largest drift over a band, or the drift under a spectrum whose phases are
 #: unknown, or random.
 OBJECTIVES = ("band", "worst", "random")
 
@@ -131,18 +130,18 @@ class ShapedConing:
 
 @dataclass(frozen=True)
 class ShapeFile:
-    """Coning coefficients for a band or a spectrum of vibration; strapgen verifies what they are said to be."""
+    """Coning coefficients for a band or a spectrum of vibration; strapgen verifies their stated properties."""
 
     name: Title
     source: Source
     samples: Annotated[int, Key("Samples of the step", "1", least=1, most=MOST_SAMPLES)]
     previous: Annotated[int, Key("Samples from before it", "1", least=0, most=MOST_KEPT)]
-    objective: Annotated[str, Key("What the coefficients are best at", choices=OBJECTIVES)]
+    objective: Annotated[str, Key("Objective of the design", choices=OBJECTIVES)]
     coefficients: Annotated[
         tuple[Fraction, ...], Key("K_1, K_2, ... of the samples before the newest one", least=1)
     ]
     powers: Annotated[
-        int, Key("Powers of the frequency, from the third on, that the drift has not", "1", least=0)
+        int, Key("Powers of the frequency, from the third on, that are annulled in the drift", "1", least=0)
     ] = 0
     products: Annotated[
         int,

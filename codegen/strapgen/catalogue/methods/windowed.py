@@ -17,9 +17,8 @@ import sympy as sp
 
 from strapgen.catalogue.kinematics import Kinematics
 from strapgen.catalogue.methods import polynomial_rotation, rate_fit, rotation_series
-from strapgen.catalogue.methods.method import PHI, Method
+from strapgen.catalogue.methods.method import PHI, Method, Samples
 from strapgen.catalogue.methods.rotation_series import Scalars, Words, fraction
-from strapgen.catalogue.methods.samples import Samples
 from strapgen.catalogue.methods.window import Taps, Window
 from strapgen.ir.kernel_info import Truncation
 from strapgen.ir.signals import Signal
@@ -190,13 +189,15 @@ def _lean_series(vectors: int) -> tuple[Scalars, dict[int, Scalars], dict[tuple[
         table.append({0: -lever[0] / lever[2], 2: 1 / lever[2]})
     crossed = rotation_series.pairs(rotation_series.substituted(second, table))
     scaled: dict[int, Scalars] = {}
-    words: Words = {(k, *key): c for k, row in rotation_series.third(third).items() for key, c in row.items()}
+    words: Words = {
+        (k, *key): c for k, row in rotation_series.third_order(third).items() for key, c in row.items()
+    }
     for (k, *key), c in rotation_series.substituted(words, table).items():
         _collect(scaled.setdefault(k, {}), key, c)
     turned: dict[tuple[int, int], Scalars] = {}
     words = {
         (*pair, *key): c
-        for pair, row in rotation_series.fourth(fourth).items()
+        for pair, row in rotation_series.fourth_order(fourth).items()
         for key, c in row.items()
         if pair == (0, 1) or sum(pair) + sum(key) + 4 <= _FOURTH + 1
     }

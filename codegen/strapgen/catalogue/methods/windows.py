@@ -18,8 +18,7 @@ from strapgen.catalogue.coefficients import short_text
 from strapgen.catalogue.methods import coefficient_files, window_conditions
 from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles, Gyro, Source, Title
 from strapgen.catalogue.methods.window import Taps, Window, sibling_name, sibling_title
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError

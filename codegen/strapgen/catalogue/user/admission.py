@@ -10,7 +10,7 @@ from fractions import Fraction
 import sympy as sp
 
 from strapgen.catalogue.derivation import companion as derived_companion
-from strapgen.catalogue.methods.samples import beside
+from strapgen.catalogue.methods.method import beside
 from strapgen.catalogue.names import reserved
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError

@@ -271,5 +271,5 @@ class FixedFilters:
     restoring: tuple[Integers, Integers]
     #: Bits by which their sums are shifted down
     restoring_shift: int
-    #: Bounds of the distance of the attitude of now from exact arithmetic, see `library.commit_late_bounds`
+    #: Bounds of the distance of the attitude of now from exact arithmetic, see `commit_late_fixed.now_errors`
     now_errors: NowErrors = field(default_factory=NowErrors)

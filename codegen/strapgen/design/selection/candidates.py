@@ -6,7 +6,6 @@ They are the methods of the catalogue, coefficients designed for the vibration, 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -23,10 +22,10 @@ from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.design import coning_design
 from strapgen.design.brief import DesignBrief, SpectralEnvironment, read_brief
 from strapgen.design.coning_design import ConingBrief, of_spectrum
+from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
 from strapgen.design.selection.causes import Rounding
 from strapgen.ir import checks
-from strapgen.ir.sources import Sources
 from strapgen.lab.cost import cost
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.runs import Run, drift_between, simulate
@@ -173,16 +172,6 @@ class AttitudeStep:
         return float(np.linalg.norm(drift_between(*ends)[-1])) / float(steps * self.step) * causes.DEG_H
 
 
-class DescribedAlgorithm(Algorithm, Protocol):
-    """An algorithm whose code is that of a described system."""
-
-    def sources(self, command: str) -> Sources:
-        """Return the C of the system; its header names the command."""
-
-    def file(self) -> str:
-        """Return the description."""
-
-
 #: The states that an algorithm can integrate.
 STATES = ("euler", "dcm")
 #: Samples of a step, from before it and from after it, of methods that are of use with several; every other method of
@@ -206,43 +195,30 @@ _REFERENCES = ("fit-exact",)
 #: The attitude in two speeds, and its fast cycles in a slow one.
 TWO_SPEED = "two-speed"
 _CYCLES = (2, 4, 8, 16)
-#: Objectives and samples of coefficients that are designed for a spectrum: see `coning.design`.
+#: Objectives and samples of coefficients that are designed for a spectrum: see `coning_design.design`.
 _OBJECTIVES = ("worst", "random")
 _DESIGNED = ((4, 0), (1, 3), (3, 3), (1, 8))
 #: What the name of a method begins with whose coefficients are designed for the brief.
 TUNED = "tuned-"
 
 
-@dataclass(frozen=True)
-class Contender:
-    """An algorithm that may be selected, for every state of `STATES`."""
+def choice_of(candidate: Candidate, state: str, path: str) -> Choice:
+    """Return the choice of a step, one that is integrated with a state of `STATES`.
 
-    #: A method of the catalogue; or "tuned-worst" or "tuned-random", whose coefficients a design for the
-    #: vibration gives; or "two-speed"
-    method: str
-    #: Samples of a step, and samples from before it and from after it; of two speeds the fast cycles in a slow
-    #: one
-    increments: int
-    previous: int = 0
-    ahead: int = 0
-
-    @property
-    def name(self) -> str:
-        """The method and its samples, as "coning-combined:3+3"."""
-        beside = f"+{self.previous}" if self.previous or self.ahead else ""
-        return f"{self.method}:{self.increments}{beside}" + (f"+{self.ahead}" if self.ahead else "")
-
-    def choice(self, state: str, path: str) -> Choice:
-        """Return the choice of a step."""
-        method = self.method
-        if method.startswith(TUNED):
-            shape = tuned(path, method.removeprefix(TUNED), self.increments, self.previous)
-            return catalogue.choose_step(state, shape, self.increments, previous=self.previous)
-        return catalogue.choose_step(state, method, self.increments, previous=self.previous, ahead=self.ahead)
+    The method is one of the catalogue; or "tuned-worst" or "tuned-random", whose coefficients a design for the
+    vibration of the brief at a path gives.
+    """
+    method = candidate.method
+    if method.startswith(TUNED):
+        shape = tuned(path, method.removeprefix(TUNED), candidate.increments, candidate.previous)
+        return catalogue.choose_step(state, shape, candidate.increments, previous=candidate.previous)
+    return catalogue.choose_step(
+        state, method, candidate.increments, previous=candidate.previous, ahead=candidate.ahead
+    )
 
 
-def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[Contender]:
-    """Return the algorithms for a brief.
+def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[Candidate]:
+    """Return the algorithms for a brief; of two speeds the increments are the fast cycles in a slow one.
 
     Coefficients are designed where the vibration has a spectrum that turns about two axes.
 
@@ -253,20 +229,20 @@ def contenders(brief: DesignBrief, names: Iterable[str] | None = None) -> list[C
     ['rk4:1+1', 'rk4:2', 'rk4:4', 'rk4:1+3', 'window-7-7:1+7+7']
     """
     several = [
-        Contender(method, *samples)
+        Candidate(method, *samples)
         for method in METHODS
         if method not in _REFERENCES and not _is_long_taylor(method)
         for samples in _SAMPLES.get(method) or [_own_samples(method)]
     ]
     if any(registration.extensions("design.two-speed")):
-        several += [Contender(TWO_SPEED, cycles) for cycles in _CYCLES]
+        several += [Candidate(TWO_SPEED, cycles) for cycles in _CYCLES]
     if isinstance(brief.environment, SpectralEnvironment) and _has_coning(brief.environment):
         several += [
-            Contender(f"{TUNED}{objective}", *samples) for objective in _OBJECTIVES for samples in _DESIGNED
+            Candidate(f"{TUNED}{objective}", *samples) for objective in _OBJECTIVES for samples in _DESIGNED
         ]
     if names is None:
         return several
-    chosen: dict[Contender, None] = {}
+    chosen: dict[Candidate, None] = {}
     for name in names:
         matching = [one for one in several if name in (one.method, one.name)]
         if not matching:
@@ -302,11 +278,11 @@ def tuned(path: str, objective: str, samples: int, previous: int) -> ShapedConin
     return coning_design.design(ConingBrief(samples, previous, objective, lines=lines, gyro=gyro))
 
 
-def algorithm_of(contender: Contender, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:
+def algorithm_of(candidate: Candidate, state: str, brief: DesignBrief, path: str | Path) -> Algorithm:
     """Return an algorithm for a brief."""
-    if contender.method == TWO_SPEED:
+    if candidate.method == TWO_SPEED:
         loops: Algorithm = registration.extension("design.two-speed", f"method {TWO_SPEED}")(
-            state, contender.increments, brief
+            state, candidate.increments, brief
         )
         return loops
-    return AttitudeStep(contender.choice(state, str(path)), brief)
+    return AttitudeStep(choice_of(candidate, state, str(path)), brief)

@@ -14,8 +14,9 @@ from typing import Any
 from strapgen import catalogue
 from strapgen.analysis.vibration.rectification import DEGREE, Rectification
 from strapgen.design.brief import DesignBrief, files_of, read_brief
+from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import STATES, Algorithm, Contender, algorithm_of
+from strapgen.design.selection.candidates import STATES, Algorithm, algorithm_of
 from strapgen.design.selection.causes import Rounding
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.version import VERSION
@@ -36,7 +37,7 @@ class Judgement:
     name: str
     state: str
     method: str
-    #: See `Contender`
+    #: Samples of a step; of two speeds the fast cycles in a slow one
     increments: int
     previous: int
     ahead: int
@@ -78,7 +79,7 @@ class Question:
 
     #: The file of the brief
     path: str
-    contender: Contender
+    candidate: Candidate
 
     def moved(self, begin: Path, end: Path) -> Question:
         """Return the question with its brief in another folder, see `parallel_cases.Bundle`."""
@@ -144,14 +145,14 @@ class _Look:
 def judged(trial: Question) -> list[dict[str, Any]]:
     """Return the judgements of an algorithm with every state it can have, as plain JSON data."""
     brief = _brief(trial.path)
-    second_order = SecondOrder()
+    known: dict[str, Any] = {}
     judgements = []
     for state in STATES:
         try:
-            algorithm = algorithm_of(trial.contender, state, brief, trial.path)
+            algorithm = algorithm_of(trial.candidate, state, brief, trial.path)
         except InputError:  # the state has no such step
             continue
-        judgements.append(vars(judge(brief, trial.contender, state, algorithm, second_order)))
+        judgements.append(vars(judge(brief, trial.candidate, state, algorithm, known)))
     return judgements
 
 
@@ -160,27 +161,25 @@ def _brief(path: str) -> DesignBrief:
     return read_brief(path)
 
 
-class SecondOrder:
-    """What follows from a step to the second power of its increments, and is therefore the same with every state."""
+def once(known: dict[str, Any], cause: Callable[[], Any]) -> Any:
+    """Return what a method of an `Algorithm` returns, or raise what it raises, for the first state and all others.
 
-    def __init__(self) -> None:
-        self._known: dict[str, Any] = {}
-
-    def __call__(self, cause: Callable[[], Any]) -> Any:
-        """Return what a function of an `Algorithm` returns; raises what it raises."""
-        name = cause.__name__
-        if name not in self._known:
-            try:
-                self._known[name] = cause()
-            except InputError as error:
-                self._known[name] = error
-        if isinstance(self._known[name], InputError):
-            raise self._known[name]
-        return self._known[name]
+    `known` holds it by the name of the method: what follows from a step to the second power of its increments is the
+    same with every state.
+    """
+    name = cause.__name__
+    if name not in known:
+        try:
+            known[name] = cause()
+        except InputError as error:
+            known[name] = error
+    if isinstance(known[name], InputError):
+        raise known[name]
+    return known[name]
 
 
 def judge(
-    brief: DesignBrief, contender: Contender, state: str, algorithm: Algorithm, second_order: SecondOrder
+    brief: DesignBrief, candidate: Candidate, state: str, algorithm: Algorithm, known: dict[str, Any]
 ) -> Judgement:
     """Return the judgement of an algorithm.
 
@@ -192,15 +191,15 @@ def judge(
     look.drift["truncation"] = algorithm.truncation()
     try:
         if not look.excesses():
-            look.drift["coning"] = second_order(algorithm.coning)
+            look.drift["coning"] = once(known, algorithm.coning)
         if not look.excesses() and brief.budget.limits_velocity:
-            _look_at_velocity(look, second_order(algorithm.sculling))
+            _look_at_velocity(look, once(known, algorithm.sculling))
         if not look.excesses() and causes.tones(brief):
             _look_at_higher_orders(look, algorithm.rectification())
     except InputError as error:
         look.unknown["coning"] = str(error)
     if not look.excesses():
-        look.drift["quantization"] = second_order(algorithm.quantization)
+        look.drift["quantization"] = once(known, algorithm.quantization)
     if not look.excesses():
         left = look.software_limit - math.fsum(look.drift[cause] or 0.0 for cause in SOFTWARE[:2])
         look.rounding = algorithm.rounding(left)
@@ -213,12 +212,12 @@ def judge(
     binding = max(excesses, key=lambda name: excesses[name][0]) if excesses else None
     figures: Mapping[str, float | None] = look.figures
     return Judgement(
-        f"{state} {contender.name}",
+        f"{state} {candidate.name}",
         state,
-        contender.method,
-        contender.increments,
-        contender.previous,
-        contender.ahead,
+        candidate.method,
+        candidate.increments,
+        candidate.previous,
+        candidate.ahead,
         binding is None,
         binding,
         "" if binding is None else excesses[binding][1],
@@ -229,7 +228,7 @@ def judge(
         figures.get("position"),
         figures.get("instructions_per_s"),
         figures.get("bytes"),
-        _cancellation(look, second_order(algorithm.line_errors)) if binding is None else "",
+        _cancellation(look, once(known, algorithm.line_errors)) if binding is None else "",
         coning_parts_deg_h=look.coning_parts,
     )
 
@@ -284,7 +283,7 @@ def _measure(look: _Look, algorithm: Algorithm) -> None:
 
 def judgements(
     path: str | Path,
-    several: Iterable[Contender],
+    several: Iterable[Candidate],
     results: str | Path | None = None,
     jobs: int | None = None,
     cluster: Cluster | None = None,

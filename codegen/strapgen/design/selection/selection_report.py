@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import Any
 
 from strapgen import pipeline, registration
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
 from strapgen.design import coning_design
 from strapgen.design.brief import DesignBrief
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import TUNED, Algorithm, AttitudeStep, DescribedAlgorithm
+from strapgen.design.selection.candidates import TUNED, Algorithm, AttitudeStep
 from strapgen.design.selection.judgement import CAUSES, Judgement, verdicts
 from strapgen.design.selection.simulated import RANDOM_RUNS, RandomDrift, Simulated
 from strapgen.results.records import entry, keyed_table
@@ -166,7 +166,7 @@ def firmware_files(
 ) -> dict[str, str]:
     """Return the files of a selected algorithm by their names."""
     if not isinstance(algorithm, AttitudeStep):
-        described = cast(DescribedAlgorithm, algorithm)  # nothing else is selected
+        described: Any = algorithm  # the loops of two speeds, the code of a described system
         options = f"--target c-fixed --word {brief.processor.word}"
         files = dict(described.sources(f"strapgen system {SYSTEM} {options}").step_files)
         return files | {SYSTEM: described.file(), REPORT: report}

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.design.brief import DesignBrief, GyroBrief, Line
+from strapgen.design.frontier import Candidate
 from strapgen.design.selection import causes
-from strapgen.design.selection.candidates import Algorithm, Contender, algorithm_of
+from strapgen.design.selection.candidates import Algorithm, algorithm_of
 from strapgen.design.selection.judgement import Judgement, after_run, in_order
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.rate_profiles import KNOT, CosineSum, ReferenceAttitude
@@ -118,8 +119,8 @@ def start_phases(count: int) -> NDArray[np.float64]:
 
 def algorithm_named(judgement: Judgement, brief: DesignBrief, path: str | Path) -> Algorithm:
     """Return the algorithm of a judgement."""
-    contender = Contender(judgement.method, judgement.increments, judgement.previous, judgement.ahead)
-    return algorithm_of(contender, judgement.state, brief, path)
+    candidate = Candidate(judgement.method, judgement.increments, judgement.previous, judgement.ahead)
+    return algorithm_of(candidate, judgement.state, brief, path)
 
 
 def run(brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: int | None = 1) -> Simulated:

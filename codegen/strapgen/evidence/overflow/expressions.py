@@ -1,4 +1,7 @@
-"""Expressions of C as intervals and formulas; whatever could go wrong in them becomes an obligation that is proved."""
+"""Expressions of C as intervals and formulas; whatever could go wrong in them becomes an obligation that is proved.
+
+A `Number` is what is known of an integer: its type, an interval, and a formula in real numbers.
+"""
 
 from __future__ import annotations
 

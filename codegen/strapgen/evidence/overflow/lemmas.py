@@ -1,4 +1,8 @@
-"""A proof by z3, step by step of its loop, that the square root in generated C is the integer next to the root."""
+"""Proofs by z3 of the functions in generated C that shift and take square roots, from its syntax tree.
+
+Shifts are executed on bit vectors: they must round down without undefined behaviour. The loop of the square root is
+proved step by step: it must return the integer next to the root.
+"""
 
 from __future__ import annotations
 

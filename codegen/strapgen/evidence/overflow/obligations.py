@@ -1,4 +1,4 @@
-"""Walks through the C of a kernel and lists what could overflow or leave its range and cannot be proved."""
+"""Walks through the C of a kernel and lists what could overflow or leave its range and is not proved."""
 
 from __future__ import annotations
 
@@ -24,58 +24,52 @@ from strapgen.evidence.overflow.lemmas import ParsedSource, is_root, shifts_down
 _EFFORTS = (100_000, 1_000_000, 4_000_000)
 
 
-class Proof:
-    """The proof that the C of a kernel computes its integers without overflow, and in their ranges."""
+def unproved(subject: Subject, files: Mapping[str, str], model: Model) -> list[Obligation]:
+    """Return what is not proved of the C of a kernel: that it computes its integers without overflow, in their ranges.
 
-    def __init__(self, subject: Subject, files: Mapping[str, str], model: Model) -> None:
-        self._subject, self._files, self._model = subject, files, model
-        self._nearest = subject.fixed.interface.settings.rounding == "nearest"
+    The statements of the kernel become formulas; the functions of its own file are proved as lemmas.
+    """
+    nearest = subject.fixed.interface.settings.rounding == "nearest"
+    ranges = {value.name: (value.low, value.high) for value in subject.fixed.body}
+    for output in subject.fixed.interface.outputs:
+        for k in range(output.signal.size):
+            ranges[f"{output.signal.name}[{k}]"] = output.low, output.high
 
-    def opened(self) -> list[Obligation]:
-        """Return what is not proved; nothing if the proof is complete."""
-        functions = self._functions()
-        for effort in _EFFORTS:
-            kernel = KernelStatements(
-                functions, self._subject.name, self._model, self._ranges(), self._nearest, effort
-            )
-            opened = kernel.obligations()
-            if not opened:
-                break
-        # A tool may read a simpler form of what shifts down, which must do the same; the rest it reads as it is.
-        texts = {name: _text(function) for name, function in functions.items()}
-        simpler = {
-            name: function
-            for name, function in self._functions("__FRAMAC__").items()
-            if _text(function) != texts.get(name)
-        }
-        return [
-            *opened,
-            *self._lemmas(functions, kernel.places),
-            *self._lemmas(simpler, kernel.places),
-        ]
+    functions = _functions(subject, files)
+    for effort in _EFFORTS:
+        kernel = KernelStatements(functions, subject.name, model, ranges, nearest, effort)
+        left = kernel.obligations()
+        if not left:
+            break
+    # A tool may read a simpler form of what shifts down, which must do the same; the rest it reads as it is.
+    texts = {name: _text(function) for name, function in functions.items()}
+    simpler = {
+        name: function
+        for name, function in _functions(subject, files, "__FRAMAC__").items()
+        if _text(function) != texts.get(name)
+    }
+    for some in (functions, simpler):
+        left = [*left, *_unproved_lemmas(some, subject.name, model, kernel.places, nearest)]
+    return left
 
-    def _functions(self, *defined: str) -> dict[str, c_ast.FuncDef]:
-        return ParsedSource(self._files, f"{self._subject.name}.c", defined).functions
 
-    def _ranges(self) -> dict[str, tuple[int, int]]:
-        """Return the ranges that the generator states, by value and by element of an output."""
-        ranges = {value.name: (value.low, value.high) for value in self._subject.fixed.body}
-        for output in self._subject.fixed.interface.outputs:
-            for k in range(output.signal.size):
-                ranges[f"{output.signal.name}[{k}]"] = output.low, output.high
-        return ranges
+def _functions(subject: Subject, files: Mapping[str, str], *defined: str) -> dict[str, c_ast.FuncDef]:
+    return ParsedSource(files, f"{subject.name}.c", defined).functions
 
-    def _lemmas(self, functions: Mapping[str, c_ast.FuncDef], places: set[int]) -> list[Obligation]:
-        """Return the functions of the file that are not proved to return what is taken for granted in the kernel."""
-        name, opened = self._subject.name, []
-        for part in ("fit", "shr"):
-            function = functions.get(f"{name}_{part}")
-            if function is not None and not shifts_down(function, self._model, places):
-                opened.append(Obligation(f"{name}_{part}", "it must return its argument shifted down"))
-        root = functions.get(f"{name}_rt")
-        if root is not None and not is_root(root, self._model, self._nearest):
-            opened.append(Obligation(f"{name}_rt", "it must return the integer next to a square root"))
-        return opened
+
+def _unproved_lemmas(
+    functions: Mapping[str, c_ast.FuncDef], name: str, model: Model, places: set[int], nearest: bool
+) -> list[Obligation]:
+    """Return the functions of the file that are not proved to return what is taken for granted in the kernel."""
+    left = []
+    for part in ("fit", "shr"):
+        function = functions.get(f"{name}_{part}")
+        if function is not None and not shifts_down(function, model, places):
+            left.append(Obligation(f"{name}_{part}", "it must return its argument shifted down"))
+    root = functions.get(f"{name}_rt")
+    if root is not None and not is_root(root, model, nearest):
+        left.append(Obligation(f"{name}_rt", "it must return the integer next to a square root"))
+    return left
 
 
 class KernelStatements:

@@ -49,12 +49,12 @@ def prove_by_z3(subject: Subject, folder: Path) -> list[Verdict]:
 
 def judged_by_z3(subject: Subject, files: dict[str, str], model: Model) -> tuple[Result, str]:
     """Return whether everything is proved of the C in some files, and what is not."""
-    from strapgen.evidence.overflow.obligations import Proof
+    from strapgen.evidence.overflow.obligations import unproved
 
-    opened = Proof(subject, files, model).opened()
-    if not opened:
+    left = unproved(subject, files, model)
+    if not left:
         return "proved", ""
-    return "fails", f"{len(opened)} open, the first in {opened[0].place}: {opened[0].text}"
+    return "fails", f"{len(left)} open, the first in {left[0].place}: {left[0].text}"
 
 
 def _eva_version() -> str:

@@ -1,6 +1,9 @@
-"""Compiles a function of a user's C or C++ file together with a loop that calls it, and runs it in another process.
+"""Compiles a user's function in C or C++, runs it in another process, and reads its states as attitudes.
 
-What the function does wrong stays in the process that runs it: a crash or an endless loop ends that one.
+What the function does wrong stays in the process that runs it: a crash or an endless loop ends that one. A run consists
+of segments. A segment begins with a reset and with calls without rotation, so that increments of the segment before are
+forgotten. Its attitudes are relative to the one before its first call: functions that hold the attitude themselves need
+no more than those that take it as an argument.
 """
 
 from __future__ import annotations

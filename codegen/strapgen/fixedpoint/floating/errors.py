@@ -104,7 +104,7 @@ class NumberFormat:
     @property
     def underflow(self) -> Fraction:
         """Half the smallest number: the largest error of a rounding near zero."""
-        return power_of_two(self.smallest - 1)
+        return _power_of_two(self.smallest - 1)
 
     def rounded(self, value: Fraction) -> Fraction:
         """Return the nearest number, of two the even one, as a literal is read."""
@@ -125,8 +125,8 @@ class NumberFormat:
         if not largest:
             return Fraction(0)
         power = exponent(largest)
-        above = largest - power_of_two(power)
-        half = power_of_two(power - self.precision)
+        above = largest - _power_of_two(power)
+        half = _power_of_two(power - self.precision)
         return max(half / 2, min(half, above), self.underflow)
 
     def ulp(self, largest: Fraction) -> Fraction:
@@ -154,7 +154,7 @@ def exponent(value: Fraction) -> int:
 
 
 @lru_cache(maxsize=4096)
-def power_of_two(power: int) -> Fraction:
+def _power_of_two(power: int) -> Fraction:
     """Return a power of two."""
     return binary(1, -power)
 
@@ -238,7 +238,7 @@ class _ComputedNumbers:
                 return errors[0], up(errors[0] * errors[0] / 2)
             case "sinc":
                 x = self.ranges[expression.arguments[0]].magnitude + errors[0]
-                return up(errors[0] * sinc_slope(x)), up(errors[0] * errors[0] / 6)
+                return up(errors[0] * _sinc_slope(x)), up(errors[0] * errors[0] / 6)
             case "maximum":
                 return max(errors), _ZERO
             case "select":
@@ -458,11 +458,11 @@ def _slopes(expression: Expression, operands: Sequence[Interval], value: Interva
         case "cos":
             return (Interval.symmetric(min(Fraction(1), operands[0].magnitude)),)
         case "sinc":
-            return (Interval.symmetric(sinc_slope(operands[0].magnitude)),)
+            return (Interval.symmetric(_sinc_slope(operands[0].magnitude)),)
     return tuple(_NO_SLOPE for _ in expression.arguments)
 
 
-def sinc_slope(magnitude: Fraction) -> Fraction:
+def _sinc_slope(magnitude: Fraction) -> Fraction:
     """Return a bound of the derivative of sin(x)/x up to a magnitude of x: |x|/3, and 1/2 anywhere."""
     return min(magnitude / 3, Fraction(1, 2))
 

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.catalogue import toml_models
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import STANDARD_GRAVITY
@@ -154,7 +153,7 @@ class GyroFile(TriadFile):
     J: Annotated[
         Term | None, _term("Drift by products of rates", "s", "anisoinertia_s", "xy", "xz", "yz")
     ] = None
-    dither: Annotated[DitherFile | None, Key("A dithered laser gyro, in the place of a noise")] = None
+    dither: Annotated[DitherFile | None, Key("A dithered laser gyro, in place of a noise")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -241,7 +240,7 @@ class OutputNoiseFile:
 
 @dataclass(frozen=True)
 class ErrorFile:
-    """The errors of three gyros and three accelerometers; what is not stated is that of the class, or zero."""
+    """The errors of three gyros and three accelerometers; the default is that of the class, or zero."""
 
     title: Annotated[str | None, Key("Title in reports")] = None
     base: Annotated[
@@ -259,7 +258,7 @@ class ErrorFile:
     accelerometer: Annotated[AccelerometerFile, Key("Errors of the accelerometers")] = AccelerometerFile()
     sampling: Annotated[Sampling | None, Key("Errors of the samples")] = None
     warm_up: Annotated[WarmUpFile | None, Key("A rate that begins at switch-on")] = None
-    heating: Annotated[HeatingFile | None, Key("Heat of the torquers")] = None
+    heating: Annotated[HeatingFile | None, Key("Heating of the torquers")] = None
     output_noise: Annotated[OutputNoiseFile | None, Key("Noise of an output whose sum stays bounded")] = None
 
     def errors(self) -> InstrumentErrors:

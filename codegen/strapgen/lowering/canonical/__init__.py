@@ -13,7 +13,7 @@ from strapgen.ir.program import Assignment
 from strapgen.kernel.covariants import NotCovariantError
 from strapgen.kernel.kernel import Kernel
 from strapgen.lowering.canonical.core import Core, decompose, extract, verify
-from strapgen.lowering.canonical.search import plans
+from strapgen.lowering.canonical.plan import plans
 from strapgen.lowering.canonical.vectors import independent
 from strapgen.lowering.canonical.writing import write
 

@@ -10,10 +10,8 @@ from strapgen.kernel.kernel import Kernel
 from strapgen.kernel.polynomials import Polynomial, atoms, scale
 from strapgen.lowering.canonical import expansion, extract_core
 from strapgen.lowering.canonical.core import Core, decompose
-from strapgen.lowering.canonical.plan import Plan, without_triples
-from strapgen.lowering.canonical.products import choose_products
-from strapgen.lowering.canonical.search import plans
-from strapgen.lowering.canonical.vectors import Form, all_components, independent
+from strapgen.lowering.canonical.plan import Plan, plans, without_triples
+from strapgen.lowering.canonical.vectors import Form, all_components, choose_products, independent
 
 #: How many bases, those in which the code is shortest first, are compared for a reader.
 _READ = 8

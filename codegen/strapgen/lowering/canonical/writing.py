@@ -10,7 +10,9 @@ from strapgen.ir.program import Assignment, Constant, Node, Operation, Reference
 from strapgen.ir.signals import Signal
 from strapgen.kernel.algebra import CROSS
 from strapgen.kernel.polynomials import Polynomial, ratio
-from strapgen.lowering.arithmetic import (
+from strapgen.lowering.canonical.plan import Cross, Plan, Sides, Weighted, unsigned
+from strapgen.lowering.canonical.vectors import choose_products
+from strapgen.lowering.trees import (
     Term,
     chain,
     expanded,
@@ -20,8 +22,6 @@ from strapgen.lowering.arithmetic import (
     signed_sum,
     with_constant,
 )
-from strapgen.lowering.canonical.plan import Cross, Plan, Sides, Weighted
-from strapgen.lowering.canonical.products import choose_products
 
 #: A summand of a vector: its coefficient, its weight unless that is a number, and the name of the vector.
 _Summand = tuple[Fraction, Reference | None, str]
@@ -223,9 +223,3 @@ def _product(a: str, b: str) -> Node:
 
 def _key(polynomial: Polynomial) -> frozenset[object]:
     return frozenset(polynomial.items())
-
-
-def unsigned(polynomial: Polynomial) -> frozenset[object]:
-    """Return a key that is the same for a polynomial and its negative."""
-    first = polynomial[min(polynomial)] if polynomial else Fraction(0)
-    return frozenset((m, -c if first < 0 else c) for m, c in polynomial.items())

@@ -7,12 +7,19 @@ from fractions import Fraction
 
 import sympy as sp
 
-from strapgen.catalogue.kinematics import DCM
-from strapgen.ir.kernel_info import Recursion
+from strapgen.catalogue.kernels.two_speed_kernels import (
+    NAVIGATION_ROTATION,
+    ROTATION_VECTOR,
+    rotated,
+    transition,
+)
+from strapgen.catalogue.kernels.velocity_position import CHANGES
+from strapgen.catalogue.kinematics import DCM, KINEMATICS, SAVAGE, UNIT
 from strapgen.ir.signals import Signal, after
+from strapgen.kernel import algebra
 from strapgen.kernel.algebra import cross
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.navigation.frame.frame_signals import (
+from strapgen.navigation.frame.frame_rates import (
     ACCELERATION,
     DERIVED,
     EARTH_RATE,
@@ -77,13 +84,12 @@ def velocity_step(level: bool = False) -> Kernel:
     later = v + change + build.scalar(CYCLE) * midpoint(a, before)
     if level:
         later[2] = v[2]
-    build.output(after(VELOCITY), later)
-    build.output(after(PREVIOUS_ACCELERATION), a)
+    build.feedback(VELOCITY, later)
+    build.feedback(PREVIOUS_ACCELERATION, a)
     return build.kernel(
         "velocity-step-level" if level else "velocity-step",
         f"Velocity after a cycle{', the vertical one held' if level else ''}",
         DERIVED,
-        recursion=_recursion(VELOCITY, PREVIOUS_ACCELERATION),
         notes=(_START,),
     )
 
@@ -97,13 +103,12 @@ def position_step() -> Kernel:
         build.scalar(CYCLE) * midpoint(rho, before),
     )
     turned = build.stage(replace(DCM.transition, constraint="", frame="n to n"), DCM.exponential(zeta, 2))
-    build.output(after(POSITION), position * turned)
-    build.output(after(PREVIOUS_TRANSPORT_RATE), rho)
+    build.feedback(POSITION, position * turned)
+    build.feedback(PREVIOUS_TRANSPORT_RATE, rho)
     return build.kernel(
         "position-step",
         "Position after a cycle",
         DERIVED,
-        recursion=_recursion(POSITION, PREVIOUS_TRANSPORT_RATE),
         notes=(
             _START,
             "Products of three elements of the rotation are left out: below 1e-15 rad for a cycle of 0.1 s.",
@@ -120,12 +125,123 @@ def height_step() -> Kernel:
     build = KernelBuilder()
     height = build.scalar(HEIGHT)
     v, later = build.input(VELOCITY), build.input(replace(after(VELOCITY), bound=VELOCITY.bound))
-    build.output(after(HEIGHT), [height + build.scalar(CYCLE) * (v[2] + later[2]) / 2])
-    return build.kernel("height-step", "Height after a cycle", DERIVED, recursion=_recursion(HEIGHT))
+    build.feedback(HEIGHT, [height + build.scalar(CYCLE) * (v[2] + later[2]) / 2])
+    return build.kernel("height-step", "Height after a cycle", DERIVED)
 
 
-def _recursion(*states: Signal) -> Recursion:
-    """Return the recursion of states that no slower loop resets."""
-    return Recursion(
-        tuple((signal.name, after(signal).name) for signal in states), retained=tuple(s.name for s in states)
+#: The position of the body from where it began; the range of 8 km leaves 4 micrometres to words of 32 bits.
+DISPLACEMENT = Signal.vector(
+    "displacement",
+    "r",
+    unit="m",
+    meaning="position of the body from the place of the start, navigation axes n",
+    bound=Fraction(8192),
+    frame="n",
+)
+
+
+def translation(name: str) -> Kernel:
+    """Return velocity and position after a step: v + C dv + g T, and r + (v + C dr + g T/2) T.
+
+    Returns: inputs ``state``, the attitude at the start of the step, ``velocity_change`` and
+    ``position_change`` (3,) in m/s in body axes there, ``velocity`` (3,) in m/s, ``displacement`` (3,) in m and
+    ``gravity`` (3,) in m/s^2, axes n, ``cycle`` in s; outputs ``next_velocity`` and ``next_displacement``.
+    """
+    build = KernelBuilder()
+    state = build.input(KINEMATICS[name].state)
+    changes = [build.input(replace(CHANGES[part], bound=Fraction(8))) for part in ("velocity", "position")]
+    v, r, g = map(build.input, (VELOCITY, DISPLACEMENT, GRAVITY))
+    cycle = build.scalar(CYCLE)
+    change = sp.Matrix.hstack(*changes)
+    turned = rotated(build, name, state, change)
+    build.feedback(VELOCITY, v + turned[:, 0] + cycle * g)
+    build.feedback(DISPLACEMENT, r + cycle * (v + turned[:, 1] + cycle * g / 2))
+    return build.kernel(
+        f"{name}-translation",
+        "Velocity and position after a step, in axes that do not turn",
+        f"derived: the integrals of {SAVAGE}, equations (44) and (57)",
+    )
+
+
+#: The rows: the navigation axes x and y in body axes.
+ROWS = tuple(
+    Signal.vector(
+        name,
+        name,
+        meaning=f"{number} row of the attitude, {axis} of n in body axes",
+        bound=UNIT,
+        constraint="unit",
+        frame="b",
+    )
+    for name, number, axis in (("row_1", "first", "x"), ("row_2", "second", "y"))
+)
+_TITLE = "Two rows of the direction cosine matrix"
+
+
+def _third(rows: list[sp.Matrix]) -> sp.Matrix:
+    """Return the third row as a column, equation (43)."""
+    return algebra.cross(*rows)
+
+
+def update(order: int | None = None) -> Kernel:
+    """Return the kernel that rotates two rows by the rotation vector of a cycle, equations (2) to (4)."""
+    build = KernelBuilder()
+    rows = [build.input(row) for row in ROWS]
+    turned = transition(build, DCM, build.input(ROTATION_VECTOR), order)
+    for signal, row in zip(ROWS, rows, strict=True):
+        build.feedback(signal, row.T * turned)
+    return build.kernel(
+        "dcm-two-rows-update" + (f"-{order}" if order else ""),
+        f"{_TITLE}: update by a rotation vector" + (f", order {order}" if order else ", exact"),
+        f"{SAVAGE}, equations (2) to (4) for two rows, as section 3.6 says",
+    )
+
+
+def navigation(order: int | None = None) -> Kernel:
+    """Return the kernel that refers two rows to the rotated navigation frame, equations (5), (6) and (43)."""
+    build = KernelBuilder()
+    rows = [build.input(row) for row in ROWS]
+    turn = transition(build, DCM, -build.input(NAVIGATION_ROTATION), order, "n")
+    third = build.stage(
+        Signal.vector("row_3", "row_3", meaning="third row of the attitude", frame="b"), _third(rows)
+    )
+    matrix = sp.Matrix.vstack(*(row.T for row in (*rows, third)))
+    for number, signal in enumerate(ROWS):
+        build.feedback(signal, turn[number, :] * matrix)
+    return build.kernel(
+        "dcm-two-rows-navigation" + (f"-{order}" if order else ""),
+        f"{_TITLE}: update by the rotation of the navigation frame" + (f", order {order}" if order else ""),
+        f"{SAVAGE}, equations (5), (6) and (43) for two rows",
+    )
+
+
+def orthonormalized() -> Kernel:
+    """Return two rows made orthonormal to first order, equations (28) to (31)."""
+    build = KernelBuilder()
+    rows = [build.input(row) for row in ROWS]
+    half = build.value("half_error", algebra.dot(*rows) / 2, "half the rows' product")
+    factors = [
+        build.value(
+            f"factor_{number}", 1 + (1 - algebra.dot(row, row)) / 2, f"1/|row {number}| to first order"
+        )
+        for number, row in enumerate(rows, 1)
+    ]
+    for signal, row, other, factor in zip(ROWS, rows, rows[::-1], factors, strict=True):
+        build.feedback(signal, factor * row - half * other)
+    return build.kernel(
+        "dcm-two-rows-orthonormalize",
+        f"{_TITLE}: made orthonormal, to first order",
+        f"{SAVAGE}, equations (28) to (31) for two rows, both corrected from the same rows",
+        notes=("Made for rows near orthonormal ones.",),
+    )
+
+
+def matrix() -> Kernel:
+    """Return the direction cosine matrix of two rows, equation (43)."""
+    build = KernelBuilder()
+    rows = [build.input(row) for row in ROWS]
+    attitude = replace(DCM.state, name="attitude")
+    build.output(attitude, sp.Matrix.vstack(*(row.T for row in (*rows, _third(rows)))))
+    return build.kernel(
+        "dcm-from-two-rows", "Direction cosine matrix from two rows", f"{SAVAGE}, equation (43)"
     )

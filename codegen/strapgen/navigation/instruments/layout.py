@@ -12,8 +12,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from strapgen.catalogue import coefficients
 from strapgen.catalogue.coefficients import Number
 from strapgen.catalogue.methods.coefficient_files import Source, Title, slug
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, algebraic, refused
+from strapgen.catalogue.toml_models import Key, UserFile, algebraic, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -89,7 +88,7 @@ class GyroFile:
         Unbalance, Key("Mass unbalance: a number, or a multiple of a symbol", "rad/s per m/s^2")
     ]
     y: Annotated[Axis | None, Key("The other torquer axis", "1")] = None
-    spin: Annotated[Axis | None, Key("The spin axis, in the place of y", "1")] = None
+    spin: Annotated[Axis | None, Key("The spin axis, in place of y", "1")] = None
     turn_deg: Annotated[
         Fraction, Key("Angle by which the torquer axes are turned about the spin axis", "deg")
     ] = Fraction(0)

@@ -8,7 +8,8 @@ import sympy as sp
 
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder
-from strapgen.navigation.instruments.imu_errors import CYCLE
+from strapgen.navigation.instruments.imu_errors import CYCLE, CYCLE_RATE
+from strapgen.navigation.instruments.separation import MICHELIN, TORQUES
 
 GILMORE = (
     "J. P. Gilmore, Modular Strapdown Guidance Unit with Embedded Microprocessors, "
@@ -125,4 +126,127 @@ def temperature_coefficient() -> Kernel:
         "Coefficient of a sensor at a temperature, two slopes",
         f"{GILMORE}, (10), printed",
         notes=("Unit 1 stands for the unit of the coefficient.",),
+    )
+
+
+_SOURCE = f"{GILMORE}, (1) to (3), ordering repaired, (2) derived"
+#: Largest angle of the float in quanta of its converter, and what a filter and an integral of it can reach.
+_ANGLE, _FILTERED, _INTEGRATED = Fraction(256), Fraction(128), Fraction(2048)
+
+ANGLE = Signal.scalar(
+    "angle", unit="1", meaning="angle of the float in quanta of its converter", bound=_ANGLE
+)
+FILTERED = Signal.scalar(
+    "filtered", unit="1", meaning="float angle through the lag of the loop, in quanta", bound=_FILTERED
+)
+INTEGRATED = Signal.scalar(
+    "integrated", unit="1", meaning="leaking integral of the float angle, in quanta", bound=_INTEGRATED
+)
+COMMAND = Signal.scalar(
+    "command", unit="1", meaning="pulses of the torquer for the next cycle, before its limit"
+)
+_CONSTANTS = tuple(
+    Signal.scalar(name, unit="1", meaning=meaning, bound=bound)
+    for name, meaning, bound in (
+        ("gain", "K_s, pulses for a quantum", Fraction(1)),
+        ("lag_gain", "C1 = Kf/(1 + r), r = tau0/dt", Fraction(1, 4)),
+        ("lag_pole", "C2 = r/(1 + r)", Fraction(1)),
+        ("integral_gain", "C3 = Ki dt", Fraction(1)),
+        ("leak", "K_L, part of the integral that is lost in a cycle", Fraction(1)),
+    )
+)
+
+
+def pulse_torque() -> Kernel:
+    """Return a cycle of the control law: a proportional part less a lag, and a leaking integral.
+
+    e = a - f, f' = C1 e + C2 f, i' = (i + C3 a)(1 - K_L), command = K_s (e + i').
+    """
+    build = KernelBuilder()
+    filtered, integrated, angle = map(build.scalar, (FILTERED, INTEGRATED, ANGLE))
+    gain, lag_gain, lag_pole, integral_gain, leak = map(build.scalar, _CONSTANTS)
+    error = angle - filtered
+    build.feedback(FILTERED, [lag_gain * error + lag_pole * filtered])
+    leaked = build.feedback(INTEGRATED, [(integrated + integral_gain * angle) * (1 - leak)])
+    build.output(COMMAND, [gain * (error + leaked[0])])
+    return build.kernel(
+        "pulse-torque",
+        "Control law of a pulse torquing loop",
+        _SOURCE,
+        notes=(
+            "The torquer has a limit of its own; the command is rounded and limited where it is handed over.",
+        ),
+    )
+
+
+DEVIATION = Signal.labelled(
+    "deviation",
+    "u",
+    "123",
+    unit="1",
+    meaning="relative deviations of the scale factors of gyros 1, 2 and 3 by heating; zero at switch-on",
+    bound=Fraction(1, 256),
+)
+DECAY = Signal.scalar(
+    "decay",
+    unit="1",
+    meaning="1 - exp(-T/tau), what decays of the deviations in a cycle",
+    bound=Fraction(1, 8192),
+)
+GAIN = Signal.labelled(
+    "heating_gain",
+    "k",
+    "123",
+    unit="(rad/s)^-2",
+    meaning="k_inf, steady deviations of the scale factors of gyros 1, 2 and 3 by the square of the rate",
+    bound=Fraction(1, 2048),
+)
+
+
+def _torque(name: str, prefix: str, meaning: str, bound: Fraction | None) -> Signal:
+    """Return a signal like `TORQUES`, with other names."""
+    labels = [element.partition("_")[2] for element in TORQUES.elements]
+    about = f"{meaning} of the cycle about the torquer axes x and y of gyros 1, 2 and 3"
+    return Signal.labelled(name, prefix, labels, unit="rad", meaning=about, bound=bound, over="cycle")
+
+
+def scale_factor_heating(errors: bool = False) -> Kernel:
+    """Return the scale factor correction of three gyros for the heat of their torquers, equations (6.6) and (6.7)."""
+    build = KernelBuilder()
+    u = build.input(DEVIATION)
+    kind = "true" if errors else "indicated"
+    d = build.input(_torque("torque_increment", "M", f"{kind} angle increments", Fraction(3, 80)))
+    decay = build.scalar(DECAY)
+    gain = build.input(GAIN)
+    cycle_rate = build.scalar(CYCLE_RATE)
+    scale = sp.Matrix([1 + u[number // 2] for number in range(6)])
+    if errors:
+        signal = _torque("indicated", "indicated", "indicated angle increments", None)
+        torqued = build.stage(signal, [x / factor for x, factor in zip(d, scale, strict=True)])
+    else:
+        torqued = d
+    labels = [element.partition("_")[2] for element in TORQUES.elements]
+    rate = build.stage(
+        Signal.labelled("rate", "w", labels, unit="rad/s", meaning="torquer rates"), cycle_rate * torqued
+    )
+    squares = [rate[2 * number] ** 2 + rate[2 * number + 1] ** 2 for number in range(3)]
+    steady = build.stage(
+        Signal.labelled("steady", "steady", "123", meaning="deviations that the rates would lead to"),
+        gain.multiply_elementwise(sp.Matrix(squares)),
+    )
+    build.feedback(DEVIATION, u + decay * (steady - u))
+    if errors:
+        signal = _torque("indicated_torque_increment", "measured", "indicated angle increments", None)
+        build.output(signal, torqued)
+    else:
+        signal = _torque("compensated_torque_increment", "true", "true angle increments", None)
+        build.output(signal, scale.multiply_elementwise(d))
+    return build.kernel(
+        "torquer-heating-errors" if errors else "scale-factor-heating",
+        "Gyros whose torquers heat up" if errors else "Scale factors of gyros whose torquers heat up",
+        f"{MICHELIN}, (6.2), (6.6) and (6.7), printed; recursion on the deviation derived",
+        notes=(
+            "The scale factor is 1 + deviation at the start of the cycle.",
+            "(6.8) and (6.9) are the solution for one constant rate and no recursion: they never decay.",
+        ),
     )

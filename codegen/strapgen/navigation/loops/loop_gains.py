@@ -13,9 +13,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel.algebra import Wrapped
 from strapgen.kernel.kernel import Kernel
-from strapgen.navigation.loops.heading import heading_loop
-from strapgen.navigation.loops.level import erection, level_loop
-from strapgen.navigation.loops.vertical import vertical_loop
+from strapgen.navigation.loops.loop_kernels import erection, heading_loop, level_loop, vertical_loop
 
 s, z = sp.symbols("s z")
 tau, g, R, T = sp.symbols("tau g R T", positive=True)

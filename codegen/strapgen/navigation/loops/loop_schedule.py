@@ -8,8 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated
 
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key
+from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 
@@ -69,14 +68,14 @@ class LoopMode:
     heading: Annotated[LoopTable, Key("Loop of the heading")]
     vertical: Annotated[LoopTable, Key("Loop of the vertical channel")]
     level: Annotated[LoopTable | None, Key("Loop of levelling")] = None
-    erection: Annotated[LoopTable | None, Key("Loop of erection, in the place of levelling")] = None
+    erection: Annotated[LoopTable | None, Key("Loop of erection, in place of levelling")] = None
     name: Annotated[str, Key("Name; by default its number")] = ""
     duration_s: Annotated[Fraction | None, Key("Duration; none for a mode without an end", "s", above=0)] = (
         None
     )
-    when: Annotated[str, Key("When the mode holds", choices=CONDITIONS)] = "sequence"
-    after_s: Annotated[Fraction, Key("Time without air data after which it holds", "s", least=0)] = Fraction(
-        0
+    when: Annotated[str, Key("When the mode is active", choices=CONDITIONS)] = "sequence"
+    after_s: Annotated[Fraction, Key("Time without air data after which it is active", "s", least=0)] = (
+        Fraction(0)
     )
     #: Levelling or erection, heading and vertical
     loops: tuple[LoopSetting, ...] = field(init=False)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,11 @@ from strapgen.ir.exceptions import InputError
 from strapgen.navigation.loops import loop_gains
 from strapgen.navigation.loops.loop_gains import closed_loop
 from strapgen.navigation.loops.loop_schedule import LoopMode, LoopSchedule, LoopSetting
+from strapgen.navigation.systems.system_runner import SystemMemory, SystemRun, SystemRunner
+from strapgen.results import figures
+from strapgen.results.records import INTERNAL, entry
+from strapgen.results.result import Result
+from strapgen.results.table import Column, TextTable
 from strapgen.run import backends
 
 Array = NDArray[np.float64]
@@ -52,10 +58,10 @@ class LoopErrors:
     height_m: float = 10.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value, largest = getattr(self, field.name), _LARGEST.get(field.name, 1e6)
+        for one in fields(self):
+            value, largest = getattr(self, one.name), _LARGEST.get(one.name, 1e6)
             if not abs(value) < largest:
-                raise InputError(f"{field.name} is {value:g}; a magnitude below {largest:g} is needed")
+                raise InputError(f"{one.name} is {value:g}; a magnitude below {largest:g} is needed")
 
     def cases(self, loop: str, gravity: float) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
         """Return the cases of a loop: constant inputs and states at the start, in SI units, by the name of the case."""
@@ -93,15 +99,18 @@ class LoopCourse:
 
 
 @dataclass(frozen=True)
-class LoopDesign:
-    """A loop in a mode: gains, and the slowest pole of a cycle as a time constant."""
+class LoopGains:
+    """The gains of a loop in a mode."""
 
     mode: str
     loop: str
-    setting: LoopSetting
-    gains: tuple[Fraction, ...]
-    #: None for an open loop
-    slowest_s: float | None
+    reference: str
+    #: Time constant
+    tau_s: float | None
+    slowest_pole_s: float | None
+    gains: list[float]
+    #: The same exactly
+    exact: tuple[Fraction, ...] = field(metadata=entry(kind=list[str]))
 
 
 def mode_gains(schedule: LoopSchedule, setting: LoopSetting) -> tuple[Fraction, ...]:
@@ -113,13 +122,13 @@ def mode_gains(schedule: LoopSchedule, setting: LoopSetting) -> tuple[Fraction, 
     )
 
 
-def designs(schedule: LoopSchedule) -> list[LoopDesign]:
-    """Return all loops of all modes with their gains."""
+def schedule_gains(schedule: LoopSchedule) -> list[LoopGains]:
+    """Return the gains of all loops of all modes; unstable ones are refused."""
     rows = []
     for mode in schedule.modes:
         for setting in mode.loops:
-            values, slowest = mode_gains(schedule, setting), None
-            if setting.time_constant_s is not None:
+            values, tau, slowest = mode_gains(schedule, setting), setting.time_constant_s, None
+            if tau is not None:
                 known = (schedule.cycle_s, schedule.gravity, schedule.radius)
                 try:
                     loop_gains.check_stable(setting.loop, values, *known)
@@ -127,7 +136,9 @@ def designs(schedule: LoopSchedule) -> list[LoopDesign]:
                     raise InputError(f"mode {mode.name}: {error}") from None
                 pole = abs(loop_gains.poles_of_a_cycle(setting.loop, values, *known)[0])
                 slowest = -float(schedule.cycle_s) / math.log(pole) if pole else 0.0
-            rows.append(LoopDesign(mode.name, setting.loop, setting, values, slowest))
+            head = (mode.name, setting.loop, setting.reference)
+            numbers = [float(value) for value in values]
+            rows.append(LoopGains(*head, None if tau is None else float(tau), slowest, numbers, values))
     return rows
 
 
@@ -328,3 +339,196 @@ _PLANTS: Mapping[str, type[_LevelPlant] | type[_HeadingPlant] | type[_VerticalPl
 def factors(loop: str) -> Array:
     """Return the factors from SI units to those of `UNITS`, (states,)."""
     return np.array([factor for _, factor in UNITS[loop].values()])
+
+
+_GAIN, _STATE = ".9g", ".7g"
+
+
+@dataclass(frozen=True)
+class LoopState:
+    """A state of a case at the end of a mode."""
+
+    loop: str
+    mode: str
+    time_s: float
+    #: What disturbs the loop
+    case: str
+    quantity: str
+    unit: str
+    #: By the kernel
+    run: float
+    matrix_exponential: float
+    #: The former less the latter
+    difference: float
+
+
+@dataclass(frozen=True)
+class LoopsResult(Result):
+    """The loops of an attitude and heading reference through their schedule."""
+
+    rows_in = "states"
+    drawn_by = f"{__name__}:loops_image"
+
+    #: Those that were run
+    modes: tuple[LoopMode, ...] = field(metadata=INTERNAL)
+    courses: Sequence[LoopCourse] = field(metadata=INTERNAL)
+    #: What disturbs the loops
+    errors: LoopErrors
+    #: Title of the schedule
+    title: str
+    #: Time of a cycle
+    cycle_s: float
+    #: The gains of all modes
+    gains: Sequence[LoopGains]
+    #: Every state of every case at the end of every mode
+    states: list[LoopState] = field(metadata=entry(key="rows"))
+
+    @staticmethod
+    def of(
+        schedule: LoopSchedule,
+        modes: tuple[LoopMode, ...],
+        errors: LoopErrors,
+        gains: Sequence[LoopGains],
+        courses: Sequence[LoopCourse],
+    ) -> LoopsResult:
+        """Return the loops that were run through modes of a schedule."""
+        states = [state for course in courses for state in _states(modes, course)]
+        return LoopsResult(modes, courses, errors, schedule.title, float(schedule.cycle_s), gains, states)
+
+    def text(self) -> str:
+        """Return the gains, and the states of each loop."""
+        return "\n".join(_lines(self))
+
+
+def _states(modes: tuple[LoopMode, ...], course: LoopCourse) -> Iterator[LoopState]:
+    """Yield the states of a loop: those of every case at the end of every mode."""
+    run, exact = (array * factors(course.loop) for array in (course.run, course.exact))
+    for mode, end in zip(modes, course.ends, strict=True):
+        for k, case in enumerate(course.cases):
+            for number, (quantity, (unit, _)) in enumerate(UNITS[course.loop].items()):
+                one, other = float(run[end, k, number]), float(exact[end, k, number])
+                facts = (course.loop, mode.name, float(course.times[end]), case, quantity, unit)
+                yield LoopState(*facts, one, other, one - other)
+
+
+def _lines(result: LoopsResult) -> Iterator[str]:
+    yield f"{result.title or 'schedule'}: cycle {result.cycle_s:g} s"
+    yield ""
+    yield from _gains_table(result.gains).lines()
+    for course in result.courses:
+        yield ""
+        yield f"{course.loop} loop at the end of each mode: by the kernel, and by the matrix exponential"
+        yield ""
+        yield from _states_table(course.loop, result.states).lines()
+
+
+def _gains_table(several: Sequence[LoopGains]) -> TextTable:
+    """Return the gains of all modes."""
+    columns = [Column(name, "<") for name in ("mode", "loop", "reference")]
+    columns += [Column("tau, s", spec="g"), Column("slowest pole, s", spec=".6g")]
+    columns += [Column(name, spec=_GAIN) for name in ("k1", "k2", "k3")]
+    rows = []
+    for one in several:
+        values = [] if one.tau_s is None else one.gains
+        gains = [*values, *[None] * (3 - len(values))]
+        rows.append([one.mode, one.loop, one.reference, one.tau_s, one.slowest_pole_s, *gains])
+    return TextTable(columns, rows)
+
+
+def _states_table(loop: str, states: Iterable[LoopState]) -> TextTable:
+    """Return the states of a loop, a line for each mode and case."""
+    columns = [Column("mode", "<"), Column("time, s", spec="g"), Column("case", "<")]
+    for quantity, (unit, _) in UNITS[loop].items():
+        columns += [
+            Column(header, spec=_STATE, group=f"{quantity}, {unit}") for header in ("kernel", "exponential")
+        ]
+    rows: dict[tuple[str, str], list[Any]] = {}
+    for state in states:
+        if state.loop == loop:
+            row = rows.setdefault((state.mode, state.case), [state.mode, state.time_s, state.case])
+            row += [state.run, state.matrix_exponential]
+    return TextTable(columns, list(rows.values()))
+
+
+def loops_image(result: LoopsResult, path: str | Path) -> bytes:
+    """Return the courses of the loops over time: the kernel as a line, the matrix exponential dashed."""
+    figure, grid = figures.grid_of_axes(len(result.courses), 2, (11.0, 2.9 * len(result.courses)))
+    for row, course in zip(grid, result.courses, strict=True):
+        quantities = list(UNITS[course.loop].items())
+        which = [number for number, (name, _) in enumerate(quantities) if name not in ("velocity", "climb")]
+        for axes, number in zip(row, which, strict=True):
+            quantity, (unit, factor) = quantities[number]
+            colours = figures.several_colours(len(course.cases))
+            for k, (case, colour) in enumerate(zip(course.cases, colours, strict=True)):
+                axes.plot(course.times, factor * course.run[:, k, number], color=colour, label=case)
+                axes.plot(
+                    course.times, factor * course.exact[:, k, number], "--", color="0.25", linewidth=0.8
+                )
+            for end in course.ends[:-1]:
+                axes.axvline(course.times[end], color="0.75", linewidth=0.8, zorder=0)
+            axes.set_ylabel(f"{quantity}, {unit}")
+            axes.set_title(f"{course.loop} loop: {quantity}", loc="left", fontsize=10)
+            figures.style(axes)
+        row[0].legend(fontsize=8, frameon=False)
+    for axes in grid[-1]:
+        axes.set_xlabel("time, s")
+    figures.title(figure, f"{result.title or 'schedule'}; dashed: matrix exponential")
+    return figures.image(figure, path)
+
+
+@dataclass(frozen=True)
+class RestingSensors:
+    """What the sensors of a body at rest measure, whose axes are those of the level frame, z down."""
+
+    #: In rad/s, axes n
+    earth_rate: tuple[float, float, float] = (7.292115e-5, 0.0, 0.0)
+    #: In rad/s
+    gyro_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: In m/s^2
+    accelerometer_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    #: Of the flux valve in rad, and of the air data in m
+    heading: float = 0.0
+    height: float = 0.0
+
+    def samples(self, schedule: LoopSchedule, mode: LoopMode, count: int) -> dict[str, Array]:
+        """Return samples of all inputs of ``examples/ahrs.toml`` for cycles of a mode."""
+        T = float(schedule.cycle_s)
+        force = np.add(self.accelerometer_bias, (0.0, 0.0, -float(schedule.gravity)))
+        row = {
+            "gyro": T * np.add(self.earth_rate, self.gyro_bias),
+            "accelerometer": T * force,
+            "airspeed": np.zeros(2),
+            "flux_valve": np.array(self.heading),
+            "air_height": np.array(self.height),
+        }
+        for setting in mode.loops:
+            loop = setting.loop
+            for number, gain in enumerate(mode_gains(schedule, setting), 1):
+                row[f"{loop}_k{number}"] = np.array(float(gain))
+        return {name: np.broadcast_to(value, (count, *value.shape)) for name, value in row.items()}
+
+
+def run_modes(
+    runner: SystemRunner,
+    schedule: LoopSchedule,
+    parts: Iterable[tuple[LoopMode, Fraction]],
+    sensors: RestingSensors,
+    memory: SystemMemory | None = None,
+) -> list[SystemRun]:
+    """Run a reference system through modes for some time each, one after the other.
+
+    `parts`: with the time in s.
+    """
+    runs: list[SystemRun] = []
+    for mode, seconds in parts:
+        count = int(seconds / schedule.cycle_s)
+        begin = runs[-1].memory if runs else memory
+        runs.append(runner.run(sensors.samples(schedule, mode, count), begin))
+    return runs
+
+
+def tilt(attitude: Array) -> Array:
+    """Return the errors of small computed attitudes whose true one is no rotation, C = I + [phi x], (..., 3) in rad."""
+    C = np.asarray(attitude, float)
+    pairs = ((2, 1), (0, 2), (1, 0))
+    return np.stack([(C[..., i, j] - C[..., j, i]) / 2 for i, j in pairs], axis=-1)

@@ -17,7 +17,7 @@ from strapgen.cli.values import names
 
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
-    from strapgen.navigation.redundancy.parity_equations import SensorSet
+    from strapgen.navigation.redundancy.redundancy_kernels import SensorSet
 
 
 @grouped
@@ -54,9 +54,8 @@ def redundancy(
     Example: strapgen redundancy examples/hexad.toml --target c-fixed --out out/hexad
     """
     check_format(format)
-    from strapgen.navigation.redundancy.failure_tables import failure_tables
-    from strapgen.navigation.redundancy.geometry_file import read
-    from strapgen.navigation.redundancy.geometry_report import GeometryResult, tables_csv
+    from strapgen.navigation.redundancy.geometry_report import GeometryResult, failure_tables, tables_csv
+    from strapgen.navigation.redundancy.redundancy_kernels import read
 
     settings = fixed.settings(1)
     sensors = read(file)
@@ -73,7 +72,7 @@ def redundancy(
 def _sources(sensors: SensorSet, target: str, settings: Settings | None) -> dict[str, str]:
     """Return the files of all kernels of a set of sensors."""
     from strapgen import pipeline
-    from strapgen.navigation.redundancy.geometry_file import kernels
+    from strapgen.navigation.redundancy.redundancy_kernels import kernels
     from strapgen.run.kernel_sources import sources_of_program
 
     files: dict[str, str] = {}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,14 @@ from numpy.typing import NDArray
 
 from strapgen import pipeline
 from strapgen.ir.exceptions import InputError
-from strapgen.navigation.redundancy import failure_selection, parity_equations
-from strapgen.navigation.redundancy.failure_tables import FailureTable, failure_table
+from strapgen.navigation.redundancy import redundancy_kernels
 from strapgen.navigation.redundancy.geometry import SensorGeometry
-from strapgen.navigation.redundancy.parity_equations import SensorSet
-from strapgen.results.records import entry, properties
-from strapgen.run.backend_names import BACKENDS
-from strapgen.run.backends import of_sources
+from strapgen.navigation.redundancy.geometry_report import FailureTable, failure_table
+from strapgen.navigation.redundancy.redundancy_kernels import SensorSet
+from strapgen.results import figures
+from strapgen.results.records import INTERNAL, entry, properties, reader_table
+from strapgen.results.result import Result
+from strapgen.run.backend_names import BACKENDS, of_sources
 from strapgen.run.evaluators import Evaluator
 from strapgen.run.kernel_sources import sources_of_program
 
@@ -141,7 +143,7 @@ def redundancy_study(
     target = BACKENDS[backend].target
     parity, select = (
         of_sources(sources_of_program(pipeline.lower(kernel(sensors)), target))
-        for kernel in (parity_equations.parity, failure_selection.select)
+        for kernel in (redundancy_kernels.parity, redundancy_kernels.select)
     )
     unit = _Unit(sensors, parity, select, {})
     rng = np.random.default_rng(seed)
@@ -226,3 +228,69 @@ def _by_tables(unit: _Unit, fails: NDArray[np.bool_], gone: Any) -> tuple[Any, A
         failed[number] = -1 if verdict.failed is None else verdict.failed
         triads[number] = verdict.triad
     return failed, triads
+
+
+_KEYS = (
+    *("removed", "size", "detected", "undetected", "false_alarms", "isolated", "wrong", "selected"),
+    *("table_isolated", "table_wrong", "table_selected"),
+)
+
+
+@dataclass(frozen=True)
+class RedundancyResult(Result):
+    """What redundancy management makes of failing sensors."""
+
+    computed = properties(name=entry())
+    drawn_by = f"{__name__}:redundancy_image"
+
+    sensors: SensorSet = field(metadata=INTERNAL)
+    errors: SensorErrors
+    outcomes: Sequence[Outcomes] = field(metadata=entry(key="rows"))
+
+    @property
+    def name(self) -> str:
+        """Name of the set of sensors."""
+        return self.sensors.name
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the counts of each step."""
+        return [{key: getattr(row, key) for key in _KEYS} for row in self.outcomes]
+
+    def text(self) -> str:
+        """Return the counts as a table."""
+        head = (
+            f"{self.name}: {self.outcomes[0].trials} trials in every row; size of the failure in trip levels of "
+            "equations of length 1;\nselected: a triad without the failing sensor\n"
+        )
+        return f"{head}\n{reader_table(self.outcomes, Outcomes, *_KEYS).as_text()}"
+
+
+def redundancy_image(result: RedundancyResult, path: str | Path) -> bytes:
+    """Return the shares of detected and isolated failures against their size, a panel for each number removed."""
+    groups: dict[int, list[Outcomes]] = {}
+    for row in result.outcomes:
+        groups.setdefault(row.removed, []).append(row)
+    figure, grid = figures.grid_of_axes(1, len(groups), (2.0 + 3.6 * len(groups), 4.2), sharey=True)
+    for axes, (removed, group) in zip(grid[0], groups.items(), strict=True):
+        _draw(axes, group)
+        axes.set_title(f"sensors removed before: {removed}", loc="left", fontsize=10)
+        axes.set_xlabel("failure, trip levels")
+    grid[0][0].set_ylabel("share of the trials")
+    figures.common_legend(figure, list(grid[0]), loc="outside right center")
+    figures.title(figure, f"{result.name}: what becomes of a failure of one more sensor")
+    return figures.image(figure, path)
+
+
+def _draw(axes: Any, group: Sequence[Outcomes]) -> None:
+    sizes = [row.size for row in group]
+    lines = (
+        ("an equation fails", "detected", "-"),
+        ("isolated by the rule", "isolated", "-"),
+        ("isolated by the tables", "table_isolated", ":"),
+        ("another one by the tables", "table_wrong", ":"),
+        ("selected without it", "selected", "--"),
+    )
+    for (label, key, line), colour in zip(lines, figures.several_colours(len(lines)), strict=True):
+        shares = [getattr(row, key) / row.trials for row in group]
+        axes.plot(sizes, shares, line, color=colour, linewidth=1.6, label=label)
+    figures.style(axes)

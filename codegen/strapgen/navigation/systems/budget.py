@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
+from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.program import Constant, Node, Operation, Program
+from strapgen.lab import cost as costs
 from strapgen.navigation.systems.fitting import Fitted
 from strapgen.navigation.systems.system import Rate
+from strapgen.results.records import INTERNAL, entry, properties
 from strapgen.targets import TARGETS
 
 #: Bytes of a number in floating point, by its type in C.
@@ -38,15 +41,25 @@ class StageBudget:
 class RateBudget:
     """What the stages of one rate need in a second."""
 
+    computed = properties(
+        operations=entry(),
+        per_second=entry(key="operations_per_second", write=float, kind=float),
+        executed_per_second=entry(key="instructions_per_second", write=float, kind=float | None),
+    )
+
     #: Cycles of the fastest rate from one time to the next
     every: int
-    hz: Fraction
-    stages: tuple[StageBudget, ...]
+    hz: Fraction = field(metadata=entry(write=float, kind=float))
+    stages: tuple[StageBudget, ...] = field(metadata=INTERNAL)
 
     @property
     def operations(self) -> dict[str, int]:
-        """Operations of one time by kind, without those that do not occur."""
-        return _added(stage.operations for stage in self.stages)
+        """Of a call of all stages by kind, without those that do not occur."""
+        total: dict[str, int] = {}
+        for stage in self.stages:
+            for kind, count in stage.operations.items():
+                total[kind] = total.get(kind, 0) + count
+        return total
 
     @property
     def per_second(self) -> Fraction:
@@ -64,23 +77,37 @@ class RateBudget:
 class Budget:
     """What a system needs."""
 
-    #: From the fastest
+    computed = properties(
+        per_second=entry(key="operations_per_second", write=float, kind=float),
+        executed_per_second=entry(key="instructions_per_second", write=float, kind=float | None),
+        memory_bytes=entry(),
+    )
+
+    #: From the fastest, without those at which no stage runs
     rates: tuple[RateBudget, ...]
-    #: Memory between calls: values, error feedback, counters, and what a compiler puts between members so that
-    #: each lies at a multiple of its size
+    #: Memory between calls: values
     cell_bytes: int
+    #: Memory between calls: error feedback
     feedback_bytes: int
+    #: Memory between calls: counters
     counter_bytes: int
+    #: What a compiler puts between members so that each lies at a multiple of its size
     padding_bytes: int
-    #: Bytes of the different constants of all stages, and of initial values that are not zero
+    #: Of the different constants of all stages, and of initial values that are not zero
     constant_bytes: int
-    #: Processor on which instructions were counted; "" if they were not
-    cpu: str = ""
+    #: Processor on which instructions were counted
+    cpu: str | None = None
 
     @property
     def memory_bytes(self) -> int:
-        """Size of the struct of the memory."""
+        """Size of the struct of the memory: values, error feedback, counters and padding."""
         return self.cell_bytes + self.feedback_bytes + self.counter_bytes + self.padding_bytes
+
+    @property
+    def code_bytes(self) -> int | None:
+        """Bytes of object code of all stages; None where they were not measured."""
+        sizes = [stage.code_bytes for rate in self.rates for stage in rate.stages]
+        return None if None in sizes else sum(filter(None, sizes))
 
     @property
     def per_second(self) -> Fraction:
@@ -95,17 +122,19 @@ class Budget:
 
 
 def budget(
-    fit: Fitted, measured: Mapping[str, tuple[int | None, int, int]] | None = None, cpu: str = ""
+    fit: Fitted,
+    measured: Mapping[str, tuple[int | None, int, int]] | None = None,
+    cpu: str | None = None,
 ) -> Budget:
     """Return what a system needs whose stages are generated.
 
     The copies of values between calls are not counted, nor are rescalings.
     """
     sizes = list(_sizes(fit))
-    cells = sum(count * size for kind, count, size in sizes if kind == "cell")
-    feedback = sum(count * size for kind, count, size in sizes if kind == "feedback")
-    counters = sum(count * size for kind, count, size in sizes if kind == "counter")
-    whole = _aligned([(count, size) for _, count, size in sizes])
+    bytes_of = dict.fromkeys(("cell", "feedback", "counter"), 0)
+    for kind, count, size in sizes:
+        bytes_of[kind] += count * size
+    padding = _aligned([(count, size) for _, count, size in sizes]) - sum(bytes_of.values())
     system = fit.description.system
     constants = sum(
         _bytes(fit, stage.name) * len(_constants(fit.description.programs[stage.name], _is_fixed(fit)))
@@ -116,18 +145,15 @@ def budget(
         for (kind, count, size), cell in zip(sizes, system.cells, strict=False)
         if kind == "cell" and any(cell.initial)
     )
-    rates = tuple(_rate(fit, rate, measured or {}) for rate in system.rates)
-    return Budget(
-        rates, cells, feedback, counters, whole - cells - feedback - counters, constants + initial, cpu
-    )
+    rates = tuple(_rate(fit, rate, measured or {}) for rate in system.rates if rate.stages)
+    cells, feedback, counters = bytes_of.values()
+    return Budget(rates, cells, feedback, counters, padding, constants + initial, cpu)
 
 
 def lines(needs: Budget) -> list[str]:
     """Return a budget in lines of text, for the head of generated files."""
     result = ["Budget of the stages' calls, without copies between them:"]
     for rate in needs.rates:
-        if not rate.stages:
-            continue
         names = ", ".join(stage.name for stage in rate.stages)
         counts = ", ".join(f"{count} {kind}" for kind, count in rate.operations.items())
         result.append(
@@ -142,11 +168,10 @@ def lines(needs: Budget) -> list[str]:
         )
     result.append(f"All rates: {_thousands(needs.per_second)} operations a second.")
     if needs.executed_per_second is not None and needs.cpu:
-        code = sum(stage.code_bytes or 0 for rate in needs.rates for stage in rate.stages)
         stack = max(stage.stack_bytes or 0 for rate in needs.rates for stage in rate.stages)
         result.append(
-            f"On {needs.cpu}: {_thousands(needs.executed_per_second)} instructions a second, {code} bytes of object "
-            f"code, at most {stack} bytes of stack in a stage."
+            f"On {needs.cpu}: {_thousands(needs.executed_per_second)} instructions a second, {needs.code_bytes} bytes "
+            f"of object code, at most {stack} bytes of stack in a stage."
         )
     parts = [f"{needs.cell_bytes} of values"]
     parts += [f"{needs.feedback_bytes} of error feedback"] if needs.feedback_bytes else []
@@ -172,14 +197,6 @@ def _rate(fit: Fitted, rate: Rate, measured: Mapping[str, tuple[int | None, int,
         seen = measured.get(stage.name, (None, None, None))
         stages.append(StageBudget(stage.name, stage.kernel, counts, constants, *seen))
     return RateBudget(rate.every, fit.description.system.sample_hz / rate.every, tuple(stages))
-
-
-def _added(counts: Iterator[Mapping[str, int]]) -> dict[str, int]:
-    total: dict[str, int] = {}
-    for entry in counts:
-        for kind, count in entry.items():
-            total[kind] = total.get(kind, 0) + count
-    return total
 
 
 def _is_fixed(fit: Fitted) -> bool:
@@ -243,3 +260,16 @@ def _is_power(number: Fraction) -> bool:
     """Return whether a number is a power of two."""
     top, bottom = number.numerator, number.denominator
     return top & (top - 1) == 0 and bottom & (bottom - 1) == 0
+
+
+def measured_budget(fit: Fitted, cpu: str) -> Budget:
+    """Return what a system needs, with the instructions of every stage on a processor."""
+    (name,) = costs.processors(None, [cpu])
+    counts = {}
+    for stage, sources in fit.sources.items():
+        try:
+            one = costs.cost(sources, name)
+        except CompilerError as error:
+            raise CompilerError(f"stage {stage}: {error}") from None
+        counts[stage] = one.executed, one.code_bytes, one.stack_bytes
+    return budget(fit, counts, name)

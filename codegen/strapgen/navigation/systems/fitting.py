@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -14,9 +14,9 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings, rounded_limit
 from strapgen.ir.formats import Format
 from strapgen.ir.interfaces import Argument
+from strapgen.ir.program import Operation, Program, Reference
 from strapgen.ir.signals import CYCLE, Signal
 from strapgen.ir.sources import Sources
-from strapgen.navigation.systems.sums import copies
 from strapgen.navigation.systems.system import Push, SystemStage
 from strapgen.navigation.systems.wiring import Description
 from strapgen.targets import TARGETS
@@ -106,6 +106,15 @@ def _generated(
     return pipeline.compile(description.choices[stage.name], target, settings, naming)
 
 
+def without_needless_feedback(generate: Callable[[Settings], Sources], settings: Settings) -> Sources:
+    """Generate a stage; without error feedback where it rounds nothing that goes on to the next call."""
+    result = generate(settings)
+    if settings.carry == "none" or result.fixed is None or result.fixed.residuals:
+        return result
+    # The same sources as from `strapgen generate` without the option.
+    return generate(replace(settings, carry="none"))
+
+
 @dataclass
 class _Fit:
     """The formats while they are worked out."""
@@ -183,11 +192,9 @@ class _Fit:
             del wired[movable[-1]]
 
     def _without_needless_feedback(self, stage: SystemStage, settings: Settings) -> Sources:
-        """Return a stage; without error feedback where it rounds nothing that goes on to the next call."""
-        result = _generated(self.description, stage, self.target, settings)
-        if settings.carry == "none" or result.fixed is None or result.fixed.residuals:
-            return result
-        return _generated(self.description, stage, self.target, replace(settings, carry="none"))
+        return without_needless_feedback(
+            lambda chosen: _generated(self.description, stage, self.target, chosen), settings
+        )
 
     def _settings(self, stage: SystemStage) -> Settings:
         """Return word, error feedback, the ranges of a stage's inputs, and the gyro if it takes counts."""
@@ -314,3 +321,58 @@ class _Fit:
                 self.arguments.setdefault(push.source, argument)
         for argument in sources.fixed.outputs:
             self.arguments.setdefault(dict(stage.results)[argument.signal.name], argument)
+
+
+def copies(program: Program) -> dict[str, str]:
+    """Return the states that are copies of inputs of the call before, with these inputs.
+
+    >>> from strapgen import pipeline
+    >>> from strapgen.catalogue import Choice
+    >>> copies(pipeline.program(Choice("two-speed-fast-2")))
+    {'previous_increment': 'increment'}
+    """
+    inputs = {signal.elements: signal.name for signal in program.inputs}
+    result = {}
+    for state, elements in _next_elements(program).items():
+        if elements in inputs:
+            result[state] = inputs[elements]
+    return result
+
+
+def summed(program: Program) -> dict[str, str]:
+    """Return the states that add up an input and nothing else until they are reset, with these inputs.
+
+    >>> from strapgen import pipeline
+    >>> from strapgen.catalogue import Choice
+    >>> summed(pipeline.program(Choice("two-speed-fast-2")))
+    {'angle_sum': 'increment', 'velocity_sum': 'velocity_increment'}
+    """
+    signals = {signal.name: signal for signal in program.inputs}
+    values = {assignment.name: assignment.value for assignment in program.body}
+    cleared = () if program.recursion is None else program.recursion.reset
+    result = {}
+    for state, elements in _next_elements(program).items():
+        sums = {_added(values.get(element)) for element in elements}
+        for name, signal in signals.items():
+            pairs = {frozenset(pair) for pair in zip(signals[state].elements, signal.elements, strict=False)}
+            if state in cleared and len(pairs) == len(elements) and sums == pairs:
+                result[state] = name
+    return result
+
+
+def _next_elements(program: Program) -> dict[str, tuple[str, ...]]:
+    """Return the names of the values that become the elements of each state."""
+    outputs = {result.signal.name: result.nodes for result in program.outputs}
+    states = () if program.recursion is None else program.recursion.states
+    return {
+        state: tuple(node.name for node in outputs[output] if isinstance(node, Reference))
+        for state, output in states
+    }
+
+
+def _added(node: object) -> frozenset[str]:
+    """Return the names of the two values that a node adds up; none if it is something else."""
+    if not isinstance(node, Operation) or node.kind != "add":
+        return frozenset()
+    names = [each.name for each in node.arguments if isinstance(each, Reference)]
+    return frozenset(names if len(names) == len(node.arguments) == 2 else ())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from strapgen.ir.kernel_info import Recursion
-from strapgen.ir.signals import ANY, CYCLE, Signal, after
+from strapgen.ir.signals import ANY, CYCLE, Signal
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 _NOTE = "Unit any stands for the unit of the increments."
@@ -33,12 +32,11 @@ def increment_sum() -> Kernel:
     """
     build = KernelBuilder()
     total, d = build.input(SUM), build.input(INCREMENT)
-    build.output(after(SUM), total + d)
+    build.feedback(SUM, total + d, reset=True)
     return build.kernel(
         "sum-3",
         "Sum of the increments of a slower cycle",
         "the increment over a cycle is the sum of those over its parts; derived",
-        recursion=Recursion(((SUM.name, after(SUM).name),)),
         notes=(_NOTE,),
     )
 

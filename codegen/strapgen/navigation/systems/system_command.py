@@ -123,8 +123,8 @@ def system(
         raise InputError(
             f"--with-runs goes with targets in C, not with {target}; its module runs many cycles"
         )
-    from strapgen.navigation.systems.drawing.drawing import drawing
     from strapgen.navigation.systems.system_bounds import bounds
+    from strapgen.navigation.systems.system_drawing import drawing
     from strapgen.navigation.systems.system_report import SystemResult
     from strapgen.storage.files import write_files
 
@@ -161,8 +161,7 @@ def fitted_stages(
     """Return the generated stages, what they need, and the command that makes the files again."""
     from strapgen.ir.fixed_settings import Settings
     from strapgen.lab.cost import processors
-    from strapgen.navigation.systems import system_cost
-    from strapgen.navigation.systems.budget import budget
+    from strapgen.navigation.systems.budget import budget, measured_budget
     from strapgen.navigation.systems.fitting import fitted
     from strapgen.navigation.systems.wiring import read_system
     from strapgen.targets import BUILT_IN, system_targets
@@ -182,7 +181,7 @@ def fitted_stages(
             raise InputError(f"--cpu goes with targets in C, not with {target}")
         processors(None, [cpu])  # known before the stages are generated
     fit = fitted(description, target, settings)
-    needs = budget(fit) if cpu is None else system_cost.measured_budget(fit, cpu)
+    needs = budget(fit) if cpu is None else measured_budget(fit, cpu)
     return fit, needs, _command(file, target, sample_hz, cpu, settings)
 
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from strapgen.catalogue.toml_files import UserFile
-from strapgen.catalogue.toml_models import Key, parse, rational, refused
+from strapgen.catalogue.toml_models import Key, UserFile, parse, rational, refused
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import CARRIES
 from strapgen.ir.formats import LONGEST_WORD, SHORTEST_WORD
 from strapgen.ir.signals import ANY, FRAMES
-from strapgen.navigation.systems.reserved import check_names
+from strapgen.targets.names import PYTHON, C
 
 #: Most stages of a system, and most cycles from one call of a stage to the next.
 MOST_STAGES, MOST_CYCLES = 64, 1 << 20
@@ -166,7 +165,7 @@ class InputFile:
             form=f"one of {', '.join(FRAMES)}, an attitude such as b to n, or no frame",
         ),
     ] = ""
-    meaning: Annotated[str, Key("Words for the header; by default its name")] = ""
+    meaning: Annotated[str, Key("Description in the header; by default its name")] = ""
 
 
 @dataclass(frozen=True)
@@ -208,7 +207,7 @@ class StageFile:
         default_factory=dict
     )
     delay: Annotated[
-        Mapping[str, int], Key("Calls by which a wire lags that goes back, by input", "1", choices=(1,))
+        Mapping[str, int], Key("Delay of a wire that goes back, in calls, by input", "1", choices=(1,))
     ] = field(default_factory=dict)
     constants: Annotated[
         Mapping[str, Numbers], Key("Inputs with a fixed value, which is folded into the code")
@@ -243,14 +242,12 @@ class StageFile:
 
 @dataclass(frozen=True)
 class SystemFile:
-    """A described system: its samples, its stages from the fastest to the slowest, and what a run records."""
+    """A described system: its samples, its stages from the fastest to the slowest, and the recorded values."""
 
     sample_hz: Annotated[
         Fraction, Key("Cycles of the fastest rate in a second; --sample-hz replaces it", "Hz", above=0)
     ]
-    inputs: Annotated[
-        Mapping[Annotated[str, _NAME], InputFile], Key("What is measured in every cycle, by name")
-    ]
+    inputs: Annotated[Mapping[Annotated[str, _NAME], InputFile], Key("Measurements of every cycle, by name")]
     stage: Annotated[
         tuple[StageFile, ...],
         Key("Kernels at their rates, from the fastest to the slowest", least=1, most=MOST_STAGES),
@@ -317,3 +314,44 @@ def _cycles(what: str, every: str, sample_hz: Fraction) -> int:
             f"{what} is {every!r}, which does not divide the {float(sample_hz):g} Hz of the samples"
         )
     return checks.count(what, int(cycles), largest=MOST_CYCLES)
+
+
+_HEADERS_TEXT = """
+assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic
+stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype numpy
+"""
+#: Headers and modules that generated files include or import, or that a file of the same name would hide.
+_HEADERS = frozenset(_HEADERS_TEXT.split())
+#: What the functions of a system are called behind its name, and members of its memory.
+_FUNCTIONS = re.compile(r"begin|cycle|memory|residuals|runs?|every_\d+")
+#: Parameters, functions and modules that generated functions use.
+_USED = re.compile(r"cycles|done|status|np|memcpy|memmove|memset|(u?int\w*|size|ptrdiff)_t")
+
+
+def check_names(system: str, inputs: Iterable[str], stages: Iterable[str]) -> None:
+    """Check that code can have the names of a system, its inputs and its stages.
+
+    >>> check_names("imu", ["gyro"], ["fast", "slow"])
+    >>> check_names("imu", ["int"], ["fast"])
+    Traceback (most recent call last):
+    strapgen.InputError: input 'int' has a meaning in generated code; another name is needed
+    """
+    stages = list(stages)
+    if system in _HEADERS or not _is_free(system):
+        raise _refused("the name", system)
+    for name in stages:
+        if _FUNCTIONS.fullmatch(name) or _USED.fullmatch(name) or not _is_free(name):
+            raise _refused("stage", name)
+    for name in inputs:
+        rest = name.removeprefix(f"{system}_")
+        shadowed = rest != name and (_FUNCTIONS.fullmatch(rest) or rest in stages)
+        if shadowed or _FUNCTIONS.fullmatch(name) or _USED.fullmatch(name) or not _is_free(name):
+            raise _refused("input", name)
+
+
+def _is_free(name: str) -> bool:
+    return C.allows(name) and PYTHON.allows(name)
+
+
+def _refused(what: str, name: str) -> InputError:
+    return InputError(f"{what} {name!r} has a meaning in generated code; another name is needed")

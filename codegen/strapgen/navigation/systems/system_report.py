@@ -75,62 +75,9 @@ class ValueRow(InputRow):
 
 
 @dataclass(frozen=True)
-class RateRow:
-    """What a rate needs."""
-
-    every: int
-    hz: float
-    #: Of a call of all stages by kind
-    operations: dict[str, int]
-    operations_per_second: float
-    instructions_per_second: float | None
-
-
-@dataclass(frozen=True)
-class BudgetData:
-    """What a system needs."""
-
-    rates: list[RateRow]
-    operations_per_second: float
-    cpu: str | None
-    instructions_per_second: float | None
-    #: Memory between calls, which is the sum of values, error feedback, counters and padding
-    memory_bytes: int
-    cell_bytes: int
-    feedback_bytes: int
-    counter_bytes: int
-    padding_bytes: int
-    constant_bytes: int
-
-    @staticmethod
-    def of(needs: Budget) -> BudgetData:
-        """Return a budget."""
-        rates = [
-            RateRow(
-                rate.every,
-                float(rate.hz),
-                rate.operations,
-                float(rate.per_second),
-                _float(rate.executed_per_second),
-            )
-            for rate in needs.rates
-            if rate.stages
-        ]
-        sizes = ("memory", "cell", "feedback", "counter", "padding", "constant")
-        return BudgetData(
-            rates=rates,
-            operations_per_second=float(needs.per_second),
-            cpu=needs.cpu or None,
-            instructions_per_second=_float(needs.executed_per_second),
-            **{f"{size}_bytes": getattr(needs, f"{size}_bytes") for size in sizes},
-        )
-
-
-@dataclass(frozen=True)
 class SystemResult(Result):
     """A described system: its stages, its values with units, frames, formats and bounds, and its budget."""
 
-    needs: Budget = field(metadata=INTERNAL)
     bounds: SystemBounds = field(metadata=INTERNAL)
     name: str
     title: str
@@ -141,7 +88,7 @@ class SystemResult(Result):
     inputs: list[InputRow]
     values: list[ValueRow]
     outputs: tuple[str, ...]
-    budget: BudgetData
+    budget: Budget
     files: Sequence[Path]
 
     @staticmethod
@@ -149,7 +96,6 @@ class SystemResult(Result):
         """Return a system with what it needs, and the files that were written."""
         system = fit.description.system
         return SystemResult(
-            needs=needs,
             bounds=bounds,
             name=system.name,
             title=system.title,
@@ -159,7 +105,7 @@ class SystemResult(Result):
             inputs=[InputRow(signal.name, 1, *_about(fit, signal.name, signal)) for signal in system.inputs],
             values=list(_values(fit, bounds)),
             outputs=tuple(system.outputs),
-            budget=BudgetData.of(needs),
+            budget=needs,
             files=files,
         )
 
@@ -182,7 +128,7 @@ class SystemResult(Result):
                 f"outputs: {', '.join(self.outputs)}",
                 *(f"no bound for {name}: {reason}" for name, reason in self.bounds.reasons.items()),
                 "",
-                *lines(self.needs),
+                *lines(self.budget),
             ]
         )
 
@@ -274,7 +220,3 @@ def _about(
 def _format(argument: Argument) -> str:
     """Return the format of a value, or the bits of the counts that it is."""
     return str(argument.format) if argument.sensor is None else f"{argument.format.word}-bit counts"
-
-
-def _float(number: Any) -> float | None:
-    return None if number is None else float(number)

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from strapgen import catalogue
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.signals import Signal
+from strapgen.ir.signals import CYCLE, Signal
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.recordings.recording import History, Recording
-from strapgen.lab.runs import Run
+from strapgen.lab.runs import Array, Run
+from strapgen.lab.runs_report import TIME_COLUMN, RunSettings, places, settings_text, table_of, thinned
 from strapgen.lab.sensor_errors.measured_motions import both_increments
 from strapgen.navigation.systems.system import Cell, DescribedSystem
-from strapgen.navigation.systems.system_backends import SystemMemory, SystemRunner
-from strapgen.navigation.systems.system_inputs import cycles_of, samples
+from strapgen.navigation.systems.system_runner import SystemMemory, SystemRunner
+from strapgen.navigation.systems.wiring import Description
+from strapgen.results.records import entry
+from strapgen.results.result import Result
+from strapgen.results.table import Column, TextTable
 from strapgen.run.backends import evaluator
+from strapgen.run.increments import pulses
 
-Array = NDArray[np.float64]
 #: From this departure of the rows' scalar products from those of orthogonal ones on, a matrix is no rotation.
 _NO_ROTATION = 0.5
 #: Largest denominator of the rate of a recording in Hz.
@@ -182,3 +187,143 @@ def system_course(
     velocity = np.asarray(getattr(recording, "velocity_increments", np.zeros_like(angle))[:count])
     run = runner.run(samples(runner.fit.description, angle, velocity), memory)
     return SystemCourse(runner.system, recording.start, recording.interval, dict(run.values), unused)
+
+
+#: What an input can measure, by its unit: which increments, and whether they are divided by the cycle.
+_UNITS = {"rad": (0, False), "rad/s": (0, True), "m/s": (1, False), "m/s^2": (1, True)}
+
+
+def samples(description: Description, angle: Array, velocity: Array) -> dict[str, Array]:
+    """Return samples of a system's inputs from exact increments in body axes.
+
+    An input takes increments, or mean rates and accelerations over a cycle, by its unit. One of counts takes whole
+    counts of the scale that the stage has to which it is wired, angle-counts or velocity-counts; what is left over goes
+    into the next count. Where a stage compensates the errors of a measurement unit, the sensors have these errors: the
+    kernel that is its inverse makes them. The navigation frame rests: an input of its rotation is zero.
+
+    `angle, velocity` (cycles, 3): increments in rad and m/s, body axes. Returns (cycles, 3).
+    """
+    system = description.system
+    sensed = _sensed(description, angle, velocity)
+    result = {}
+    for signal in system.inputs:
+        if signal.shape == (3,) and signal.frame == "n" and signal.unit in ("rad", "rad/s"):
+            result[signal.name] = np.zeros_like(angle)
+            continue
+        unit, scale = _measured(description, signal)
+        if signal.frame != "b" or signal.shape != (3,) or unit not in _UNITS:
+            raise InputError(
+                f"input {signal.name} (unit {signal.unit}, frame {signal.frame or 'none'}) is no gyro or "
+                "accelerometer in body axes; rad, rad/s, m/s, m/s^2 or counts with a constant scale are needed"
+            )
+        which, divided = _UNITS[unit]
+        exact = sensed[which] * (float(system.sample_hz) if divided else 1.0)
+        result[signal.name] = exact if scale is None else np.rint(pulses(exact[:, None], scale)[:, 0] / scale)
+    return result
+
+
+def _sensed(description: Description, angle: Array, velocity: Array) -> tuple[Array, Array]:
+    """Return increments with the errors that the system compensates."""
+    for stage in description.system.stages:
+        if stage.kernel.startswith("imu-compensate"):
+            constants = dict(description.choices[stage.name].constants)
+            errors = evaluator(catalogue.choose("imu-errors", constants=constants))
+            measured: tuple[Array, Array] = errors(angle, velocity)
+            return measured
+    return angle, velocity
+
+
+def _measured(description: Description, signal: Signal) -> tuple[str, float | None]:
+    """Return the unit of what an input measures, and how much of it a count is."""
+    if signal.unit != "1" or signal.over != CYCLE:
+        return signal.unit, None
+    for stage in description.system.stages:
+        takes = any(wire.external and wire.source == signal.name for wire in stage.wires)
+        scale = dict(description.choices[stage.name].constants).get("scale")
+        if takes and scale is not None and len(scale) == 1:
+            return description.programs[stage.name].outputs[0].signal.unit, float(scale[0])
+    return signal.unit, None
+
+
+def cycles_of(system: DescribedSystem, seconds: Fraction) -> int:
+    """Return the cycles of the samples in a time."""
+    cycles = seconds * system.sample_hz
+    if cycles > checks.MOST:
+        raise InputError(
+            f"a duration of {float(seconds):.3g} s has too many cycles of {float(1 / system.sample_hz):g} s; "
+            f"up to {checks.MOST:,} are run"
+        )
+    if cycles.denominator != 1 or cycles % system.cycle or not cycles:
+        raise InputError(
+            f"{float(seconds):g} s are no whole number of cycles of the slowest rate, "
+            f"{float(system.cycle / system.sample_hz):g} s"
+        )
+    return int(cycles)
+
+
+@dataclass(frozen=True)
+class SystemRecords:
+    """The outputs of a system along a recording."""
+
+    #: Samples at the end that fill no cycle of all rates
+    unused_samples: int
+    time_s: Array
+    #: Unit of each output
+    units: dict[str, str]
+    #: The outputs at each time
+    outputs: dict[str, Array]
+
+    @staticmethod
+    def of(course: SystemCourse) -> SystemRecords:
+        """Return the records of a course."""
+        time, outputs = course.rows()
+        return SystemRecords(
+            course.unused, time, {name: signal.unit for name, signal in _signals(course).items()}, outputs
+        )
+
+
+def _signals(course: SystemCourse) -> dict[str, Signal]:
+    return {name: course.system.cell(name).signal for name in course.rows()[1]}
+
+
+@dataclass(frozen=True)
+class SystemCourseResult(Result):
+    """The outputs of a described system along an inertial recording."""
+
+    indented = False
+
+    settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))
+    course: SystemCourse = field(metadata=entry(spread=True, write=SystemRecords.of, kind=SystemRecords))
+
+    def rows(self) -> Any:
+        """Return the records of the course, as their times."""
+        return self.course.rows()[0]
+
+    def table(self) -> TextTable:
+        """Return the elements of all outputs at each time."""
+        time, outputs = self.course.rows()
+        names = [
+            f"{name}_{element}" if signal.unit == "1" else f"{name}_{element}, {signal.unit}"
+            for name, signal in _signals(self.course).items()
+            for element in places(signal)
+        ]
+        values = np.column_stack([time, *(part.reshape(len(time), -1) for part in outputs.values())])
+        return table_of(["time_s", *names], values.tolist())
+
+    def text(self) -> str:
+        """Return each output at most of the times that a reader looks at."""
+        (time, outputs), signals = self.course.rows(), _signals(self.course)
+        shown = thinned(len(time))
+        lines = [settings_text({**self.settings})]
+        for name, part in outputs.items():
+            signal, flat = signals[name], part.reshape(len(time), -1)
+            columns = [TIME_COLUMN, *(Column(p, spec=".9g", least=15, gap=1) for p in places(signal))]
+            lines += ["", f"{name}, unit {signal.unit}{f', frame {signal.frame}' if signal.frame else ''}"]
+            lines += TextTable(columns, np.column_stack([time, flat])[shown].tolist()).lines()
+        if len(shown) < len(time):
+            lines.append(f"({len(shown)} of {len(time)} rows; --format csv prints all)")
+        if self.course.unused:
+            lines.append(
+                f"{self.course.unused} samples at the end fill no cycle of all rates and were not used"
+            )
+        return "\n".join(lines)

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir.fixed_settings import Settings
-from strapgen.navigation.systems import system_inputs
-from strapgen.navigation.systems.budget import Budget, budget
-from strapgen.navigation.systems.compiled_system import CompiledSystem
+from strapgen.navigation.systems import system_runs
+from strapgen.navigation.systems.budget import Budget, budget, measured_budget
 from strapgen.navigation.systems.system import Cell
-from strapgen.navigation.systems.system_backends import SystemMemory, SystemRunner, system_runner
-from strapgen.navigation.systems.system_cost import measured_budget
+from strapgen.navigation.systems.system_runner import (
+    CompiledSystem,
+    SystemRunner,
+    system_runner,
+)
 from strapgen.navigation.systems.system_runs import matrices
 from strapgen.navigation.systems.turning_vehicle import TurningVehicle
 from strapgen.navigation.systems.wiring import Description
+from strapgen.results.records import INTERNAL, entry, reader_table
+from strapgen.results.result import Result
+from strapgen.results.table import Column, TextTable
 from strapgen.run import backends
+from strapgen.targets.printer import fill
 
 Array = NDArray[np.float64]
 #: The back end that the others are compared with.
@@ -76,7 +84,10 @@ def study(
         runner = system_runner(description, name, settings if fixed else None)
         if isinstance(runner, CompiledSystem):
             needs[name] = measured_budget(runner.fit, cpu) if cpu and fixed else budget(runner.fit)
-        return runner, runner.run(inputs, started(runner, outputs, vehicle)).values
+        memory = None
+        if outputs.attitude is not None:
+            memory, _ = system_runs.begun(runner, vehicle.attitude(np.zeros(1))[0])
+        return runner, runner.run(inputs, memory).values
 
     runner, values = run(REFERENCE)
     errors = tuple(
@@ -99,9 +110,9 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
     these errors: the kernel that is its inverse makes them.
     """
     system = description.system
-    cycles = system_inputs.cycles_of(system, seconds)
+    cycles = system_runs.cycles_of(system, seconds)
     angle, velocity = vehicle.increments(float(1 / system.sample_hz), cycles)
-    return system_inputs.samples(description, angle, velocity)
+    return system_runs.samples(description, angle, velocity)
 
 
 @dataclass(frozen=True)
@@ -143,19 +154,141 @@ class Outputs:
         return NavigationErrors(name, turned(self.attitude), velocity, turned(self.position) * _RADIUS)
 
 
-def started(runner: SystemRunner, outputs: Outputs, vehicle: TurningVehicle) -> SystemMemory:
-    """Return the memory of a system that begins with the attitude of a vehicle."""
-    memory = runner.begin()
-    if outputs.attitude is not None:
-        attitude = vehicle.attitude(np.zeros(1))[0]
-        if outputs.attitude.signal.size == 4:
-            attitude = backends.evaluator("euler-from-dcm")(attitude)
-        runner.set(memory, outputs.attitude.name, attitude)
-    return memory
-
-
 def angles(one: Array, other: Array) -> Array:
     """Return the angle between attitudes in rad, from the antisymmetric part of their quotient."""
     turned = one @ other.swapaxes(-1, -2)
     skew = (turned - turned.swapaxes(-1, -2)) / 2
     return np.asarray(np.sqrt(skew[..., 2, 1] ** 2 + skew[..., 0, 2] ** 2 + skew[..., 1, 0] ** 2))
+
+
+_ARCSEC = math.degrees(1) * 3600
+_SPEC = ".3g"
+#: What the papers print, AGARD LS-133.
+_PRINTED = (
+    "printed in 1984: LTR-81 had a Z-8002 with 40,960 bytes of program and 6,144 of scratch for its whole task, and "
+    "the M6800 of the gyro module of LCIGS, with 1,433 bytes of program and 143 of memory, was busy 85 % of the time"
+)
+
+
+@dataclass(frozen=True)
+class DifferenceRow:
+    """How far a back end has gone from double: at most, and at the end; None where there is no such output."""
+
+    backend: str = field(metadata=entry("back end", align="<"))
+    attitude_arcsec: float | None = field(metadata=entry("largest", _SPEC, group="attitude, arcsec"))
+    attitude_end_arcsec: float | None = field(metadata=entry("at the end", _SPEC, group="attitude, arcsec"))
+    velocity_m_s: float | None = field(metadata=entry("largest", _SPEC, group="velocity, m/s"))
+    velocity_end_m_s: float | None = field(
+        metadata=entry("at the end", _SPEC, group="velocity, m/s", unit="m/s")
+    )
+    position_m: float | None = field(metadata=entry("largest", _SPEC, group="position, m"))
+    position_end_m: float | None = field(metadata=entry("at the end", _SPEC, group="position, m"))
+
+    @staticmethod
+    def of(errors: NavigationErrors) -> DifferenceRow:
+        """Return the largest difference of each kind, and that at the end."""
+        row: list[float | None] = []
+        for values, scale in ((errors.attitude, _ARCSEC), (errors.velocity, 1.0), (errors.position, 1.0)):
+            both = (values.max(), values[-1]) if values.size else (None, None)
+            row += [None if value is None else float(value) * scale for value in both]
+        return DifferenceRow(errors.backend, *row)
+
+
+@dataclass(frozen=True)
+class NeedsRow:
+    """Memory, code and load of a back end in C; None where no processor was named."""
+
+    backend: str
+    memory_bytes: int
+    constant_bytes: int
+    operations_per_s: float
+    cpu: str | None
+    code_bytes: int | None
+    instructions_per_s: float | None
+
+    @staticmethod
+    def of(backend: str, needs: Budget) -> NeedsRow:
+        """Return what a back end needs."""
+        executed = needs.executed_per_second
+        return NeedsRow(
+            backend,
+            needs.memory_bytes,
+            needs.constant_bytes,
+            float(needs.per_second),
+            needs.cpu,
+            needs.code_bytes,
+            None if executed is None else float(executed),
+        )
+
+
+class FromTruth(NamedTuple):
+    """Angle between the attitude and the true one in arcsec, at most and at the end."""
+
+    largest: float
+    end: float
+
+
+@dataclass(frozen=True)
+class SystemStudyResult(Result):
+    """What a described system navigates on several back ends."""
+
+    rows_in = "from_double"
+
+    study: SystemStudy = field(metadata=INTERNAL)
+    system: str
+    sample_hz: float
+    seconds: float
+    #: Attitude of C in double from the true one; None without an attitude
+    double_from_truth_arcsec: FromTruth | None
+    needs: list[NeedsRow]
+    from_double: list[DifferenceRow]
+
+    @staticmethod
+    def of(study: SystemStudy) -> SystemStudyResult:
+        """Return the result of a study."""
+        truth, system = study.against_truth * _ARCSEC, study.description.system
+        return SystemStudyResult(
+            study=study,
+            system=system.name,
+            sample_hz=float(system.sample_hz),
+            seconds=study.seconds,
+            double_from_truth_arcsec=FromTruth(float(truth.max()), float(truth[-1])) if truth.size else None,
+            needs=[NeedsRow.of(name, budget) for name, budget in study.needs.items()],
+            from_double=list(map(DifferenceRow.of, study.errors)),
+        )
+
+    def text(self) -> str:
+        """Return differences, memory and load."""
+        return "\n".join(_lines(self))
+
+
+def _lines(result: SystemStudyResult) -> Iterator[str]:
+    study = result.study
+    system = study.description.system
+    yield f"{system.title}: {study.seconds:g} s at {float(system.sample_hz):g} Hz"
+    if study.against_truth.size:
+        truth = study.against_truth * _ARCSEC
+        yield (
+            f"attitude in double: {truth.max():{_SPEC}} arcsec from the truth at most, {truth[-1]:{_SPEC}} at the end"
+        )
+    if study.errors:
+        yield from [
+            "",
+            "differences from double, in one closed run",
+            "",
+            *reader_table(result.from_double, DifferenceRow).lines(),
+        ]
+    yield from ["", *_load(result.needs).lines(), "", *fill(_PRINTED, "", 100).splitlines()]
+
+
+def _load(needs: Sequence[NeedsRow]) -> TextTable:
+    """Return memory, code and load of each back end in C."""
+    cpu = next((row.cpu for row in needs if row.cpu), "")
+    columns = [Column("back end", "<"), Column("state, bytes"), Column("constants, bytes")]
+    columns += [Column("operations/s", spec=",.0f")]
+    columns += [Column(f"code on {cpu}, bytes"), Column("instructions/s", spec=",.0f")] if cpu else []
+    rows = []
+    for row in needs:
+        measured = [row.code_bytes, row.instructions_per_s] if cpu else []
+        rows.append([row.backend, row.memory_bytes, row.constant_bytes, row.operations_per_s, *measured])
+    return TextTable(columns, rows)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.analysis.vibration.spectrum import Spectrum
-from strapgen.navigation.frame.earth import Earth
+from strapgen.navigation.frame.frame_rates import Earth
 
 Array = NDArray[np.float64]
 

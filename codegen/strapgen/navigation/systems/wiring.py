@@ -14,11 +14,21 @@ from strapgen.ir.fixed_settings import TURNING
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, Signal
-from strapgen.navigation.systems import built_in, system_file, wire_checks
-from strapgen.navigation.systems.ports import Ports, ports
+from strapgen.navigation.systems import built_in, system_file
+from strapgen.navigation.systems.ports import (
+    Ports,
+    Source,
+    check_direction,
+    check_initial,
+    check_order,
+    check_range,
+    check_rates,
+    check_shape,
+    check_undelayed,
+    ports,
+)
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, Rate, SystemStage, Wire
 from strapgen.navigation.systems.system_file import SystemText
-from strapgen.navigation.systems.wire_checks import Source
 
 
 @dataclass(frozen=True)
@@ -108,7 +118,7 @@ class _Wiring:
 
     def run(self) -> None:
         """Wire all stages."""
-        wire_checks.check_order(self.stages)
+        check_order(self.stages)
         self.by_name = {stage.name: stage for stage in self.stages}
         self.described = {entry.name: entry for entry in self.text.inputs}
         self.shared: dict[tuple[str, str], str] = {}
@@ -174,7 +184,7 @@ class _Wiring:
         """Note the states that are those of another stage, and the outputs that replace them."""
         for state in stage.states:
             if state in stage.text.wires:
-                wire_checks.check_undelayed(stage, state, "the same memory as a state of another stage")
+                check_undelayed(stage, state, "the same memory as a state of another stage")
                 self.shared[stage.name, state] = self._shared_state(stage, "wires", state)
         for output, reference in stage.text.writes.items():
             if stage.state_of(output) is not None:
@@ -183,9 +193,7 @@ class _Wiring:
                 )
             self.shared[stage.name, output] = self._shared_state(stage, "writes", output)
             target = self._source(f"stage {stage.name}: writes: {output}", reference)
-            wire_checks.check_shape(
-                f"stage {stage.name}: writes: {output}", stage.outputs[output], target.signal
-            )
+            check_shape(f"stage {stage.name}: writes: {output}", stage.outputs[output], target.signal)
 
     def _shared_state(self, stage: Ports, table: str, name: str) -> str:
         """Return the cell of a state that belongs to another stage."""
@@ -199,7 +207,7 @@ class _Wiring:
                 f"{where} = {reference!r} is no state of another stage, as a state can be wired to"
             )
         if table == "wires":
-            wire_checks.check_shape(where, stage.inputs[name], source.signal)
+            check_shape(where, stage.inputs[name], source.signal)
         earlier = self.shared.get((other.name, state))
         return earlier or f"{other.name}_{state}"
 
@@ -267,7 +275,7 @@ class _Wiring:
         output = stage.states.get(name, name)
         initial = stage.text.initial.get(name, stage.text.initial.get(output))
         if initial is not None:
-            wire_checks.check_initial(stage, name, signal, initial)
+            check_initial(stage, name, signal, initial)
         if cell in self.cells or cell in self.described:
             raise InputError(f"stage {stage.name}: {name} would be called {cell} in code, which is taken")
         self.cells[cell] = Cell(
@@ -286,16 +294,16 @@ class _Wiring:
         source = self._source(where, reference)
         many = self._samples(stage, signal, source)
         if source.stage is None:
-            wire_checks.check_undelayed(stage, name, "an input of the system")
+            check_undelayed(stage, name, "an input of the system")
             self._add_input(where, reference, signal, many)
         else:
             if not many:
-                wire_checks.check_shape(where, signal, source.signal)
-            wire_checks.check_direction(stage, name, source)
-        wire_checks.check_rates(where, stage, signal, source, many)
+                check_shape(where, signal, source.signal)
+            check_direction(stage, name, source)
+        check_rates(where, stage, signal, source, many)
         if source.sum:
             self._clear(where, stage, source)
-        wire_checks.check_range(stage, name, signal, source)
+        check_range(stage, name, signal, source)
         cell = reference if source.stage is None else self._cell(source.stage, reference.partition(".")[2])
         self.read.add(cell)
         if many:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from strapgen import registration
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.generate_command import SourceOptions
+from strapgen.cli.generated_result import GeneratedSources
 from strapgen.cli.option_groups import Shown, grouped
 from strapgen.cli.options import CTarget, Sculling, TwoSpeedAlgorithm
 from strapgen.cli.output import Format, check_format, show
 from strapgen.ir.exceptions import InputError
+from strapgen.results.records import INTERNAL
+from strapgen.results.result import Result
 
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
-    from strapgen.navigation.two_speed.two_speed_result import TwoSpeedResult
 
 
 @grouped
@@ -79,7 +82,6 @@ def _result(sources: Sources, loops: Sequence[Sources], written: Sequence[Path],
     """Return what was generated, with what `generate` says of each loop."""
     from strapgen.catalogue import Choice
     from strapgen.cli.generated_result import GeneratedSources
-    from strapgen.navigation.two_speed.two_speed_result import TwoSpeedResult
 
     places = {path.name: str(path) for path in written}
     functions = [
@@ -117,3 +119,23 @@ def _settings(target: str, fixed: FixedOptions) -> Settings | None:
     if settings is not None:
         raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
     return None
+
+
+@dataclass(frozen=True)
+class TwoSpeedResult(Result):
+    """What was generated of an algorithm in two speeds."""
+
+    kernel: str
+    target: str
+    #: Kernels of the loops
+    loops: Sequence[str]
+    files: Sequence[str]
+    #: Operations of a call by kind
+    operations: Mapping[str, int]
+    #: The loops, as generate has them
+    functions: Sequence[GeneratedSources]
+    said: str = field(metadata=INTERNAL)
+
+    def text(self) -> str:
+        """Return operations, files and contracts."""
+        return self.said

@@ -4,38 +4,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from strapgen.catalogue.kernels.acceleration import (
-    NAVIGATION_VELOCITY,
-    VELOCITY_EQUATIONS,
-    compensated,
-    frame_correction,
-    rotated,
-)
-from strapgen.catalogue.kernels.coning_sculling import (
+from strapgen.catalogue.kernels.two_speed_kernels import (
     ANGLE_SUM,
     CONING,
     INCREMENT,
-    PREVIOUS,
-    SCULLING,
-    VELOCITY_INCREMENT,
-    VELOCITY_SUM,
-    FastLoop,
-    coned,
-    rotation_vector_of,
-    sculled,
-)
-from strapgen.catalogue.kernels.updates import (
     NAVIGATION_ROTATION,
+    NAVIGATION_VELOCITY,
+    PREVIOUS,
     PREVIOUS_TURN,
     ROTATION_VECTOR,
+    SCULLING,
     TURN,
+    VELOCITY_EQUATIONS,
+    VELOCITY_INCREMENT,
+    VELOCITY_SUM,
+    compensated,
+    coned,
+    frame_correction,
+    rotated,
     rotation_sum,
+    rotation_vector_of,
+    sculled,
     transition,
     turned_frame,
 )
 from strapgen.catalogue.kinematics import KINEMATICS, SAVAGE
-from strapgen.ir.kernel_info import Recursion
-from strapgen.ir.signals import Signal, after
 from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 #: Equations of Savage that turn a state by a rotation vector, and with the navigation frame.
@@ -45,19 +38,19 @@ _TURNED_FRAME = {"dcm": "(5), (6)", "euler": "(15)"}
 
 def fast(form: int) -> Kernel:
     """Return the fast loop: coning and sculling from angle and velocity increments, equations (26) and (55) or (56)."""
-    loop = FastLoop()
+    build = KernelBuilder()
     beta, coning, past, u, eta, d, dv = map(
-        loop.build.input,
-        (ANGLE_SUM, CONING, PREVIOUS, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT),
+        build.input, (ANGLE_SUM, CONING, PREVIOUS, VELOCITY_SUM, SCULLING, INCREMENT, VELOCITY_INCREMENT)
     )
-    loop.hand_on(ANGLE_SUM, beta + d)
-    loop.hand_on(CONING, coned(loop.build, coning, beta, past, d))
-    loop.hand_on(PREVIOUS, d)
-    loop.hand_on(VELOCITY_SUM, u + dv)
-    loop.hand_on(SCULLING, sculled(loop.build, form, eta, beta, u, d, dv))
-    equation = "(55)" if form == 1 else "(56)"
-    return loop.kernel(
-        f"two-speed-fast-{form}", f"Two speeds: fast loop with S{form}", f"equations (26) and {equation}"
+    build.feedback(ANGLE_SUM, beta + d, reset=True)
+    build.feedback(CONING, coned(build, coning, beta, past, d), reset=True)
+    build.feedback(PREVIOUS, d)
+    build.feedback(VELOCITY_SUM, u + dv, reset=True)
+    build.feedback(SCULLING, sculled(build, form, eta, beta, u, d, dv), reset=True)
+    return build.kernel(
+        f"two-speed-fast-{form}",
+        f"Two speeds: fast loop with S{form}",
+        f"{SAVAGE}, equations (26) and {'(55)' if form == 1 else '(56)'}",
     )
 
 
@@ -70,27 +63,16 @@ def slow(name: str, form: int) -> Kernel:
     )
     beta, coning, u, eta, turn = map(build.input, (ANGLE_SUM, CONING, VELOCITY_SUM, SCULLING, TURN))
     phi = build.stage(ROTATION_VECTOR, rotation_vector_of(beta, coning))
-    step_transition = transition(build, kinematics, phi)
-    states = (
-        (kinematics.state, kinematics.next, kinematics.product(state, step_transition)),
-        (
-            NAVIGATION_VELOCITY,
-            after(NAVIGATION_VELOCITY),
-            v + rotated(build, name, state, compensated(build, form, u, eta, beta)),
-        ),
-        (NAVIGATION_ROTATION, after(NAVIGATION_ROTATION), rotation_sum(theta, before, turn)),
-        (PREVIOUS_TURN, after(PREVIOUS_TURN), turn),
-    )
-    for _, signal, value in states:
-        build.output(signal, value)
+    turned = kinematics.product(state, transition(build, kinematics, phi))
+    velocity = v + rotated(build, name, state, compensated(build, form, u, eta, beta))
+    build.feedback(kinematics.state, turned, kinematics.next)
+    build.feedback(NAVIGATION_VELOCITY, velocity, reset=True)
+    build.feedback(NAVIGATION_ROTATION, rotation_sum(theta, before, turn), reset=True)
+    build.feedback(PREVIOUS_TURN, turn)
     return build.kernel(
         f"{name}-two-speed-slow-{form}",
         f"Two speeds: slow loop of the {_title(name)}",
         f"{SAVAGE}, equations {_UPDATE[name]}, (22), (27) and {VELOCITY_EQUATIONS[name, form]}",
-        recursion=Recursion(
-            tuple((held.name, signal.name) for held, signal, _ in states),
-            retained=(kinematics.state.name, PREVIOUS_TURN.name),
-        ),
     )
 
 
@@ -99,8 +81,8 @@ def navigation(name: str) -> Kernel:
     kinematics = KINEMATICS[name]
     build = KernelBuilder()
     state, theta, v = map(build.input, (kinematics.state, NAVIGATION_ROTATION, NAVIGATION_VELOCITY))
-    build.output(kinematics.next, turned_frame(build, kinematics, state, theta))
-    gained: Signal = replace(
+    build.feedback(kinematics.state, turned_frame(build, kinematics, state, theta), kinematics.next)
+    gained = replace(
         NAVIGATION_VELOCITY,
         name="velocity_change",
         elements=tuple(f"change_{axis}" for axis in "xyz"),
@@ -112,9 +94,6 @@ def navigation(name: str) -> Kernel:
         f"{name}-two-speed-navigation",
         f"Two speeds: navigation loop of the {_title(name)}",
         f"{SAVAGE}, equations {_TURNED_FRAME[name]} and (59)",
-        recursion=Recursion(
-            ((kinematics.state.name, kinematics.next.name),), retained=(kinematics.state.name,)
-        ),
     )
 
 

@@ -43,9 +43,9 @@ from strapgen.lab.motions.motions import Motion
 from strapgen.lab.quantization_noise import polynomial_noise
 from strapgen.lab.runs import Run, drift_between
 from strapgen.navigation.systems import system_file, system_generation
+from strapgen.navigation.systems.budget import measured_budget
 from strapgen.navigation.systems.fitting import Fitted, fitted
-from strapgen.navigation.systems.system_backends import system_runner
-from strapgen.navigation.systems.system_cost import measured_budget
+from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.system_runs import simulate_system
 from strapgen.navigation.systems.wiring import Description, wired
 from strapgen.run import exact
@@ -286,10 +286,10 @@ class TwoSpeedLoops:
     def cost(self, carry: str) -> ProcessorCost:
         """Return bytes and instructions of the loops in fixed point."""
         budget = measured_budget(self.fixed, self.brief.processor.cpu)
-        code = sum(stage.code_bytes or 0 for rate in budget.rates for stage in rate.stages)
         executed = budget.executed_per_second
         return ProcessorCost(
-            float(code + budget.constant_bytes), None if executed is None else float(executed)
+            float((budget.code_bytes or 0) + budget.constant_bytes),
+            None if executed is None else float(executed),
         )
 
     def steady(self) -> TwoSpeedLoops:

@@ -18,9 +18,9 @@ import sympy as sp
 
 from strapgen.catalogue.methods import order_conditions
 from strapgen.catalogue.methods.coning_coefficients import Design
-from strapgen.catalogue.methods.samples import sample_names
+from strapgen.catalogue.methods.method import sample_names
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
-from strapgen.catalogue.methods.tableau import Tableau
+from strapgen.catalogue.methods.tableaux import Tableau
 from strapgen.catalogue.methods.window import Window
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program

@@ -1,4 +1,4 @@
-"""Stages of a kernel as vectors, quaternions and matrices, where they are sums and products of such."""
+"""Steps and stages of kernels in LaTeX, as sums and products of vectors, quaternions and matrices where they are."""
 
 from __future__ import annotations
 

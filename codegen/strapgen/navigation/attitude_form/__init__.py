@@ -1,1 +1,0 @@
-"""Forms of the attitude, compared by cost."""

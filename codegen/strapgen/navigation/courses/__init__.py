@@ -1,1 +1,0 @@
-"""Courses over the Earth."""

@@ -1,1 +1,0 @@
-"""Output functions and their filters."""

@@ -1,1 +1,0 @@
-"""Rate-table tests: largest rates that an algorithm follows."""

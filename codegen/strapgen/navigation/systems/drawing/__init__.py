@@ -1,1 +1,0 @@
-"""Block diagrams of described systems."""

@@ -1,0 +1,239 @@
+"""Described systems in the commands ``simulate``, ``compare`` and ``strapdown``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from strapgen.cli.option_groups import stated
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.run_options import DescribedAlgorithms, read_errors, with_errors
+from strapgen.navigation.systems.built_in import is_system
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from strapgen.cli.fixed_options import FixedOptions
+    from strapgen.cli.options import MethodOptions, SeveralMethods
+    from strapgen.cli.output import Output
+    from strapgen.lab.recordings.recording import Recording
+    from strapgen.lab.run_options import RunOptions, RunOutput, SampleSource
+    from strapgen.navigation.strapdown_command import CourseOutput, Start
+    from strapgen.navigation.systems.system_runner import SystemRunner
+    from strapgen.navigation.systems.wiring import Description
+
+
+#: The options of fixed point that go with a system, whose inputs have their ranges in its file.
+FIXED = ("--word", "--rounding", "--carry", "--drift-allowance")
+
+
+def simulated_system(
+    name: str,
+    method: MethodOptions,
+    backend: str,
+    source: SampleSource,
+    intervals: RunOptions,
+    fixed: FixedOptions,
+    output: RunOutput,
+) -> None:
+    """Simulate a described system, and deliver the run."""
+    others = {"--orthonormalize": intervals.orthonormalize, "--scheme": intervals.scheme}
+    refuse_options(method, fixed, [option for option, value in others.items() if value is not None])
+    fixed.check_backend(backend)
+    output.check(name, *source.files)
+    if source.motion is None:
+        if intervals.initial is not None or intervals.record is not None:
+            raise InputError("--initial-deg and --record of a described system go with --motion")
+        return _on_recording(name, backend, source, fixed, output)
+    if output.print_every is not None:
+        raise InputError("--print does not go with a described system; --record and --format csv do")
+    from strapgen.cli.progress import waiting
+    from strapgen.lab.runs_report import RunResult
+    from strapgen.navigation.systems.system_runs import simulate_system
+
+    description = described_at(name, source)
+    runner = runner_of(description, backend, fixed)
+    profile, record = source.profile(), intervals.record
+    assert source.duration is not None, "a motion has a duration"
+    with waiting(f"running {name}"):
+        run = simulate_system(runner, profile, source.duration, record, intervals.start(), source.force)
+    facts = facts_of(runner, name) | {
+        "motion": profile.name,
+        "duration_s": float(source.duration),
+        "specific_force_m_s2": list(source.force),
+    }
+    facts |= source.facts
+    title = f"{name}, {backend}: {source.described(profile.name, ' motion')}"
+    matrices, words = run if output.matrices else None, source.described(profile.name)
+    output.show(RunResult(facts, run, output.title, matrices, words, plot_title=title))
+
+
+def _on_recording(
+    name: str, backend: str, source: SampleSource, fixed: FixedOptions, output: RunOutput
+) -> None:
+    """Run along recorded gyro data, and deliver the attitude."""
+    from strapgen.lab.runs_report import HistoryResult
+    from strapgen.navigation.systems.system_runs import attitude_output, system_history
+
+    data = recorded(source)
+    runner = runner_of(described_along(name, data), backend, fixed)
+    elements = attitude_output(runner.system).signal.elements
+    history = system_history(runner, data)
+    facts = facts_of(runner, name) | {"source": str(source.file)} | source.facts
+    title = f"{name}, {backend}: attitude along {source.file.name}"
+    replace(output, format=output.format or "csv").show(
+        HistoryResult(facts, replace(history, elements=elements), plot_title=title)
+    )
+
+
+def recorded(source: SampleSource) -> Recording:
+    """Read the recorded data of a run, in whole pulses of the gyro if they are stated."""
+    data = source.recording()
+    if source.pulse is None:
+        return data
+    from strapgen.run.increments import pulses
+
+    return replace(data, increments=pulses(data.increments[:, None], source.pulse)[:, 0])
+
+
+def refuse_options(method: MethodOptions | None, fixed: FixedOptions, others: list[str]) -> None:
+    """Refuse options of an algorithm that a described system states itself."""
+    of_method = [] if method is None else stated(method)
+    for option in [*of_method, *others, *(option for option in stated(fixed) if option not in FIXED)]:
+        raise InputError(f"{option} does not go with a described system, whose file states what it does")
+
+
+def described_at(name: str, source: SampleSource) -> Description:
+    """Return a system at the rate of its file, or with the stated step from sample to sample."""
+    from strapgen.navigation.systems.wiring import described
+
+    return described(name, None if source.step is None else 1 / source.step)
+
+
+def described_along(name: str, data: Recording) -> Description:
+    """Return a system at the rate of a recording."""
+    from strapgen.navigation.systems.system_runs import rate_of
+    from strapgen.navigation.systems.wiring import described
+
+    return described(name, rate_of(data))
+
+
+def runner_of(description: Description, backend: str, fixed: FixedOptions) -> SystemRunner:
+    """Return a system on a back end."""
+    from strapgen.navigation.systems.system_runner import system_runner
+
+    return system_runner(description, backend, fixed.settings(1))
+
+
+def facts_of(runner: SystemRunner, name: str) -> dict[str, Any]:
+    """Return what a report says first."""
+    rate = runner.system.sample_hz
+    return {"system": name, "backend": runner.backend, "sample_hz": float(rate)}
+
+
+def compared_system(
+    name: str,
+    methods: SeveralMethods,
+    stated: list[str],
+    backends: tuple[Sequence[str], str],
+    files: tuple[Sequence[Path] | None, bool],
+    source: SampleSource,
+    fixed: FixedOptions,
+    output: Output,
+) -> None:
+    """Compare a described system on back ends, and exit with 1 if a pass is outside its bound."""
+    refuse_options(methods, fixed, stated)
+    output.check(name, *source.files)
+    from strapgen import registration
+    from strapgen.cli.progress import waiting
+    from strapgen.lab.compare_command import counted
+    from strapgen.navigation.systems.system_comparison import SystemComparisonResult, compare_system
+
+    names, reference = backends
+    description, inputs, title = _inputs(name, source)
+    with waiting(f"running {name}"):
+        runners = {}
+        for path in files[0] or ():
+            reader = registration.extension("navigation.source-files", "--source")
+            runners[path] = reader(path, description, [name], files[1])
+        settings = counted(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
+        of_files = {str(path): runner for path, (runner, _) in runners.items()}
+        rows = compare_system(description, names, reference, inputs, settings, of_files)
+    output.show(SystemComparisonResult(rows, f"{name}: {title}", reference))
+    broken = [f"{row.output} on {row.backend}" for row in rows if row.share is not None and row.share > 1]
+    if broken:
+        typer.echo(f"strapgen: outside the certified bound: {', '.join(broken)}", err=True)
+        raise typer.Exit(1)
+
+
+def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDArray[Any]], str]:
+    """Return the system, the samples of its inputs, and where they come from in words."""
+    import numpy as np
+
+    from strapgen.lab.sensor_errors.measured_motions import both_increments
+    from strapgen.navigation.systems.system_runs import cycles_of, samples
+
+    if source.motion is None:
+        data = recorded(source)
+        description = described_along(name, data)
+        angle = np.asarray(data.increments)
+        return description, samples(description, angle, np.zeros_like(angle)), Path(source.file).name
+    description, profile = described_at(name, source), source.profile()
+    assert source.duration is not None, "a motion has a duration"
+    system = description.system
+    count, interval = cycles_of(system, source.duration), 1 / system.sample_hz
+    angle, velocity = both_increments(profile, profile.attitude, source.force, interval, count)
+    title = f"{source.described(profile.name, ' motion')}, {count} cycles of {float(interval):.6g} s"
+    return description, samples(description, angle, velocity), title
+
+
+def system_along(
+    name: str,
+    others: Iterable[str],
+    backend: str,
+    sensors: tuple[Path, str | None],
+    start: Start,
+    fixed: FixedOptions,
+    output: CourseOutput,
+) -> None:
+    """Run a described system along a recording, as sensors with errors measure it, and deliver its outputs."""
+    increments, errors = sensors
+    refuse_options(None, fixed, [*others, *([] if output.plot is None else ["--plot"])])
+    if any(start.frame_rate):
+        raise InputError(
+            "--frame-rate-deg-h does not go with a described system, whose navigation frame rests"
+        )
+    fixed.check_backend(backend)
+    output.check(name, increments)
+    from strapgen.cli.progress import waiting
+    from strapgen.lab.recordings import recording
+    from strapgen.navigation.systems.system_runs import SystemCourseResult, begun, system_course
+
+    data = with_errors(recording.read_inertial(increments), read_errors(errors))
+    runner = runner_of(described_along(name, data), backend, fixed)
+    memory = None
+    if any(start.initial):
+        memory, _ = begun(runner, start.matrix())
+    with waiting(f"running {name}"):
+        course = system_course(runner, data, memory)
+    facts = facts_of(runner, name) | {"source": str(increments)}
+    facts |= {} if errors is None else {"errors": errors}
+    format = output.format or ("text" if output.file is None else "csv")
+    replace(output, format=format).show(SystemCourseResult(facts, course))
+
+
+def _simulate(*arguments: Any) -> None:
+
+    simulated_system(*arguments)
+
+
+def _compare(*arguments: Any) -> None:
+
+    compared_system(*arguments)
+
+
+SYSTEMS = DescribedAlgorithms(is_system, _simulate, _compare)

@@ -1,1 +1,0 @@
-"""Pulse torquing of gyros."""

@@ -1,1 +1,0 @@
-"""Velocity and position beside truth."""
