@@ -205,6 +205,16 @@ def velocity_conditions(kernel: Kernel, demand: Demand, more: int = 0) -> list[E
     ]
 
 
+# The conditions on the unknown coefficients of a step of velocity and position, up to an order.
+#
+# On a general motion the errors of the changes have to vanish up to a power of the step. On a polynomial motion, of
+# the degree that the samples determine, and on sculling they do so up to products of a rate and a force, for which
+# there are cross products of increments. Sculling is the rate u cos(omega t) with the force v cos(omega t + phase).
+# The mean of the cross product of the i-th derivative of the rate with the j-th of the force is then half of omega^(i
+# + j) cos((j - i) pi/2 + phase) u x v: the conditions hold at every phase if the even and the odd powers of the step
+# vanish, each by itself.
+
+
 def _of_small_motion(kernel: Kernel, count: int, top: int) -> dict[str, dict[int, Coefficients]]:
     """Return the errors up to products of a rate and a force, by part and power of the step."""
     frame = Frame(2 * count)
