@@ -70,7 +70,7 @@ def cost(
     ] = None,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Measure what the C of a kernel costs on microcontrollers.
+    """Measure size and execution of generated C on microcontrollers.
 
     You get the instructions and the bytes of the object code, the stack, and, where QEMU is installed, the instructions
     that a call executes, from the entry of the function to its return.

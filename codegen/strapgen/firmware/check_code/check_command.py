@@ -116,13 +116,13 @@ def check(
     foreign: ForeignOptions,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Test what every attitude step must do; exit with 1 if it fails.
+    """Run the conformance tests; exit 1 on failure.
 
     Identities are checked in arithmetic of 40 digits, the order is measured on a ladder of step lengths, and every back
-    end is compared with exact arithmetic. A line that begins with a dash is a measurement that has no limit to pass.
+    end is compared with exact arithmetic. A line that begins with a dash is a measurement without a limit.
 
-    A function in a file of C or C++ is compiled, run along motions with known attitude, and held to the same behaviour.
-    If it fails, the likely cause is named.
+    A function in a file of C or C++ is compiled, run along motions with known attitude, and put to the same tests. If
+    it fails one, the likely cause is named.
 
     Example: strapgen check examples/modified_rodrigues.py
 
