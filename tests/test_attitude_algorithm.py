@@ -58,10 +58,12 @@ def test_generation_refuses_what_does_not_go_together(alg):
     with pytest.raises(strapgen.InputError, match=r"^settings and word are both given; one is needed$"):
         alg.generate("c-fixed", strapgen.Settings(), word=16)
     with pytest.raises(
-        strapgen.InputTypeError, match=r"^setting 'wrod' is not known \(did you mean word\?\)"
+        strapgen.InputTypeError, match=r"^setting 'max_rate' is not known \(did you mean max_rate_deg_s\?\)"
     ):
-        alg.generate("c-fixed", wrod=16)
-    with pytest.raises(strapgen.InputError, match=r"^target c takes no fixed-point settings; these do: c-fixed"):
+        alg.generate("c-fixed", max_rate=16)
+    with pytest.raises(
+        strapgen.InputError, match=r"^target c takes no fixed-point settings; these do: c-fixed"
+    ):
         alg.generate("c", word=16)
     with pytest.raises(
         strapgen.InputError, match="increments is 3, but euler-rk4-2 takes 2 increments a step"
