@@ -87,7 +87,7 @@ def test_drift_is_that_from_the_truth_where_it_is_known():
     assert row.max_abs_rad == 0
 
 
-def test_a_motion_that_a_back_end_cannot_follow_is_refused():
+def test_increments_beyond_a_format_are_refused():
     with pytest.raises(InputError, match="dcm-rk1-2 refuses its input in step"):
         comparison.compare("dcm", "rk1", 2, ["c-fixed32"], np.full((200, 2, 3), 0.05))
 
@@ -100,7 +100,7 @@ def test_a_motion_that_a_back_end_cannot_follow_is_refused():
         ([], "numpy", "no back end"),
     ],
 )
-def test_names_that_cannot_be_used(backends, reference, said):
+def test_unknown_names_are_refused(backends, reference, said):
     with pytest.raises(InputError, match=said):
         comparison.compare("euler", "rk4", 2, backends, np.zeros((2, 2, 3)), reference=reference)
 
@@ -139,7 +139,7 @@ def test_a_choice_is_compared_like_its_name(increments):
         ({"samples": 2}, InputError, "increments is 2, but the choice of euler-rk2-2 has its own"),
     ],
 )
-def test_what_does_not_go_with_a_choice_is_told(options, error, said):
+def test_arguments_that_contradict_a_choice_are_refused(options, error, said):
     with pytest.raises(error, match=said):
         comparison.compare(
             strapgen.choose("euler", "rk2", 2), **({"increments": np.zeros((2, 2, 3))} | options)

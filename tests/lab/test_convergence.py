@@ -88,7 +88,7 @@ def test_every_method_has_its_order_with_enough_increments(algorithm, method, co
         pytest.param("butcher6", 3, 2, 6, marks=pytest.mark.long),
     ],
 )
-def test_where_the_samples_limit_the_order_it_is_seen(method, increments, previous, order, coning):
+def test_samples_limit_the_order(method, increments, previous, order, coning):
     found = converge(choose("euler", method, increments, previous=previous), coning, SHORT, "1/2")
     assert found.predicted == order
     assert found.observed == pytest.approx(order, abs=WITHIN)
@@ -103,7 +103,7 @@ def test_every_back_end_shows_the_order(backend_name, coning):
     assert found.observed == pytest.approx(found.predicted, abs=WITHIN)
 
 
-def test_rounding_that_hides_the_order_is_no_order(coning):
+def test_no_order_is_observed_below_rounding(coning):
     found = converge(choose("euler", "rk4", 2), coning, ["1/64", "1/128", "1/256"], 1, "c-float")
     assert found.observed is None
     assert not any(rung.used for rung in found.rungs)
@@ -111,7 +111,7 @@ def test_rounding_that_hides_the_order_is_no_order(coning):
 
 
 @pytest.mark.long
-def test_rounded_coefficients_are_the_floor(coning):
+def test_rounded_coefficients_limit_the_fitted_errors(coning):
     """The published coefficients of this method leave 1e-17; without regard to that the slope would be far below 8."""
     choice = choose("euler", "dormand-prince8", 6)
     assert 0 < catalogue.rounding(choice) < Fraction(1, 10**16)
@@ -139,7 +139,7 @@ def test_in_many_digits_the_error_is_that_of_double(coning):
         (["1/8", "1/16"], "x", "duration is 'x'"),
     ],
 )
-def test_steps_that_cannot_be_used(steps, duration, says, coning):
+def test_invalid_steps_are_refused(steps, duration, says, coning):
     choice = choose("euler", "rk1", 1)
     if says is None:
         assert len(converge(choice, coning, steps, duration).rungs) == 2
@@ -178,7 +178,7 @@ def test_reports_have_every_figure():
     assert math.isclose(data["rungs"][2]["slope"], 4.0)
 
 
-def test_rows_tell_the_methods_of_one_kernel_apart():
+def test_labels_distinguish_methods_of_one_kernel():
     """Kernels of a user may have one name for all methods; the label tells them apart as the text does."""
     path = str(Path(__file__).parents[2] / "examples" / "modified_rodrigues.py")
     coning = motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)

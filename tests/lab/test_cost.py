@@ -65,7 +65,7 @@ def test_counts_of_a_gyro_cost_little_more_than_angles(kernel):
     assert cost.cost(sources, "cortex-m3").executed <= COUNTS[kernel]
 
 
-def test_the_command_prints_what_was_agreed(capsys):
+def test_the_command_prints_its_json_keys(capsys):
     needed("cortex-m3")
     command = "cost euler-normalize euler-product --cross arm-none-eabi-gcc --cpu cortex-m3 --format json"
     run(command.split())
@@ -111,7 +111,7 @@ def test_without_an_emulator_nothing_is_executed(monkeypatch):
         ("avr-gcc", ["cortex-m3"], "avr-gcc does not compile for cortex-m3; arm-none-eabi-gcc does"),
     ],
 )
-def test_processors_that_cannot_be_measured_are_refused(cross, cpus, said):
+def test_unknown_processors_are_refused(cross, cpus, said):
     with pytest.raises(InputError, match=said):
         cost.processors(cross, cpus)
 
@@ -181,14 +181,14 @@ def test_a_program_is_compiled_and_run_from_another_folder(tmp_path):
     )
 
 
-def test_a_program_that_does_not_end_is_stopped(monkeypatch, tmp_path):
+def test_an_endless_program_is_stopped(monkeypatch, tmp_path):
     monkeypatch.setattr(processors, "_PATIENCE", 0.2)
     (tmp_path / "program.c").write_text("int main(void)\n{\n    for (volatile int k = 0;; ++k) {\n    }\n}\n")
     with pytest.raises(CompilerError, match=r"env: the program has not ended in 0\.2 s"):
         HOST.run(tmp_path, ["program.c"])
 
 
-def test_a_program_that_does_not_compile_is_told_with_its_error(tmp_path):
+def test_compilation_errors_are_reported(tmp_path):
     (tmp_path / "program.c").write_text("int main(void)\n{\n    return missing;\n}\n")
     with pytest.raises(CompilerError, match=r"cc failed: .*missing.* undeclared"):
         HOST.run(tmp_path, ["program.c"])

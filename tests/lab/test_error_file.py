@@ -189,12 +189,12 @@ BAD = [
 
 
 @pytest.mark.parametrize("text, words", BAD)
-def test_what_is_wrong_is_told_in_one_line(text, words, tmp_path):
+def test_mistakes_are_refused_in_one_line(text, words, tmp_path):
     with pytest.raises(InputError, match=re.escape(words)) as refused:
         read(file_of(text, tmp_path))
     assert "errors.toml" in str(refused.value) and "\n" not in str(refused.value)
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"none\.toml cannot be read"):
         read(tmp_path / "none.toml")

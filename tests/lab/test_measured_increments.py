@@ -64,7 +64,7 @@ def gyros(errors: InstrumentErrors, row: np.ndarray, run: int = 0, force: float 
     return MeasurementUnit(errors, float(STEP), run)(row, np.full_like(row, force))[0]
 
 
-def test_without_errors_a_run_is_the_same_to_the_last_bit(make, algorithm):
+def test_runs_without_errors_are_bit_identical(make, algorithm):
     backend, motion = make(algorithm), strapgen.motion("coning", **CONING)
     for errors in (NONE, EVERY.without(*CAUSES)):
         assert measured(motion, errors) is motion
@@ -92,7 +92,7 @@ def test_errors_act_alike_on_every_back_end(make, algorithm):
 
 
 @pytest.mark.parametrize("cause", CAUSES)
-def test_every_cause_is_seen_and_leaves_the_others_alone(cause, row):
+def test_each_cause_acts_alone(cause, row):
     assert cause in [*EVERY.causes]
     alone = EVERY.only(cause)
     assert [*alone.causes] == [cause]
@@ -101,7 +101,7 @@ def test_every_cause_is_seen_and_leaves_the_others_alone(cause, row):
 
 
 @pytest.mark.parametrize("cause", ["noise", "random walk", "output noise", "lost samples"])
-def test_switching_a_cause_off_takes_no_number_from_the_others(cause, row):
+def test_causes_have_independent_random_streams(cause, row):
     others = [other for other in ("noise", "random walk", "output noise") if other != cause]
     both = gyros(EVERY.only(*others, cause), row)
     if cause == "lost samples":
@@ -115,7 +115,7 @@ def test_switching_a_cause_off_takes_no_number_from_the_others(cause, row):
 
 
 @pytest.mark.parametrize("cause", [None, *CAUSES])
-def test_a_run_in_parts_measures_what_a_whole_one_does(cause, row):
+def test_measuring_in_parts_equals_measuring_at_once(cause, row):
     errors = EVERY if cause is None else EVERY.only(cause)
     whole = MeasurementUnit(errors, float(STEP))(row, 0.1 + row)
     unit = MeasurementUnit(errors, float(STEP))
@@ -125,7 +125,7 @@ def test_a_run_in_parts_measures_what_a_whole_one_does(cause, row):
         np.testing.assert_allclose(np.concatenate([part[kind] for part in parts]), whole[kind], atol=1e-15)
 
 
-def test_a_motion_measures_the_same_however_it_is_read():
+def test_measured_motions_are_repeatable():
     profile = measured(strapgen.motion("coning", **CONING), EVERY, force=(0, 0, 9.81))
     whole = profile.samples(STEP, 0, 300)
     np.testing.assert_allclose(profile.samples(STEP, 100, 200), whole[100:200], atol=1e-15)
@@ -158,7 +158,7 @@ def test_scale_factors_by_sign_rectify_an_oscillation():
     assert np.degrees(mean[0]) * 3600 == pytest.approx(41.25296, abs=5e-6)
 
 
-def test_the_kernel_that_compensates_undoes_the_errors_to_second_order(row):
+def test_compensation_cancels_errors_to_second_order(row):
     velocity = 0.1 + row
 
     def left(share: float) -> float:
@@ -235,7 +235,7 @@ def test_a_delay_holds_the_angle_back_by_its_time(row):
         assert not lag[:, 2].any()
 
 
-def test_a_delay_that_no_memory_holds_is_refused(row):
+def test_too_long_delays_are_refused(row):
     errors = InstrumentErrors(gyro=TriadErrors(delay=np.full(3, 10.0)))
     with pytest.raises(strapgen.InputError, match="2e\\+06 sampling intervals late"):
         MeasurementUnit(errors, 5e-6)
@@ -301,7 +301,7 @@ def test_accelerometers_have_errors_of_their_own(row):
     assert {*np.rint(counts)} == {9.0, 10.0} and np.abs(counts - np.rint(counts)).max() < 1e-9
 
 
-def test_a_unit_of_unbalanced_gyros_senses_acceleration_through_the_same_torquers(row):
+def test_heated_torquers_disturb_both_rate_and_acceleration(row):
     heat = Heating(np.full(3, -2.6e-4), 150.0, np.radians(5) / 9.81)
     unit = MeasurementUnit(InstrumentErrors(heating=heat), float(STEP))
     fast, up = np.tile([0.0, 0.0, np.radians(200) / 100], (500, 1)), np.full((500, 3), 0.0981)
@@ -340,7 +340,7 @@ def test_drawn_constants_have_the_stated_deviations():
     assert abs(np.corrcoef(bias[:, 0], [unit.gyro.scale_plus[0] for unit in units])[0, 1]) < 0.2
 
 
-def test_errors_by_acceleration_need_one():
+def test_acceleration_errors_need_a_specific_force():
     errors = InstrumentErrors(gyro=TriadErrors(terms={"B_xz": 1e-5}))
     motion = strapgen.motion("constant", z_deg_s=0)
     with pytest.raises(strapgen.InputError, match="a specific force is needed"):
@@ -415,7 +415,7 @@ def test_jinking_in_the_simulator_follows_the_formula_for_small_angles():
     assert rate[2] == pytest.approx(expected, rel=2e-3)
 
 
-def test_loops_of_unequal_phase_show_a_coning_that_is_not_there():
+def test_unequal_loops_measure_false_coning():
     hertz, amplitude, damping = 20.0, 2e-3, 0.7
     motion = angles(amplitude, amplitude, hertz, 0.0)
     wave = {"theta_x": amplitude, "theta_y": amplitude, "phase": 0}
@@ -437,7 +437,7 @@ def test_loops_of_unequal_phase_show_a_coning_that_is_not_there():
     assert rates.computed == 0  # equal loops
 
 
-def test_delays_of_unequal_length_do_the_same():
+def test_unequal_delays_measure_false_coning():
     hertz, amplitude = 20.0, 2e-3
     motion = angles(amplitude, amplitude, hertz, 0.0)
     step = Fraction(1, 1000)

@@ -128,7 +128,7 @@ def test_the_axis_of_a_cone_keeps_its_angle_while_the_body_spins_about_it():
         ("vibration", {"angle_deg": 1, "gyro_hz": -1}, "gyro_hz is -1; at least 0.001 is needed"),
     ],
 )
-def test_settings_that_cannot_be_used(name, settings, words):
+def test_invalid_settings_are_refused(name, settings, words):
     with pytest.raises(InputError, match=words):
         strapgen.motion(name, **settings)
 
@@ -198,7 +198,7 @@ def test_a_vibration_has_its_angle_and_y_comes_a_quarter_period_after_x():
     assert abs(np.exp(1j * (profile.phases[0] - profile.phases[2])).sum()) < 20  # forty would be in step
 
 
-def test_a_gyro_passes_on_what_a_butterworth_filter_does():
+def test_the_gyro_filter_is_a_butterworth_filter():
     profile = rate_profiles.vibration_rate(0.003, math.inf)
     cutoff, s = 2 * math.pi * 40, 1j * profile.frequencies[0]
     # The poles of the filter lie on a circle.
@@ -211,7 +211,7 @@ def test_a_gyro_passes_on_what_a_butterworth_filter_does():
     )
 
 
-def test_the_truth_is_not_what_the_gyro_passes_on():
+def test_a_gyro_filters_samples_and_not_the_truth():
     ideal, seen = (strapgen.motion("vibration", angle_deg=0.1, **gyro) for gyro in ({}, {"gyro_hz": 40}))
     np.testing.assert_array_equal(ideal.rate(0.3), seen.rate(0.3))
     np.testing.assert_array_equal(ideal.attitude(0.3), seen.attitude(0.3))
@@ -232,7 +232,7 @@ def test_a_cone_meets_its_closed_form_at_any_time():
     np.testing.assert_array_equal(reference(times.reshape(2, 4))[1, 2], reference(7.0))
 
 
-def test_no_bit_depends_on_what_was_asked_for_before():
+def test_results_do_not_depend_on_earlier_calls():
     """Runs of several lengths share an attitude, in one process or in many."""
     profile = rate_profiles.random_rate(math.radians(60))
     once, in_steps = (ReferenceAttitude(profile.rate, profile.substeps) for _ in range(2))
@@ -253,14 +253,14 @@ def test_no_bit_depends_on_what_was_asked_for_before():
         pytest.param(rate_profiles.vibration_rate(math.radians(0.1), math.inf), id="vibration"),
     ],
 )
-def test_half_the_substep_changes_nothing_that_counts(profile):
+def test_the_reference_has_converged(profile):
     """The runs of 60 s have eight slews; the first is over after 5 s."""
     times = np.array([3.0, 3.5, 4.0, 5.0])
     coarse, fine = (ReferenceAttitude(profile.rate, n * profile.substeps)(times) for n in (1, 2))
     np.testing.assert_allclose(coarse, fine, atol=ACCURACY)
 
 
-def test_a_kink_beside_the_grid_would_count():
+def test_a_kink_off_the_grid_loses_accuracy():
     """That is why ramps begin and end on it."""
     profile = rate_profiles.ramps(0.05, math.radians(300))
     beside = [

@@ -67,12 +67,12 @@ def never(number: int) -> int:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_cases_run_whatever_the_number_of_processes(jobs):
+def test_results_do_not_depend_on_the_number_of_processes(jobs):
     assert dict(side_by_side(square, CASES, jobs)) == {name: k * k for name, k in CASES.items()}
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_what_a_case_raises_is_raised_and_what_is_done_stays(jobs, tmp_path):
+def test_a_failing_case_raises_and_finished_results_stay(jobs, tmp_path):
     path = tmp_path / "results.jsonl"
     with pytest.raises(InputError, match="3 is not allowed"):
         list(resume(refuse_3, CASES, path, IDENTITY, jobs))
@@ -82,12 +82,12 @@ def test_what_a_case_raises_is_raised_and_what_is_done_stays(jobs, tmp_path):
         assert kept == ["case 0", "case 1", "case 2"]
 
 
-def test_a_process_that_is_killed_is_told_in_one_line():
+def test_a_killed_worker_process_is_reported():
     with pytest.raises(StrapgenError, match="a process of the study was killed"):
         list(side_by_side(end_at_once, CASES, 2))
 
 
-def test_results_are_read_again_and_not_worked_out(tmp_path):
+def test_stored_results_are_not_recomputed(tmp_path):
     path = tmp_path / "new" / "folder" / "results.jsonl"
     first = dict(resume(square, CASES, path, IDENTITY, 1))
     content = path.read_bytes()
@@ -98,7 +98,7 @@ def test_results_are_read_again_and_not_worked_out(tmp_path):
     assert dict(resume(square, {"new": 9, "case 2": 2}, path, IDENTITY, 1)) == {"case 2": 4, "new": 81}
 
 
-def test_a_result_is_the_same_when_it_is_read_again(tmp_path):
+def test_stored_results_equal_fresh_ones(tmp_path):
     values = {"tuple": (1, 2), "number": 0.1, "none": None}
     path = tmp_path / "results.jsonl"
     first = dict(resume(dict, {"one": values}, path, IDENTITY))
@@ -107,7 +107,7 @@ def test_a_result_is_the_same_when_it_is_read_again(tmp_path):
 
 
 @pytest.mark.parametrize("end", [-1, -5, -20, -30, -50, -10_000, 1, 10, 30])
-def test_a_file_that_ends_anywhere_goes_on_from_its_last_complete_line(end, tmp_path):
+def test_a_truncated_file_resumes_after_its_last_complete_line(end, tmp_path):
     path = tmp_path / "results.jsonl"
     whole = dict(resume(square, CASES, path, IDENTITY, 1))
     content = path.read_bytes()
@@ -128,7 +128,7 @@ def test_a_file_that_ends_anywhere_goes_on_from_its_last_complete_line(end, tmp_
         ),
     ],
 )
-def test_the_results_of_another_study_are_refused_and_left_alone(identity, words, tmp_path):
+def test_results_of_another_study_are_refused_unchanged(identity, words, tmp_path):
     path = tmp_path / "results.jsonl"
     list(resume(square, CASES, path, IDENTITY, 1))
     torn = path.read_bytes()[:-3]
@@ -154,7 +154,7 @@ def test_the_results_of_another_study_are_refused_and_left_alone(identity, words
         (b'{"study": {"version": "1", "rate": 100}}\n\xff\n', "line 2 of .* is no result"),
     ],
 )
-def test_other_files_are_refused_and_left_alone(content, words, tmp_path):
+def test_other_files_are_refused_unchanged(content, words, tmp_path):
     path = tmp_path / "notes.txt"
     path.write_bytes(content)
     with pytest.raises(InputError, match=words):
@@ -162,7 +162,7 @@ def test_other_files_are_refused_and_left_alone(content, words, tmp_path):
     assert path.read_bytes() == content
 
 
-def test_places_that_cannot_be_written(tmp_path):
+def test_unwritable_paths_are_refused(tmp_path):
     (tmp_path / "file").write_text("")
     for path in (tmp_path, tmp_path / "file" / "results.jsonl"):
         with pytest.raises(InputError, match="cannot be written"):
@@ -171,7 +171,7 @@ def test_places_that_cannot_be_written(tmp_path):
         list(resume(square, CASES, "/dev/null", IDENTITY, 1))
 
 
-def test_a_study_that_is_killed_goes_on_where_it_was(tmp_path):
+def test_a_killed_study_resumes_and_leaves_no_process(tmp_path):
     script, path, go = tmp_path / "study.py", tmp_path / "results.jsonl", tmp_path / "go"
     script.write_text(STUDY)
     command = [sys.executable, str(script), str(path), str(go)]
@@ -209,7 +209,7 @@ def test_a_study_that_is_killed_goes_on_where_it_was(tmp_path):
         (None, "here", "local:N with N from 1 to 256 is needed"),
     ],
 )
-def test_a_cluster_that_cannot_be_is_refused(scheduler, cluster, said):
+def test_invalid_clusters_are_refused(scheduler, cluster, said):
     with pytest.raises(InputError, match=said):
         Cluster.of(scheduler, cluster)
     assert Cluster.of(None, None) is None
@@ -232,13 +232,13 @@ def test_files_move_with_their_folders(tmp_path):
         Bundle.of([tmp_path / "none.toml"])
 
 
-def test_a_worker_with_another_version_refuses(monkeypatch):
+def test_a_worker_of_another_version_refuses(monkeypatch):
     assert parallel_cases._remote(Fraction, "1/3", cache.generator_digest(), None) == Fraction(1, 3)
     with pytest.raises(StrapgenError, match="another version of strapgen"):
         parallel_cases._remote(Fraction, "1/3", "0" * 24, None)
 
 
-def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
+def test_a_missing_scheduler_is_reported(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(parallel_cases, "_PATIENCE_S", 1)
     with pytest.raises(StrapgenError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
@@ -341,7 +341,7 @@ def test_studies_are_completed_whatever_is_killed(tmp_path, machines, capsys):
 
 
 @pytest.mark.long
-def test_a_brief_is_answered_by_workers_that_do_not_have_its_files(capsys):
+def test_workers_receive_the_files_of_a_brief(capsys):
     pytest.importorskip("distributed")
     words = ["design", str(BRIEFS / "ins-1.toml"), "--method", "rk4:2,coning-compressed:4"]
     command = [sys.executable, "-m", "strapgen", *words, "--cluster", "local:1", "--format", "json"]

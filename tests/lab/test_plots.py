@@ -179,7 +179,7 @@ def test_comparison_has_a_line_and_a_bound_for_each_back_end(figures):
     assert first.get_xlim() == second.get_xlim() == (0, 2500)
 
 
-def test_labels_at_the_right_cover_none_another():
+def test_labels_at_the_right_do_not_overlap():
     figure, grid = drawing.grid_of_axes(1, 1, (5, 3))
     drawing.labels_at_the_right(
         grid[0, 0], [(1.0, "a", "k"), (0.0, "b", "k"), (1.0, "c", "k"), (9.0, "d", "k")]
@@ -191,7 +191,7 @@ def test_labels_at_the_right_cover_none_another():
     assert all(other - one > 0.04 for one, other in pairwise(heights))
 
 
-def test_labels_beside_points_cover_none_another_and_stay_inside():
+def test_labels_beside_points_do_not_overlap():
     figure, axes = pyplot.subplots()
     points = {f"algorithm {k}": (0.5 + 0.01 * k, 0.5 - 0.01 * k) for k in range(5)} | {
         "at the left": (0.0, 0.2)
@@ -363,7 +363,7 @@ def test_no_screen_is_needed(run, figures, monkeypatch):
 
 
 @pytest.mark.long
-def test_a_screen_of_the_user_s_that_is_not_there_changes_nothing(tmp_path):
+def test_the_users_plotting_backend_is_kept(tmp_path):
     code = (
         "from strapgen.results import figures; figures.pyplot(); import os; print(os.environ['MPLBACKEND'])"
     )

@@ -40,7 +40,7 @@ def test_the_closed_forms_lie_in_the_interval_of_many_runs(method, increments, p
     assert high < 1.5 * low
 
 
-def test_runs_in_parts_are_the_runs_in_one_piece(monkeypatch):
+def test_blocks_of_steps_do_not_change_the_result(monkeypatch):
     choice = catalogue.choose_step("euler", "coning-compressed", 3, previous=2)
     runs = SteadyRuns(choice, replace(PULSES, noise=1e-5), 40, 5)
     whole = outcome(runs)
@@ -54,7 +54,7 @@ def test_runs_in_parts_are_the_runs_in_one_piece(monkeypatch):
     assert np.abs(turned).max() <= PULSES.pulse / 2, "angles are whole numbers of pulses, the first one exact"
 
 
-def test_every_part_of_a_run_has_noise_of_its_own():
+def test_blocks_of_a_run_have_independent_noise():
     drawn = experiment._Gyro(SteadyRuns(catalogue.choose_step("euler", "rk4", 2), NOISE, 6, 5), beside=0)
     rows = np.concatenate([drawn.rows(6), drawn.rows(6)])
     assert np.unique(rows).size == rows.size
@@ -104,7 +104,7 @@ def test_runs_of_more_steps_than_are_drawn_at_a_time_are_those_of_any_number_of_
         ("--out a.txt --results a.txt", "--out and --results are both a.txt"),
     ],
 )
-def test_runs_that_cannot_be_are_refused_in_one_line(options, said, capsys, tmp_path, monkeypatch):
+def test_invalid_options_are_refused_in_one_line(options, said, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
         main(["study", "monte-carlo", "euler", *options.split()])

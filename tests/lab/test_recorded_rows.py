@@ -61,7 +61,7 @@ def outcome(path: Path) -> object:
 
 
 @given(st.lists(ROWS, max_size=30), st.sampled_from(["\n", "\r\n", "\r"]))
-def test_a_block_is_read_as_its_rows_are(lines, end):
+def test_blocks_give_what_single_rows_give(lines, end):
     path = Path(tempfile.gettempdir()) / f"rows-{np.random.default_rng().integers(1 << 60)}.csv"
     good = [f"{k},{k},{k},{k}" for k in range(4)]
     path.write_bytes(end.join([*good, *lines, *good, ""]).encode())
@@ -135,7 +135,7 @@ def test_memory_does_not_grow_with_the_file(read, on_disk, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
-def test_a_recording_on_the_disk_has_the_bits_of_one_in_memory(read, tmp_path, request):
+def test_recordings_on_disk_and_in_memory_are_equal(read, tmp_path, request):
     path = long_file(tmp_path / "gyro.csv", 5_000)
     in_memory = read(path)
     request.getfixturevalue("on_disk")
@@ -151,14 +151,14 @@ def test_a_recording_on_the_disk_has_the_bits_of_one_in_memory(read, tmp_path, r
 
 @pytest.mark.long
 @pytest.mark.parametrize("hz", [3, 999, 1000, 7777])
-def test_resampling_in_parts_has_the_bits_of_all_at_once(hz, tmp_path, request):
+def test_resampling_in_parts_gives_the_same_bits(hz, tmp_path, request):
     path = long_file(tmp_path / "gyro.csv", 2_500)
     at_once = recording.read_rates(path, "rad/s", hz).increments
     request.getfixturevalue("on_disk")
     np.testing.assert_array_equal(recording.read_rates(path, "rad/s", hz).increments, at_once)
 
 
-def test_points_of_the_grid_on_last_rows_of_parts_have_the_bits_of_all_at_once(rng, tmp_path, monkeypatch):
+def test_grid_points_at_part_boundaries_give_the_same_bits(rng, tmp_path, monkeypatch):
     """The sum of whole intervals rounds otherwise than a piece up to a row: the part that begins there has it."""
     path = tmp_path / "gyro.csv"
     rates = rng.normal(size=(200, 3)).tolist()
@@ -204,7 +204,7 @@ def test_parts_cover_all_rows(few_on_disk, overlap, count, rng):
     assert largest_magnitude(columns.array()) == np.abs(rows).max()
 
 
-def test_a_full_disk_is_told_in_one_line(few_on_disk, monkeypatch):
+def test_a_full_disk_is_reported(few_on_disk, monkeypatch):
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: open("/dev/full", "wb"))  # noqa: SIM115, PTH123
     columns = Columns(1)
     with pytest.raises(
@@ -215,7 +215,7 @@ def test_a_full_disk_is_told_in_one_line(few_on_disk, monkeypatch):
 
 
 @given(st.lists(steps, min_size=1, max_size=40))
-def test_the_median_of_a_long_row_is_that_of_numpy(numbers):
+def test_interval_statistics_agree_with_numpy(numbers):
     time = np.cumsum([0.0, *numbers])
     exact = np.diff(time)
     with pytest.MonkeyPatch.context() as patch:
@@ -240,7 +240,7 @@ def test_rows_have_the_numbers_of_the_lines_at_which_they_end(tmp_path):
     assert read(path) == [(1, ["a", "b"]), (4, ["1", "2\n3"]), (5, ["", ""]), (7, ["4"])]
 
 
-def test_what_is_at_the_bounds_is_read(tmp_path, monkeypatch):
+def test_rows_at_the_limits_are_read(tmp_path, monkeypatch):
     monkeypatch.setattr(recorded_rows, "MOST_ROWS", 3)
     path = tmp_path / "x.csv"
     path.write_text(
@@ -261,7 +261,7 @@ def test_what_is_at_the_bounds_is_read(tmp_path, monkeypatch):
         ("1\n2\n" + "," * 1000, "{path}, line 3: 1001 cells; at most 1000 are allowed"),
     ],
 )
-def test_what_is_beyond_bounds_is_refused_in_one_line(text, said, block, tmp_path, monkeypatch):
+def test_rows_beyond_the_limits_are_refused(text, said, block, tmp_path, monkeypatch):
     monkeypatch.setattr(recorded_rows, "MOST_ROWS", 3)
     monkeypatch.setattr(recorded_rows, "_BLOCK", block)
     path = tmp_path / "x.csv"
@@ -272,13 +272,13 @@ def test_what_is_beyond_bounds_is_refused_in_one_line(text, said, block, tmp_pat
 
 
 @pytest.mark.long
-def test_a_line_without_an_end_is_not_read_to_its_end():
+def test_an_endless_line_is_refused():
     """The device never ends a line, nor itself."""
     with pytest.raises(InputError, match="line 1: over 20000 characters"):
         next(recorded_rows.line_blocks(Path("/dev/zero")))
 
 
-def test_no_more_is_read_than_is_used(tmp_path, monkeypatch):
+def test_blocks_are_read_lazily(tmp_path, monkeypatch):
     monkeypatch.setattr(recorded_rows, "_BLOCK", 2)
     path = tmp_path / "x.csv"
     path.write_text("1\n2\n3\n4\n5\n")

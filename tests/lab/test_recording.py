@@ -126,7 +126,7 @@ def test_increments_by_name_in_any_order(order, write):
     np.testing.assert_array_equal(read_increments(write([shouted, *rows])).increments, INCREMENTS)
 
 
-def test_columns_that_names_leave_open_are_stated(write):
+def test_columns_can_be_stated_by_name_or_number(write):
     header = ["Time (s)", "pitch", "roll", "yaw", "note"]
     path = write([header, *([*row, "text"] for row in EVEN)])
     with pytest.raises(InputError, match=r"no rates about three axes are named among .*'pitch'.*--columns"):
@@ -139,7 +139,7 @@ def test_columns_that_names_leave_open_are_stated(write):
         read_rates(path, "rad/s", columns="time,pitch,roll,speed")
 
 
-def test_blank_lines_and_blanks_are_overlooked(write, read):
+def test_blank_lines_and_spaces_are_ignored(write, read):
     rows = [
         [],
         ["t", "dx", "dy", "dz"],
@@ -320,7 +320,7 @@ def test_resampling_integrates_a_piecewise_linear_rate_exactly(tmp_path_factory,
         ("1e300", "would make over"),
     ],
 )
-def test_frequencies_that_cannot_be_used(hertz, said):
+def test_invalid_frequencies_are_refused(hertz, said):
     with pytest.raises(InputError, match=said):
         read_rates(DATA / "rates_uneven.csv", "deg/s", hertz)
 
@@ -364,13 +364,13 @@ def test_records_and_orthonormalization_are_counted_in_steps(make, even):
         ({"orthonormalize": "1e300"}, "orthonormalize 1e300 s is not a whole multiple"),
     ],
 )
-def test_intervals_that_cannot_be_used(options, said, even, make):
+def test_invalid_intervals_are_refused(options, said, even, make):
     with pytest.raises(InputError, match=re.escape(said)):
         propagate(make("euler"), even, **options)
 
 
 @pytest.mark.filterwarnings("error")
-def test_attitude_that_overflows_is_refused(make, even):
+def test_an_overflowing_attitude_is_refused(make, even):
     large = Recording(even.start, even.interval, np.full((24, 3), 1e30))
     backend = make("dcm")
     said = r"^the attitude is not finite from 1\d"
@@ -388,7 +388,7 @@ def test_attitude_that_overflows_is_refused(make, even):
     ("count", "previous"),
     [(1, 1), (1, 3), (2, 2), pytest.param(5, 3, marks=pytest.mark.long)],
 )
-def test_the_first_increments_of_a_recording_are_those_before_the_first_step(count, previous, even):
+def test_previous_increments_come_from_the_start_of_a_recording(count, previous, even):
     backend = strapgen.backend("euler", "rk4", count, "numpy", previous=previous)
     history = propagate(backend, even)
     steps, unused = divmod(24 - previous, count)
@@ -405,7 +405,7 @@ def test_the_first_increments_of_a_recording_are_those_before_the_first_step(cou
 
 
 @pytest.mark.long
-def test_a_recording_that_is_as_long_as_a_first_step(even):
+def test_a_recording_of_one_step_is_run_and_a_shorter_one_refused(even):
     backend = strapgen.backend("euler", "rk4", 2, "numpy", previous=3)
     history = propagate(backend, Recording(even.start, even.interval, even.increments[:5]))
     assert (len(history.time), history.unused) == (2, 0)
@@ -448,7 +448,7 @@ def outcome(call) -> object:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", EXTREME)
-def test_extreme_recordings_are_run_or_refused_and_nothing_warns(name, write):
+def test_extreme_recordings_are_run_or_refused_without_warnings(name, write):
     path = write([[repr(time), *[value] * 6] for time, value in EXTREME[name]])
     outcomes = {}
     for hz in (None, "7", "1e300", "1e-300"):
@@ -472,13 +472,13 @@ def test_extreme_recordings_are_run_or_refused_and_nothing_warns(name, write):
             assert np.isfinite(result.time).all() and np.isfinite(result.states).all(), key
 
 
-def test_rates_whose_integral_is_beyond_all_numbers_are_refused(write):
+def test_rates_whose_integral_overflows_are_refused(write):
     path = write([[repr(time), value, "0", "0"] for time, value in EXTREME["late"]])
     with pytest.raises(InputError, match=r"the integral of a rate is beyond the range of double$"):
         read_rates(path, "rad/s", time_unit="s")
 
 
-def test_interval_measured_from_a_file_is_matched_to_a_hundredth(even):
+def test_intervals_are_matched_to_a_hundredth_of_a_step(even):
     measured = Recording(even.start, 0.1250003, even.increments)
     history = propagate(strapgen.backend("euler", backend="numpy"), measured, record="0.75")
     assert len(history.time) == 5

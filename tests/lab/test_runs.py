@@ -42,7 +42,8 @@ DRIFTS = {
 #: Below this drift in deg/h, 3e-12 rad after 60 s, rounding counts.
 FLOOR = 1e-8
 
-STEPS = 50
+#: Steps of a run that is propagated in parts.
+PART_STEPS = 50
 
 H, STEPS, EVERY = 0.125, 1440, 40
 A = B = G = math.radians(10)
@@ -95,12 +96,12 @@ def test_decimals_are_exact(make):
         ({"step": 0.1, "duration": 1, "orthonormalize": -1}, "orthonormalize is -1"),
     ],
 )
-def test_times_that_cannot_be_used(times, words):
+def test_invalid_times_are_refused(times, words):
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
         simulate(strapgen.backend("euler"), strapgen.motion("constant", y_deg_s=1), **times)
 
 
-def test_a_run_that_overflows_names_the_samples_that_the_rate_is_extracted_from():
+def test_an_overflowing_run_names_the_rate_extraction():
     # A cone of 5 degrees at 20 Hz, sampled at 100 Hz: the polynomial through eight samples swings far beyond the rate.
     omega, half_angle = 2 * math.pi * 20, math.radians(5)
     cone = strapgen.motion(
@@ -181,7 +182,7 @@ def test_orthonormalization_keeps_the_turned_error_to_second_order():
     assert math.log(apart[0] / apart[1]) / math.log(sizes[0] / sizes[1]) > 1.8
 
 
-def test_a_state_without_a_kernel_for_its_start_begins_at_zero_rotation(monkeypatch):
+def test_an_initial_attitude_without_conversion_kernel_is_refused(monkeypatch):
     backend = strapgen.backend("euler")
     monkeypatch.setattr(backend, "attitude", "dcm-from-thirds")
     with pytest.raises(InputError, match="no kernel converts a matrix to the state of euler-rk4-2"):
@@ -227,7 +228,7 @@ def test_the_drift_is_the_largest_angle_over_the_duration():
     assert drift(runs_of(vectors)) == pytest.approx(360)
 
 
-def test_the_steady_drift_leaves_out_what_swings():
+def test_the_steady_drift_excludes_oscillation():
     time = np.arange(101)
     vectors = np.zeros((101, 3))
     vectors[:, 0] = 1e-6 * time + 1e-3 * (-1.0) ** time
@@ -246,9 +247,9 @@ def short_parts(monkeypatch):
 @pytest.mark.parametrize(
     ("every", "record"), [(None, 1), (3, 1), (3, 7), (8, 50), (20, 3), (None, 11), (49, 49)]
 )
-def test_a_run_in_parts_has_the_bits_of_the_whole(make, every, record, rng, short_parts):
+def test_runs_in_parts_are_bit_identical(make, every, record, rng, short_parts):
     backend = make("euler", largest=0.011, carry="full")
-    increments = backend.representable(rng.uniform(-0.011, 0.011, (STEPS, 2, 3)))
+    increments = backend.representable(rng.uniform(-0.011, 0.011, (PART_STEPS, 2, 3)))
     calls = []
 
     def part(first: int, count: int):
@@ -256,7 +257,7 @@ def test_a_run_in_parts_has_the_bits_of_the_whole(make, every, record, rng, shor
         return increments[first : first + count]
 
     whole = backend.propagate(increments, record, every)
-    np.testing.assert_array_equal(backend.propagate_parts(part, STEPS, record, every), whole)
+    np.testing.assert_array_equal(backend.propagate_parts(part, PART_STEPS, record, every), whole)
     assert len(calls) > 5
     assert [first for first, _ in calls] == np.cumsum([0, *(count for _, count in calls)])[:-1].tolist()
 
@@ -264,42 +265,42 @@ def test_a_run_in_parts_has_the_bits_of_the_whole(make, every, record, rng, shor
 @pytest.mark.parametrize("segment", [0, 1, 3, 8, 9, 17, 60])
 def test_parts_end_where_a_state_is_restored(segment, short_parts):
     restored, place = [], 0
-    for first, count, every in run_parts(STEPS, segment):
+    for first, count, every in run_parts(PART_STEPS, segment):
         assert (first, count <= 8) == (place, True)
         place += count
         restored += [first + k for k in range(1, count + 1) if every and k % every == 0]
-    assert place == STEPS
-    assert restored == [k for k in range(1, STEPS + 1) if segment and k % segment == 0]
+    assert place == PART_STEPS
+    assert restored == [k for k in range(1, PART_STEPS + 1) if segment and k % segment == 0]
 
 
 def test_a_division_by_zero_ends_a_run_in_parts_as_one_in_memory(short_parts):
     backend = strapgen.backend("dcm", backend="exact", method="rk1", increments=1)
-    increments = np.full((STEPS, 1, 3), 1e300)
+    increments = np.full((PART_STEPS, 1, 3), 1e300)
     whole = backend.propagate(increments, 1, 4)
-    parts = backend.propagate_parts(lambda first, count: increments[first : first + count], STEPS, 1, 4)
+    parts = backend.propagate_parts(lambda first, count: increments[first : first + count], PART_STEPS, 1, 4)
     np.testing.assert_array_equal(parts, whole)
 
 
 def test_a_refusal_names_the_step_of_the_run(short_parts):
     settings = strapgen.Settings().fitted(0.01)
     backend = strapgen.backend("euler", backend="c-fixed32", settings=settings)
-    increments = np.zeros((STEPS, 2, 3))
+    increments = np.zeros((PART_STEPS, 2, 3))
     increments[30:] = np.array([0.0099, 0, 0])
     with pytest.raises(InputError) as whole:
-        backend.propagate(np.where(np.arange(STEPS)[:, None, None] == 30, 1.0, increments))
+        backend.propagate(np.where(np.arange(PART_STEPS)[:, None, None] == 30, 1.0, increments))
     with pytest.raises(InputError) as parts:
         backend.propagate_parts(
             lambda first, count: np.where(
                 np.arange(first, first + count)[:, None, None] == 30, 1.0, increments[first : first + count]
             ),
-            STEPS,
+            PART_STEPS,
         )
     assert str(parts.value) == str(whole.value)
 
 
 @pytest.mark.parametrize("previous", [0, 1, 3])
 @pytest.mark.parametrize("pulse", [None, 0.01])
-def test_windows_in_parts_are_those_of_the_whole_row(previous, pulse, rng):
+def test_windows_in_parts_equal_those_of_the_whole_row(previous, pulse, rng):
     row = rng.normal(size=(previous + 2 * 20, 3))
     whole = windows(row, 2, previous)
     whole = whole if pulse is None else pulses(whole, pulse, previous)
@@ -309,7 +310,7 @@ def test_windows_in_parts_are_those_of_the_whole_row(previous, pulse, rng):
     np.testing.assert_array_equal(np.concatenate(got), whole)
 
 
-def test_pulses_that_cannot_be_counted_are_refused_in_a_later_part():
+def test_uncountable_pulses_are_refused_in_later_parts():
     part = StepWindows(lambda first, stop: np.full((stop - first, 3), 1e14 * first), 1, 0, 0.1)
     part(0, 5)
     with pytest.raises(InputError, match="more pulses than can be counted"):
@@ -321,7 +322,7 @@ def test_pulses_that_cannot_be_counted_are_refused_in_a_later_part():
 def test_simulations_and_recordings_run_in_parts(previous, ahead, pulse, request):
     backend = strapgen.backend("euler", "rk4", 1, previous=previous, ahead=ahead)
     motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
-    data = Recording(0.0, 0.125, motion.increments(runs.Fraction("0.125"), STEPS, 1)[:, 0])
+    data = Recording(0.0, 0.125, motion.increments(runs.Fraction("0.125"), PART_STEPS, 1)[:, 0])
 
     def results():
         return (

@@ -6,7 +6,6 @@ import json
 import math
 import shlex
 from fractions import Fraction
-from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
@@ -178,7 +177,7 @@ def test_stated_errors_have_a_mean_and_no_spread():
     np.testing.assert_allclose(whole.mean, error_mean(path, errors), atol=2 * size**2 + 1e-7)
 
 
-def test_intervals_cover_what_they_say():
+def test_intervals_have_their_coverage():
     # The quantiles of tables: t and chi-square of 9 and of 99 degrees of freedom.
     assert student_quantile(9) == pytest.approx(2.262157, abs=1e-3)
     assert student_quantile(99) == pytest.approx(1.984217, abs=1e-5)
@@ -199,7 +198,6 @@ def test_records_divide_the_steps(steps, records):
 
 # The command
 
-EXAMPLES = FilePath(__file__).resolve().parents[2] / "examples"
 MOTION = "--motion constant --set z_deg_s=10 --step 0.05 --duration 5 --runs 20"
 
 
@@ -258,7 +256,7 @@ def test_the_command_shows_causes_with_their_intervals(run, tmp_path):
         ("noise.toml --motion constant --set z_deg_s=1 --step 1e-6 --duration 5", "are too many"),
     ],
 )
-def test_what_cannot_be_used_is_refused_in_one_line(command, words, run):
+def test_invalid_commands_are_refused_in_one_line(command, words, run):
     status, text, said = run(command)
     assert (status, text) == (2, "")
     assert words in said and said.count("\n") == 1

@@ -228,7 +228,7 @@ def test_a_motion_that_contradicts_itself_is_refused_with_the_time(fault, tmp_pa
     assert begin <= time <= end + 1e-9 and end - begin < 0.2
 
 
-def test_previous_and_ahead_must_belong_to_the_row(tmp_path):
+def test_increments_beside_a_step_must_be_consistent(tmp_path):
     swapped = (
         BEGIN.replace("np.arange(-previous, samples + ahead)", "np.arange(previous + samples + ahead)")
         + CONING
@@ -239,7 +239,7 @@ def test_previous_and_ahead_must_belong_to_the_row(tmp_path):
         read_motion(file, 10)
 
 
-def test_files_that_are_no_motions(tmp_path):
+def test_invalid_motion_files_are_refused(tmp_path):
     for text, said in BAD.items():
         with pytest.raises(InputError) as refused:
             read_motion(written(tmp_path, text), 10)
@@ -287,7 +287,7 @@ def test_increments_have_forty_digits_and_the_attitude_is_within_its_bound():
             assert max(abs(x - y) for x, y in zip(computed, true, strict=True)) <= piece.error < 1e-22
 
 
-def test_what_the_polynomial_of_a_rate_leaves_out_is_within_the_bound():
+def test_the_truncated_term_of_a_rate_is_within_its_bound():
     """A power of the time leaves out one term, which is known: of a longer piece it would be above the tolerance."""
     power = RATE_DEGREE + 1
     integrated = Integrated(
@@ -301,7 +301,7 @@ def test_what_the_polynomial_of_a_rate_leaves_out_is_within_the_bound():
         assert longer > piece.angle_error
 
 
-def test_time_runs_backwards_too():
+def test_negative_times_are_integrated():
     integrated = Integrated("odd", *operations_of("odd", [sp.exp(T), T**3, sp.sqrt(4 + T)]))
     with mp.workdps(DIGITS):
         piece = integrated.piece(mp.mpf(-2))
@@ -338,7 +338,7 @@ def test_bounds_of_taylor_coefficients_hold_over_the_interval(expression):
                 assert abs(float(coefficient)) <= bound * (1 + 1e-12)
 
 
-def test_a_divisor_that_may_vanish_has_no_bound():
+def test_a_possibly_zero_divisor_has_no_bound():
     operations, _ = operations_of("this", [1 / (T - 1)] * 3)
     with pytest.raises(UnboundedError):
         Jets(3, bounds=True).evaluated(operations, iv.mpf([0.5, 1.5]))
@@ -425,7 +425,7 @@ def test_a_bad_rate_is_refused_in_one_line(rate, tmp_path):
     assert "\n" not in str(refusal.value)
 
 
-def test_one_way_of_stating_a_motion_is_enough(tmp_path):
+def test_a_rate_beside_an_attitude_is_refused(tmp_path):
     path = written_rate(tmp_path, "[t, 0, 0]", "def attitude(t):\n    return None")
     with pytest.raises(InputError, match="defines rate_expression and attitude; one of both ways is needed"):
         read_motion(path, 1)

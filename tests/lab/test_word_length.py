@@ -78,7 +78,7 @@ def test_a_finished_case_is_not_run_again(outcomes, monkeypatch):
         assert run_case(outcome.case) == outcome
 
 
-def test_a_run_that_leaves_its_range_is_told():
+def test_a_run_out_of_range_is_reported():
     (outcome,) = run(cases(methods=("rk1",), words=(16,), carries=("none",), steps=("0.5",), duration="180"))
     assert outcome.drift_deg is None and outcome.rounding_deg is None
     assert outcome.dominates == "range"
@@ -116,7 +116,7 @@ def test_image(outcomes):
         ({"pulses_arcsec": ("-1",)}, "pulse_arcsec is -1"),
     ],
 )
-def test_studies_that_cannot_be_run(values, said):
+def test_invalid_studies_are_refused(values, said):
     with pytest.raises(InputError, match=said):
         cases(**values)
 

@@ -86,7 +86,7 @@ def test_cases_have_a_brace_and_two_columns():
     assert any(element.tag == "mo" and element.text == "{" for element in found)
 
 
-def test_a_line_that_was_broken_for_paper_is_one_equation():
+def test_broken_lines_are_one_equation():
     kernel = pipeline.derive(choose("dcm", "rk4", 2))
     latex = as_latex(kernel)
     rows = equations(latex)

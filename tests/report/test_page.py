@@ -83,7 +83,7 @@ def comparable(name, result):
     return result
 
 
-def test_all_numbers_are_those_of_the_commands_that_stand_beside_them(page, data, capsys, tmp_path):
+def test_all_numbers_are_those_of_the_commands_beside_them(page, data, capsys, tmp_path):
     results = [(name, of) for several in data["results"].values() for name, of in several.items()]
     assert sorted(name for name, _ in results) == sorted(
         ["frontier", "tables", "derive", "generate", "simulate", "compare", "converge", "derive", "generate"]
@@ -150,7 +150,7 @@ def test_charts_tables_and_tabs_answer(browser, page):
         assert not window.view().faults()
 
 
-def test_evidence_stands_beside_the_very_code_that_was_examined_alone():
+def test_evidence_is_shown_for_the_examined_code_only():
     choice = choose("euler-product")
     proof = Verdict("euler_product_w32", "no overflow: AVR", "z3", "4.16", "proved", 0.1)
     recorded = read_page(evidence_page([proof], {proof.kernel: Subject(choice).digest}))
@@ -173,7 +173,7 @@ def test_a_new_version_that_generates_the_same_code_keeps_the_evidence(monkeypat
     assert newer.digest == digest
 
 
-def test_no_text_of_a_user_is_markup():
+def test_user_text_is_escaped():
     conditions = Conditions(motion="</script><script>alert(1)</script>", settings={})
     known = dossier(choose("euler-product"))
     content = Content("<b>bold</b>", "a & b", conditions, (), (known,), (), (), (), None)

@@ -88,7 +88,7 @@ def test_the_report_has_every_statement_in_every_format():
     assert math.isnan(single) or single < 14, "false in single precision"
 
 
-def test_a_verdict_that_runs_do_not_bear_out_is_told(monkeypatch):
+def test_a_verdict_against_the_runs_is_reported(monkeypatch):
     said, template, verdict, _ = thesis_statements._STATEMENTS[3]
     case = (said, template, verdict, lambda: ({"by_rate": 1.0, "by_step": 2.0}, False))
     monkeypatch.setattr(thesis_statements, "_STATEMENTS", (case,))

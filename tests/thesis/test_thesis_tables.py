@@ -91,7 +91,7 @@ def test_tables(table, backend_name, make):
 
 
 @pytest.mark.parametrize("backend_name", LONG_RUNS, indirect=True)
-def test_the_contradiction_of_table_2_is_told(backend_name):
+def test_the_contradiction_of_table_2_is_noted(backend_name):
     noted = [row for row in entries(TABLES[1], backend_name) if "2.391" in (row.note or "")]
     assert [(row.algorithm, row.order) for row in noted] == [("dcm", 1)]
     assert "2.391" in noted[0].note
@@ -123,7 +123,7 @@ def test_every_repair_of_the_scan_is_disclosed():
     assert motions == {1: [], 2: [], 3: [], 4: ["b = .1", "-a sin bt"], 5: ["-a sin bt"]}
 
 
-def test_a_figure_that_does_not_come_out_is_told():
+def test_a_figure_that_is_not_reproduced_is_marked():
     """The scan of table 4 reads .30e-3 where .30e-8 comes out; the figures beside it agree."""
     table = TABLES[3]
     first, second, _ = table.printed["dcm"]
@@ -151,7 +151,7 @@ def test_entries_have_the_text_of_the_scan(table):
     ],
     ids=["rate", "sign"],
 )
-def test_the_scan_of_table_4_does_not_come_out(repaired, unrepaired):
+def test_the_scanned_settings_of_table_4_are_not_reproduced(repaired, unrepaired):
     backend = strapgen.backend("dcm", "rk1", 2)
     base, other = (
         math.degrees(strapgen.simulate(backend, strapgen.motion("coning", **s), "1/8", 180, 5, 5).mean_drift)
@@ -161,7 +161,7 @@ def test_the_scan_of_table_4_does_not_come_out(repaired, unrepaired):
     assert other == pytest.approx({0.1: 0.00942, -1: 0.140}[unrepaired["b_deg_s"]], rel=0.01)
 
 
-def test_ten_seconds_between_orthonormalizations_come_out_as_five_do():
+def test_ten_seconds_between_orthonormalizations_agree_too():
     rows = [row for table in TABLES for row in entries(table, "numpy", interval=Fraction(10))]
     assert all(row.agrees for row in rows), "the tables cannot decide between 5 s and 10 s"
     last = {(row.algorithm, row.order): row.normalised for row in rows if row.table == 5}
@@ -173,7 +173,7 @@ def test_ten_seconds_between_orthonormalizations_come_out_as_five_do():
 @pytest.mark.parametrize(
     ("table", "base"), [(TABLES[0], 0.288), (TABLES[4], 1.064)], ids=["one-axis", "coning"]
 )
-def test_records_between_orthonormalizations_do_not_come_out(table, base):
+def test_records_between_orthonormalizations_are_not_reproduced(table, base):
     backend = strapgen.backend("dcm", "rk1", 2)
     motion = strapgen.motion(table.motion, **table.settings)
     between = strapgen.simulate(backend, motion, "1/8", 180, 5)

@@ -135,6 +135,13 @@ _DEGREE, _MOST_TERMS = 2, 60
 _SMALLER = 1 + Fraction(1, 1000)
 
 
+# Writes a call in fixed point as a script for Gappa: the integers as the C rounds them, beside the exact program.
+#
+# Every value has three names: ``c_x`` is the number that the integer in the C stands for, ``e_x`` what the same sum
+# is in exact arithmetic, and ``x_x`` is the value of the exact program. The script claims how far the outputs of the
+# C are from the results of the exact program; that ``e_x`` is the same as ``x_x`` is an identity, which Gappa checks.
+
+
 def fixed_script(fixed: FixedProgram) -> Script:
     """Return the script of one call of a program in fixed point."""
     return _FixedScriptWriter(fixed).script

@@ -103,6 +103,13 @@ class _Term:
     named: Sequence[sp.Expr]  # the same in the symbols of stages, where there are such
 
 
+# Derivatives of covariant functions of vectors, which keep their form: few products, each written once.
+#
+# A function is a sum of tensors T_c(u), each times a polynomial P_c in the scalar products s_kj = u_k . u_j. Its
+# derivative along an element of u_k is the sum of P_c dT_c plus, for every j, that element of u_j times the tensor
+# H_kj = sum_c dP_c/ds_kj T_c, twice where j is k. The tensors H do not depend on the direction.
+
+
 class CovariantFunction:
     """A covariant quaternion, vector (a quaternion with scalar 0) or matrix, and its derivatives, as stages.
 

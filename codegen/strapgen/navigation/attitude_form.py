@@ -26,6 +26,13 @@ _SMALL = 0.5
 _TERMS = 12
 
 
+# What the first-order attitude in a slow cycle, equation (47), costs in velocity: exact series and closed form.
+#
+# At a constant rate w and acceleration a across it, over a cycle T, with the angle phi = |w| T, A(t) = I + [beta x]
+# makes the velocity increment too large by 1 - sin(phi)/phi of itself along a, and by phi/2 - (1 - cos(phi))/phi
+# across a and w. The leading term of what is missing is (T^3/6) w x (w x a).
+
+
 def along_series(terms: int) -> dict[int, Fraction]:
     """Return the series of the error along the acceleration, by powers of phi.
 

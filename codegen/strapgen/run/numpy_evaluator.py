@@ -308,6 +308,14 @@ class _BlockedScan:
         return view
 
 
+# A blocked scan over the transitions of a run, which has the state after every step in few calls of numpy.
+#
+# The state after n steps is the product of n transitions, and the product is associative. The steps are therefore cut
+# into blocks whose products grow side by side, as in a parallel prefix sum: Python loops over the places in a block,
+# numpy over the blocks. Arrays have the element first, (elements, depth, blocks, ...), so that every operation runs
+# over contiguous memory.
+
+
 def _cut(length: int, width: int) -> tuple[int, int]:
     """Return the number of blocks for a scan of `length` steps in `width` columns, and the places in each."""
     blocks = max(1, min(round(_WIDTH / width), length // 4))

@@ -212,6 +212,14 @@ def _sums(terms: Mapping[int, sp.Matrix]) -> list[str]:
     return vector_texts(terms, STEP)
 
 
+# The drift of a run has a part that grows with time and a part that stays bounded; both follow from the error rate.
+#
+# To first order in the error, the error matrix of a run is the integral of the error rate, carried along with the
+# motion. If the frame turns at a constant rate about an axis s, the component of the drift rate along s accumulates,
+# and the components across it oscillate with the angle |s| t. To the same order, orthonormalization does not change
+# the drift, and it prevents scale and skew from accumulating.
+
+
 @dataclass(frozen=True)
 class RunDrift(Record):
     """The drift of a run that begins at time 0."""

@@ -73,7 +73,7 @@ def attitude_conditions(attitude_step: Step, demand: Demand, more: int = 0) -> l
 
     >>> from strapgen import choose
     >>> step = one_step.step(choose("euler", "rk2"))
-    >>> for equation in conditions(step, Demand("general", 2), more=1):
+    >>> for equation in attitude_conditions(step, Demand("general", 2), more=1):
     ...     print(equation.order, equation.label, equation.value)
     3 h^3, drift: |w0|^2 w0 -1/24
     3 h^3, drift: w0 x w1 -1/6
@@ -172,7 +172,7 @@ def velocity_conditions(kernel: Kernel, demand: Demand, more: int = 0) -> list[E
 
     >>> from strapgen import choose, derive
     >>> step = derive(choose("velocity-position", "magnus2", 1))
-    >>> for equation in conditions(step, Demand("velocity", 2), more=1):
+    >>> for equation in velocity_conditions(step, Demand("velocity", 2), more=1):
     ...     print(equation.order, equation.label, equation.value)
     3 h^3, velocity: w0 x f1 -1/12
     3 h^3, velocity: w1 x f0 1/12
@@ -203,6 +203,16 @@ def velocity_conditions(kernel: Kernel, demand: Demand, more: int = 0) -> list[E
         for power, one in rows[part].items()
         for equation in state(part, power, one, count)
     ]
+
+
+# The conditions on the unknown coefficients of a step of velocity and position, up to an order.
+#
+# On a general motion the errors of the changes have to vanish up to a power of the step. On a polynomial motion, of
+# the degree that the samples determine, and on sculling they do so up to products of a rate and a force, for which
+# there are cross products of increments. Sculling is the rate u cos(omega t) with the force v cos(omega t + phase).
+# The mean of the cross product of the i-th derivative of the rate with the j-th of the force is then half of omega^(i
+# + j) cos((j - i) pi/2 + phase) u x v: the conditions hold at every phase if the even and the odd powers of the step
+# vanish, each by itself.
 
 
 def _of_small_motion(kernel: Kernel, count: int, top: int) -> dict[str, dict[int, Coefficients]]:

@@ -219,6 +219,13 @@ def weights(increments: int, previous: int = 0) -> tuple[Fraction, ...]:
         return tuple(Fraction(int(mpmath.nint(weight * 2**_BITS)), 2**_BITS) for weight in solution)
 
 
+# Coning coefficients that are shaped over a band of frequencies, in place of being exact at low ones.
+#
+# The rotation vector is d_0 + ... + d_(N-1) + (sum_s K_s d_(N-1-s)) x d_(N-1); `coning_drift` has its drift E(b) on
+# coning of the angular frequency b in rad a sample. The weights K_s are those of the least mean square of E over the
+# band 0 < b <= 1.3, which ends at a fifth of the sampling rate. They are rounded to multiples of 2^-60.
+
+
 def _sine_times_sine(m: int, n: int) -> mpmath.mpf:
     """Return the integral of sin(m b) sin(n b) over the band."""
     return (_cosine(m - n) - _cosine(m + n)) / 2

@@ -78,6 +78,14 @@ def series(
     return total
 
 
+# Taylor series of the transition in time, for a rate that is a polynomial of time: see `polynomial_rotation`.
+#
+# With three samples or more, and a motion that is fast for the sampling, the polynomial's coefficients grow with the
+# power of time and nearly cancel at the end of the step. A series that is cut off before they cancel is no rotation:
+# the state grows or shrinks from step to step. From three samples on the series therefore starts in the middle of the
+# step, so that time is at most half a step at both ends, and the result is normalized.
+
+
 def _rates(
     build: KernelBuilder,
     scale: sp.Rational,

@@ -268,6 +268,13 @@ def _moment(samples: Samples, power: int) -> sp.Matrix:
     return samples.combination(f"moment_{power}", samples.fit.moment(power), meaning)
 
 
+# Magnus series: the rotation vector of a step from integrals of the rate, and its exponential.
+#
+# The series of order 2 is the integral of the rate. The series of order 4 adds the complete term of second order in the
+# rate; that of order 6 adds the terms of third and fourth order up to the sixth power of the step. Coning drift is of
+# second order in the rate, so a step on more samples than its order needs gains from all of them.
+
+
 def _legendre_moment(samples: Samples, degree: int) -> list[sp.Expr]:
     """Return the weights of the samples in the integral over the step of the rate times a Legendre polynomial."""
     return [weight / (2 * degree + 1) for weight in samples.fit.legendre(degree)]

@@ -194,6 +194,14 @@ def _require_room(filters: FixedFilters, inputs: dict[str, Argument]) -> None:
 _BITS = 80
 
 
+# Bounds how far rounding moves the attitude of now in fixed point from exact arithmetic on the same integers.
+#
+# The attitude of now is the committed one after the intervals that wait: L of them in a run, p + L at the end of the
+# start, and those of a gap. In each of them three things add to the distance: the rounding of the step; for the step
+# from Legendre coefficients the rounding of these times their derivatives, which interval arithmetic bounds over all
+# samples; and the distance before the step times what a transition can stretch it.
+
+
 class Advance(NamedTuple):
     """What one step adds to the distance from exact arithmetic."""
 

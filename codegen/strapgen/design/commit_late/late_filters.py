@@ -159,6 +159,15 @@ _REAL = MPContext()
 _REAL.dps = 50
 
 
+# Filters that restore a lost sample from those on both sides of it, with or without the sum of it and the next one.
+#
+# The rate has no frequency above the band of a window, so that its increments are not independent: a lost one follows
+# from its neighbours within the band. The filter f makes the sum over `POINTS` frequencies b of the band of
+# |A_0(b)|^2 |sum_j f_j e^(ijb) - 1|^2 least, A_0 what a sample shows of the rate e^(ibt), with a small weight of the
+# squares of the taps. Their sum is 1, so that a constant rate is restored exactly. In 50 digits the taps come out alike
+# on every machine; they are rounded to multiples of 2^-60.
+
+
 class Restoration(NamedTuple):
     """The filters that restore a lost sample, the oldest tap first: those of samples -8 to 8, 0 the lost one."""
 

@@ -320,6 +320,15 @@ def least_absolute(answers: Answers, weights: Sequence[Any]) -> list[Any]:
     raise InputError("the coefficients of the least sum of drifts are not reached; fewer samples are needed")
 
 
+# Least weighted sum of absolute errors, exactly: from vertex to vertex, as the simplex method does.
+#
+# At a vertex as many errors are zero as there are unknowns. Its multipliers tell which of them to let go, and the
+# weighted median along the edge which error becomes zero in its place. All of it is in the integers and digits of
+# `band_grid`, so that a design is the same on every machine.
+#
+# Source: I. Barrodale, F. D. K. Roberts, SIAM J. Numer. Anal. 10 (1973) 839-848.
+
+
 def _multipliers(
     rows: Sequence[Sequence[Any]], errors: Sequence[Any], weights: Sequence[Any], active: Sequence[int]
 ) -> list[Any]:

@@ -199,6 +199,13 @@ def in_words(window: Window, bits: int) -> Window:
     return replace(window, filters=tuple(rows), conditions=exact, one_sided=(), start=())
 
 
+# Rounds the taps of filters to binary words, with the least largest error over the band that a search reaches.
+#
+# Not all conditions hold in binary words: the right sides 3/40 and 1/6 of the cubic and the square one are no binary
+# fractions. The sum of the taps and, but for a gyro, their first moment hold exactly; the others as nearly as a unit of
+# a tap lets them.
+
+
 class _Search:
     """The taps of one filter in words, and their errors in units of the words."""
 

@@ -147,6 +147,15 @@ class _Piece:
         return _product(self.attitude, _series_at(self.transition, time - self.middle))
 
 
+# Integrates a rate and the attitude that follows from it, with proved bounds of the error.
+#
+# Time is cut into pieces. About the middle of each the rate is a Taylor polynomial in 50 digits; a bound of the next
+# Taylor coefficient over the whole piece bounds what it leaves out. For the polynomial the attitude has a Taylor
+# series by (k + 1) C_(k+1) = sum_j C_j skew(w_(k-j)), whose remainder is that of its majorant, exp(sum_j |w_j|
+# t^(j+1)/(j + 1)). A rotation keeps lengths, so that an error of the rate, in rad/s, times the time bounds that of
+# the attitude in rad.
+
+
 class Integrated:
     """The integral of a rate, and the attitude, from time 0 as far as they are needed, forwards and backwards.
 
