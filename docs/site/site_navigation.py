@@ -45,7 +45,7 @@ SECTIONS = (
         "docs/paths/firmware.md",
         "You need C for a processor, with bounds that you can sign and tests that come with it.",
         _docs(
-            *("fixed-point", "design", "generated-code", "microcontrollers", "evidence"),
+            *("variants", "fixed-point", "design", "generated-code", "microcontrollers", "evidence"),
             *("check-foreign-code", "sensor-data", "redundancy"),
         ),
     ),

@@ -186,7 +186,7 @@ class Recursion:
 
     Examples
     --------
-    >>> Recursion((("sum", "next_sum"), ("previous", "next_previous")), retained=("previous",)).begun_anew
+    >>> Recursion((("sum", "next_sum"), ("previous", "next_previous")), retained=("previous",)).reset
     ('sum',)
     """
 

@@ -159,7 +159,7 @@ def _compared(
         return compare(
             choice,
             backends=names,
-            increments=increments,
+            samples=increments,
             reference=REFERENCE,
             truth=truth,
             settings=settings,

@@ -73,7 +73,7 @@ def attitude_conditions(attitude_step: Step, demand: Demand, more: int = 0) -> l
 
     >>> from strapgen import choose
     >>> step = one_step.step(choose("euler", "rk2"))
-    >>> for equation in conditions(step, Demand("general", 2), more=1):
+    >>> for equation in attitude_conditions(step, Demand("general", 2), more=1):
     ...     print(equation.order, equation.label, equation.value)
     3 h^3, drift: |w0|^2 w0 -1/24
     3 h^3, drift: w0 x w1 -1/6
@@ -172,7 +172,7 @@ def velocity_conditions(kernel: Kernel, demand: Demand, more: int = 0) -> list[E
 
     >>> from strapgen import choose, derive
     >>> step = derive(choose("velocity-position", "magnus2", 1))
-    >>> for equation in conditions(step, Demand("velocity", 2), more=1):
+    >>> for equation in velocity_conditions(step, Demand("velocity", 2), more=1):
     ...     print(equation.order, equation.label, equation.value)
     3 h^3, velocity: w0 x f1 -1/12
     3 h^3, velocity: w1 x f0 1/12

@@ -438,4 +438,4 @@ def _curves(
         (case.label, mean_rates.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
         for case in cases
     ]
-    return drawn, f"Errors under vibration, step {step} s\n{source.words}", marked
+    return drawn, f"Errors under vibration, step {step} s, {source.words}", marked

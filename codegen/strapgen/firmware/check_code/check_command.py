@@ -161,7 +161,7 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
     if live:
         typer.echo(f"{kernel.name}: {kernel.title}\n")
     findings = []
-    for finding in conformance.check(choice):
+    for finding in conformance.findings(choice):
         findings.append(finding)
         if live:
             typer.echo(conformance.finding_text(finding))

@@ -27,7 +27,7 @@ def increment_sum() -> Kernel:
     Returns: inputs ``sum`` (3,), which is zero at the start of every slower cycle, and ``increment`` (3,) of
     the faster cycle, in any unit and frame that they share; output ``next_sum`` (3,).
 
-    >>> increment_sum().recursion.begun_anew
+    >>> increment_sum().recursion.reset
     ('sum',)
     """
     build = KernelBuilder()
