@@ -139,7 +139,7 @@ def executing(executed: CoverageData, file: str, line: int) -> list[str]:
     subject, folder = path.stem, path.parts[2] if path.parts[0] == "codegen" else "targets"
     if path.parts[0] == "templates":
         subject = path.parts[1]
-        file, line = f"codegen/strapgen/targets/{subject}/emit.py", 0
+        file, line = filling(subject), 0
     elif path.suffix != ".py":
         file, line = "codegen/strapgen/catalogue/methods/tableaux.py", 0
     by_line = executed.contexts_by_lineno(file)
@@ -148,6 +148,15 @@ def executing(executed: CoverageData, file: str, line: int) -> list[str]:
     return sorted(
         functions, key=lambda test: (subject not in test, not test.startswith(f"tests/{folder}/"), test)
     )
+
+
+@cache
+def filling(folder: str) -> str:
+    """Return the module that fills the templates of a folder: a target of its name, or the first that names it."""
+    target = f"codegen/strapgen/targets/{folder}.py"
+    modules = [file for file in _files() if file.startswith("codegen/") and file.endswith(".py")]
+    named = (file for file in modules if re.search(rf"[\"'/]{folder}[\"'/]", (ROOT / file).read_text()))
+    return target if target in modules else next(named)
 
 
 # The runs

@@ -16,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import derived
+import numpy as np
 import pytest
 import typer.main
 from shared_results import shared_results  # noqa: F401
@@ -162,8 +163,7 @@ def missing(excerpt: str, text: str) -> list[str]:
 @pytest.mark.long
 def test_the_formulas_and_the_c_of_the_readme_are_what_its_python_prints(new_clone):
     _, done = new_clone
-    first_screen = "\n".join(README.splitlines()[:FIRST_SCREEN])
-    (formulas,), (code,) = blocks(first_screen, "text"), blocks(first_screen, "c")
+    (formulas,), (code,) = blocks(README, "text"), blocks(README, "c")
     assert 10 <= sum(line != "..." for line in code.splitlines()) <= 15
     printed = str(done["python"]["out"])
     assert missing(formulas, printed) + missing(code, printed) == []
@@ -180,8 +180,75 @@ def test_the_readme_is_short_and_begins_with_what_matters():
     assert len(lines) <= 120
     assert len(shown_commands(README)) <= 15
     first_screen = "\n".join(lines[:FIRST_SCREEN])
+    parts = ("| what you get |", "\n![", "pip install .", "```python\n", "```text\n", "```c\n")
+    places = [README.index(part) for part in parts]
+    assert places == sorted(places)
     assert len(re.findall(r"^!\[", first_screen, flags=re.MULTILINE)) == 1
     assert len(blocks(first_screen, "python")[0].splitlines()) <= 12
+
+
+def readme_row(start: str) -> str:
+    """Return the row of the first table of the README that begins with these words."""
+    (row,) = (line for line in README.splitlines() if line.startswith(f"| {start}"))
+    return row
+
+
+def readme_command(start: str) -> str:
+    (command,) = (command for command in shown_commands(README) if command.startswith(start))
+    return command
+
+
+def test_the_instructions_in_the_readme_are_those_of_the_page_on_cost():
+    """Which tests/test_microcontrollers.py measures."""
+    executed = re.findall(
+        r"^\| (.*?by hand|32 bits) \| \d+ \| (\d+) \|", DOCS["microcontrollers"], re.MULTILINE
+    )
+    ours, textbook, tuned = (dict(executed)[name] for name in ("32 bits", "by hand", "tuned by hand"))
+    assert re.search(rf"Cortex-M3 \| {ours} \| {textbook}, .*; {tuned}, ", readme_row("few instructions"))
+
+
+def test_the_bound_in_the_readme_is_that_of_its_header():
+    """The header in the README is what its Python prints, as another test sees."""
+    ((bound, ulp),) = re.findall(r"error <= (\S+) \((\S+) ulp\)", blocks(README, "c")[0])
+    words = f"| {float(bound):.2e}, or {float(ulp):.2f} units of the last place"
+    assert words in readme_row("a proved bound")
+
+
+@pytest.mark.long
+def test_the_drifts_in_the_readme_are_those_of_its_command(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    rows = json.loads(run(f"{readme_command('strapgen frontier')} --format json", capsys))["algorithms"]
+    ours, published = sorted(rows, key=lambda row: row["drift_deg_h"]["cone"])
+    assert "Ignagni" in published["source"] and ours["algorithm"].startswith("window-7-7")
+    cells = [
+        rf"{row['drift_deg_h']['cone']:.2g} °/h, .* {row['multiply_per_sample']:.0f} multiplications a sample"
+        for row in (ours, published)
+    ]
+    assert re.search(".*\\| ".join(cells), readme_row("little drift"))
+
+
+#: Pictures of the pages that a command on a page draws, by what its file of that command is called.
+DRAWN = {"cone-drift": "README", "orders": "paths/paper", "bounds": "paths/firmware"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("picture", DRAWN)
+def test_a_picture_is_what_the_command_beside_it_draws(picture, workplace):
+    """In a process of its own, since `shared_results` leaves the layout of figures out."""
+    text = README if DRAWN[picture] == "README" else DOCS[DRAWN[picture]]
+    (command,) = (c for c in shown_commands(text) if f"--plot out/{picture}.svg" in c)
+    main_program = [sys.executable, "-c", "from strapgen.cli import main; main()"]
+    subprocess.run([*main_program, *shlex.split(command)[1:]], check=True, capture_output=True)
+    # The names of clips depend on positions; the rest is text and numbers.
+    drawn, shown = (
+        re.sub(r'(?:url\(#|id=")p[0-9a-f]{10}', "", path.read_text())
+        for path in (Path(f"out/{picture}.svg"), ROOT / "docs" / f"{picture}.svg")
+    )
+    number = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+    assert re.sub(number, "#", drawn) == re.sub(number, "#", shown)
+    ours, theirs = (np.array(re.findall(number, one), float) for one in (drawn, shown))
+    # Pixels: the last digits of a mathematical library do not show.
+    np.testing.assert_allclose(ours, theirs, rtol=0, atol=0.5)
 
 
 # Links

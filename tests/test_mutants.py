@@ -214,3 +214,11 @@ def test_the_longer_draw_takes_its_faults_from_the_way_to_integers_and_text():
     assert len({fault.key for fault in drawn}) == mutants.DRAWS["lowering"].count == 200
     folders = {Path(fault.site.file).parts[2] for fault in drawn}
     assert folders == {"fixedpoint", "lowering", "targets"}
+
+
+@pytest.mark.parametrize(
+    ("folder", "module"),
+    [("c_fixed", "targets/c_fixed.py"), ("system_svg", "navigation/systems/system_drawing.py")],
+)
+def test_templates_are_filled_by_their_module(folder, module):
+    assert mutants.filling(folder) == f"codegen/strapgen/{module}"

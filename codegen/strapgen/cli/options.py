@@ -242,7 +242,7 @@ class MethodOptions:
         option(
             "--previous",
             metavar="N",
-            help="Number of increments from before the step that it uses as well, 0 to 32.  [default: 0]",
+            help="Number of increments before the step that it also uses, 0 to 32.  [default: 0]",
         ),
     ] = None
     ahead: Annotated[
@@ -250,14 +250,14 @@ class MethodOptions:
         option(
             "--ahead",
             metavar="N",
-            help="Number of increments from after the step that it uses as well, 0 to 32.  [default: 0]",
+            help="Number of increments after the step that it also uses, 0 to 32.  [default: 0]",
         ),
     ] = None
     rates: Annotated[
         bool,
         option(
             "--rates",
-            help="Let the step take, in place of increments, body rates at the method's nodes, times the step length.",
+            help="Take body rates at the method's nodes, times the step length, in place of increments.",
         ),
     ] = False
 
@@ -266,8 +266,8 @@ class MethodOptions:
         option(
             "--constant",
             metavar="NAME=VALUE,...",
-            help="Value of the input NAME in its unit, row by row, which the code then has as a constant; or of an "
-            "unknown of your own algorithm.",
+            help="Value of the input NAME in its unit, row by row, as a constant in the code; or value of an unknown "
+            "of your own algorithm.",
         ),
     ] = None
 
@@ -276,7 +276,7 @@ class MethodOptions:
         option(
             "--layout",
             metavar="FILE",
-            help="TOML file with the gyros whose rate and acceleration separate separates.",
+            help="TOML file with the layout of gyros for the kernels separate and measure.",
         ),
     ] = None
 

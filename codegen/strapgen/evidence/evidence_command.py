@@ -35,7 +35,7 @@ def evidence(
         argument(
             "NAME...",
             help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file, "
-            "or a described system, of which every stage is examined.",
+            "or a described system, all of whose stages are verified.",
             words="strapgen.catalogue.names:reserved",
         ),
     ] = None,
@@ -81,11 +81,11 @@ def evidence(
     ] = False,
     format: Annotated[str, format_option(_FORMATS)] = "text",
 ) -> None:
-    """Have independent tools examine what generated C promises.
+    """Verify the generated C with external tools.
 
-    From the program of the C come a harness for Frama-C, formulas for a solver, a script for Gappa, runners for
-    processors and a driver for a fuzzer. The tools that are installed say whether any sum can overflow, whether the
-    error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
+    The command writes a harness for Frama-C, formulas for SMT solvers, a script for Gappa, test programs for processors
+    and a driver for a fuzzer, and runs the tools that are installed. They show whether any sum can overflow, whether
+    the error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
 
     Example: strapgen evidence euler --method rk4 --out out/evidence
     """

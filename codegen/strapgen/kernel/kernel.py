@@ -314,7 +314,7 @@ class KernelBuilder:
         expressions : iterable of Expr
             Its elements in the next call.
         output : Signal, optional
-            By default the input's signal with "next_" before its names.
+            By default the input's signal with ``next_`` before its names.
         reset : bool, optional
             Whether the input is zero again at the start of each cycle of a slower loop.
 

@@ -142,7 +142,7 @@ def _compared(
         rows = comparison.compare(
             choice,
             backends=backends,
-            increments=inputs.increments,
+            samples=inputs.increments,
             reference=reference,
             truth=inputs.truth,
             settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),

@@ -57,7 +57,7 @@ def study_sensor_errors(
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     output: Output,
 ) -> None:
-    """Show how far sensors with errors lead an attitude astray, over many runs and as predicted in closed form.
+    """Measure the attitude error due to sensor errors over many runs, beside its prediction in closed form.
 
     All causes run together, and then each alone. You see the mean and the standard deviation of the error on each axis
     at the end, with intervals of 95 %, beside what covariance predicts; --plot draws the deviations over time.

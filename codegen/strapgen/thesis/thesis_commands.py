@@ -121,10 +121,10 @@ def runnable() -> tuple[str, ...]:
 
 @grouped
 def statements(*, output: Annotated[Output, Shown(only=TEXT_OUTPUT)]) -> None:
-    """Run the statements of the thesis's text, and say whether they hold.
+    """Test the statements of the thesis's text by runs.
 
-    Chapter 5 of the thesis says more than its tables show. Each of fourteen statements stands beside the numbers of the
-    runs that test it, and a verdict.
+    Chapter 5 of the thesis makes fourteen statements beside its tables. Each is shown with the numbers of the runs that
+    test it, and a verdict.
 
     Example: strapgen statements --format markdown
     """

@@ -323,14 +323,14 @@ def vibration(
     source: VibrationSource,
     output: VibrationOutput,
 ) -> None:
-    """Show the drift that an algorithm computes under vibration.
+    """Show the drift of an algorithm under vibration.
 
-    You see the mean drift rate about z that it computes, the true one, and the error. The angles are X sin(2 pi f t)
+    You see the computed mean drift rate about z, the true one, and the error. The angles are X sin(2 pi f t)
     about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too. The rates are closed forms to
     second order in the amplitudes, derived from the algorithm itself. Several methods, or numbers of increments, are
     shown side by side.
 
-    Of a kernel of your own that holds unknowns you see the closed forms, without numbers of a vibration.
+    For your own kernel with unknowns you see the closed forms alone.
 
     For a fast loop alone, the continuous and the computed rate leave out a term in the slow cycle T_m: the slow loop
     adds that to both, so that the error is that of both loops.
@@ -441,4 +441,4 @@ def _curves(
         (case.label, mean_rates.curve(case.assessment, hertz, step, cycles=case.cycles, **source.amplitudes))
         for case in cases
     ]
-    return drawn, f"Errors under vibration, step {step} s\n{source.words}", marked
+    return drawn, f"Errors under vibration, step {step} s, {source.words}", marked

@@ -126,13 +126,13 @@ def check(
     foreign: ForeignOptions,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Test what every attitude step must do; exit with 1 if it fails.
+    """Run the conformance tests; exit 1 on failure.
 
     Identities are checked in arithmetic of 40 digits, the order is measured on a ladder of step lengths, and every back
-    end is compared with exact arithmetic. A line that begins with a dash is a measurement that has no limit to pass.
+    end is compared with exact arithmetic. A line that begins with a dash is a measurement without a limit.
 
-    A function in a file of C or C++ is compiled, run along motions with known attitude, and held to the same behaviour.
-    If it fails, the likely cause is named.
+    A function in a file of C or C++ is compiled, run along motions with known attitude, and put to the same tests. If
+    it fails one, the likely cause is named.
 
     Example: strapgen check examples/modified_rodrigues.py
 
@@ -171,7 +171,7 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
     if live:
         typer.echo(f"{kernel.name}: {kernel.title}\n")
     findings = []
-    for finding in conformance.check(choice):
+    for finding in conformance.findings(choice):
         findings.append(finding)
         if live:
             terminal.write(conformance.finding_text(finding))
