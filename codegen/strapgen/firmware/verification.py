@@ -20,7 +20,7 @@ from strapgen import pipeline
 from strapgen.firmware.vectors import MODEL, vectors_of_choice
 from strapgen.firmware.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError, InputError
-from strapgen.ir.fixed_settings import TURNING
+from strapgen.ir.fixed_settings import ROTATION_INPUTS
 from strapgen.ir.formats import float_above, places_above
 from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.sources import Sources
@@ -467,7 +467,7 @@ def _identity(sources: Sources) -> list[int]:
 
 def _cone(interface: Interface) -> Array | None:
     """Return the increments of a cone whose angles are near the largest ones; None for what is no step."""
-    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in TURNING:
+    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in ROTATION_INPUTS:
         return None
     argument = interface.inputs[1]
     angles = np.arange(STEPS * argument.signal.size // 3) * (math.pi / 37)

@@ -18,7 +18,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import TURNING, Settings, rounded_limit
+from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings, rounded_limit
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Value
 from strapgen.ir.interfaces import Argument
@@ -261,12 +261,12 @@ def state_fraction(word: int, largest: Fraction) -> int:
 def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> Fraction:
     """Return the largest magnitude of the elements of an input."""
     if signal.name in settings.ranges:
-        if signal.constraint or signal.name in TURNING:
+        if signal.constraint or signal.name in ROTATION_INPUTS:
             raise InputError(
                 f"the range of {signal.name} follows from the drift allowance and the largest angle; it takes no other"
             )
         return settings.ranges[signal.name]
-    if signal.name in TURNING:
+    if signal.name in ROTATION_INPUTS:
         return settings.largest_angle
     if signal.constraint:
         return (signal.bound or Fraction(1)) + settings.allowance

@@ -75,7 +75,8 @@ class Backend:
     dtype : dtype
         Type of its states.
     takes : str
-        Name of the step's second input: "increments", or "turns" where a step takes rates at nodes times its length.
+        Name of the step's second input: "increments", or "node_rotations" where a step takes rates at nodes times its
+        length.
     increments : int
         Number of increments of a step.
     previous, ahead : int

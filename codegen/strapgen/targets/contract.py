@@ -9,7 +9,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 
-from strapgen.ir.fixed_settings import TURNING, Settings
+from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings
 from strapgen.ir.formats import Format, above, below, places_above
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.interfaces import (
@@ -80,7 +80,7 @@ def options(settings: Settings, inputs: Iterable[Signal] = (), *, keep_stated: b
     if keep_stated and settings.stated:
         largest = settings.stated
         words.append(largest)
-    elif any(signal.name in TURNING for signal in inputs):
+    elif any(signal.name in ROTATION_INPUTS for signal in inputs):
         largest = settings.stated or f"--max-angle-rad {settings.largest_angle}"
         words.append(largest)
     if settings.sensor is not None and settings.sensor.stated not in largest:

@@ -278,12 +278,18 @@ WRONG = {
     "nodes of increments": (
         ",) * 9)",
         ",) * 9, nodes=(0,))",
-        "takes increments and has nodes; nodes go with turns",
+        "takes increments and has nodes; nodes go with node_rotations",
     ),
-    "no nodes": ('Signal("increments"', 'Signal("turns"', "its attitude_step needs as many different nodes"),
+    "no nodes": (
+        'Signal("increments"',
+        'Signal("node_rotations"',
+        "its attitude_step needs as many different nodes",
+    ),
     "a decimal node": (
         FROM_INCREMENTS,
-        FROM_INCREMENTS.replace('"increments"', '"turns"').replace(",) * 9)", ",) * 9, nodes=(0.5,))"),
+        FROM_INCREMENTS.replace('"increments"', '"node_rotations"').replace(
+            ",) * 9)", ",) * 9, nodes=(0.5,))"
+        ),
         "its nodes are (0.5,); whole numbers and fractions.Fraction are needed",
     ),
     "output": (
@@ -325,6 +331,18 @@ WRONG = {
         "one output of the shape of the state, (9,), is needed",
     ),
 }
+
+
+def test_old_name_of_node_rotations_warns(tmp_path):
+    text = (Path(__file__).parents[3] / "examples" / "rates_at_nodes.py").read_text()
+    (tmp_path / "mine.py").write_text(
+        text.replace(
+            "node_rotations_signal(NODES)", 'replace(node_rotations_signal(NODES), name="turns")'
+        ).replace("from fractions", "from dataclasses import replace\nfrom fractions")
+    )
+    with pytest.warns(DeprecationWarning, match="input turns of kernel .* is now node_rotations"):
+        kernel = strapgen.derive(str(tmp_path / "mine.py"))
+    assert kernel.inputs[1].name == "turns" and kernel.attitude_step.nodes
 
 
 def test_the_step_of_the_refusals_is_right(tmp_path):

@@ -15,6 +15,7 @@ from strapgen.analysis.vibration.waves import Expander, Expansion, Number, Shift
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.fixed_settings import NODE_ROTATIONS
 from strapgen.ir.signals import Signal
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel
@@ -27,7 +28,7 @@ F, T, T_L, T_M = sp.symbols("f T T_l T_m", positive=True)
 ANGLES, VELOCITIES = ("angle_x", "angle_y"), ("velocity_x", "velocity_y")
 CHANNELS = (*ANGLES, *VELOCITIES)
 #: Names of inputs that are samples of the vibration.
-SAMPLES = ("increments", "increment", "turns", "velocity_increments", "velocity_increment")
+SAMPLES = ("increments", "increment", *NODE_ROTATIONS, "velocity_increments", "velocity_increment")
 #: Kernels of the catalogue that accumulate sums over a slow cycle.
 RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
 #: Vectors of a step that have a mean rate.
@@ -134,7 +135,7 @@ def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction
         times=times,
         watched=_rotation_about_z(expander, matrix),
         unit="rad",
-        rates=sampled[0].name == "turns",
+        rates=sampled[0].name in NODE_ROTATIONS,
     )
 
 
@@ -202,7 +203,7 @@ def _of_vector(
         times=times,
         watched=watched,
         unit=output.unit,
-        rates=sampled[0].name == "turns",
+        rates=sampled[0].name in NODE_ROTATIONS,
     )
 
 
@@ -285,7 +286,7 @@ def _waves(
     cycle: sp.Symbol = T,
 ) -> tuple[dict[str, dict[str, Wave]], tuple[sp.Expr, ...], Shift]:
     """Return the responses of the samples to the channels, the basic times in s, and the cycle as a shift."""
-    if sampled[0].name == "turns":
+    if sampled[0].name in NODE_ROTATIONS:
         return _waves_of_rates(expander, kernel, sampled[0], nodes, cycle)
     previous = beside[0]
     counts = {signal.size // 3 - sum(beside) for signal in sampled}

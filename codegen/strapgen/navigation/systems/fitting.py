@@ -11,7 +11,7 @@ from strapgen import pipeline, targets
 from strapgen.fixedpoint.format_plan import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings, rounded_limit
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, ROTATION_INPUTS, Settings, rounded_limit
 from strapgen.ir.formats import Format
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Operation, Program, Reference
@@ -206,7 +206,7 @@ class _Fit:
             largest = self._range(stage, known, sources[known], signal)
             if signal.constraint or largest is None:
                 continue
-            if wire.input in TURNING:
+            if wire.input in ROTATION_INPUTS:
                 angle = largest
             else:
                 ranges[wire.input] = largest

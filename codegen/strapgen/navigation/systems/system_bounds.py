@@ -11,7 +11,7 @@ from strapgen.fixedpoint.floating.errors import Expression, Expressions, NoBound
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, ROTATION_INPUTS, Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
 from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
@@ -131,9 +131,9 @@ class _Pass:
         plain = {
             signal.name: limits[signal.name]
             for signal in program.inputs
-            if not signal.constraint and signal.name not in TURNING
+            if not signal.constraint and signal.name not in ROTATION_INPUTS
         }
-        angle = max((limits[name] for name in TURNING if name in limits), default=DEFAULT_ANGLE)
+        angle = max((limits[name] for name in ROTATION_INPUTS if name in limits), default=DEFAULT_ANGLE)
         result = rounding_bounds(
             program, TARGETS[self.fit.target].number, Settings(ranges=plain, largest_angle=angle)
         )
