@@ -37,7 +37,7 @@ from strapgen.fixedpoint.quantities import (
     Quantity,
     Sum,
 )
-from strapgen.fixedpoint.quantization import _planned, _walked
+from strapgen.fixedpoint.quantization import _plan, _walk
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.ir.kernel_info import KernelInfo
@@ -282,8 +282,8 @@ def behind_transition(code: Program, values: dict[str, Fraction]) -> list[Fracti
 def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng):
     """The transition, and the state of the computed transition, less what is fed back of them, are off by so little."""
     code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12, rounding=rounding, carry="full")
-    exact, plan = _planned(code, settings)
-    context = _walked(code, settings, exact, plan, {})
+    exact, plan = _plan(code, settings)
+    context = _walk(code, settings, exact, plan, {})
     result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
     errors = step_errors(context, code.transition, result)
     after = exact.results[code.outputs[0].signal.name]
@@ -324,8 +324,8 @@ def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng)
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
 def test_increments_rounded_to_their_format_move_the_transition_by_what_is_told(algorithm):
     code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12)
-    exact, plan = _planned(code, settings)
-    context = _walked(code, settings, exact, plan, {})
+    exact, plan = _plan(code, settings)
+    context = _walk(code, settings, exact, plan, {})
     result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
     errors = step_errors(context, code.transition, result)
     part, argument = code.transition_program(), plan.inputs[1]

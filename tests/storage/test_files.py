@@ -372,8 +372,8 @@ def test_where_there_are_no_locks_age_decides(tmp_path, monkeypatch, age, is_for
 
 
 def test_a_draft_that_another_process_takes_at_once_is_made_again(tmp_path, monkeypatch):
-    locked, answers = drafts._locked, [None, None]
-    monkeypatch.setattr(drafts, "_locked", lambda place: answers.pop() if answers else locked(place))
+    locked, answers = drafts._lock, [None, None]
+    monkeypatch.setattr(drafts, "_lock", lambda place: answers.pop() if answers else locked(place))
     with drafts.draft_folder(tmp_path, ".draft-") as place:
         assert list(tmp_path.iterdir()) == [place]
 
@@ -390,7 +390,7 @@ def test_a_temporary_folder_of_a_killed_process_is_removed_by_the_next_one(tmp_p
 
 
 def test_a_busy_folder_is_an_error_and_no_endless_loop(tmp_path, monkeypatch):
-    monkeypatch.setattr(drafts, "_locked", lambda _: None)
+    monkeypatch.setattr(drafts, "_lock", lambda _: None)
     with pytest.raises(OSError, match="busy"), drafts.draft_folder(tmp_path, ".draft-"):
         raise AssertionError
     assert list(tmp_path.iterdir()) == []

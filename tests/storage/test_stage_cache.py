@@ -68,7 +68,7 @@ def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, 
 
     monkeypatch.setattr(cache, "stored", noted)
     for key in ("a", "b", "a", "c", "a", "b"):
-        assert cache._remembered("kind", [key], "", lambda key=key: key, False) == key
+        assert cache._load("kind", [key], "", lambda key=key: key, False) == key
     assert asked == ["a", "b", "c", "b"]
 
 

@@ -30,7 +30,7 @@ from strapgen.kernel.kernel import Kernel
 from strapgen.run.backends import of_sources
 from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
 from strapgen.storage import resources
-from strapgen.targets.c_fixed import _noted
+from strapgen.targets.c_fixed import _with_comment
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
 CHOICES = [choice for choice in FIXED_POINT if not (choice.method and choice.name == "cayley-klein")]
@@ -219,8 +219,8 @@ def test_a_note_stands_behind_a_statement_as_long_as_the_line_has_room():
     statement, end = "x = y;", " /* note */"
     for width in (95, 96):
         padded = statement.rjust(width - len(end))
-        assert _noted(padded, "note") == padded + (end if width == 95 else f"\n       {end}")
-    assert _noted(f"{'x' * 95}\n{statement}", "note") == f"{'x' * 95}\n{statement}{end}", (
+        assert _with_comment(padded, "note") == padded + (end if width == 95 else f"\n       {end}")
+    assert _with_comment(f"{'x' * 95}\n{statement}", "note") == f"{'x' * 95}\n{statement}{end}", (
         "the last line counts"
     )
 

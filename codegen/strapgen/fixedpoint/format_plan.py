@@ -200,7 +200,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
             continue
         largest = largest_magnitude(program, signal, settings)
         if signal in counted(program) and settings.input_bits is not None:
-            stated.append(_counted(signal, largest, settings, settings.input_bits))
+            stated.append(_counts_format(signal, largest, settings, settings.input_bits))
             continue
         text = _stated_format(settings, signal)
         if text is not None:
@@ -221,7 +221,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
     return stated
 
 
-def _counted(signal: Signal, largest: Fraction, settings: Settings, bits: int) -> Limit:
+def _counts_format(signal: Signal, largest: Fraction, settings: Settings, bits: int) -> Limit:
     """Return the range of increments of so many bits: counts of a gyro, or numbers in the format that fits best."""
     if signal.name in settings.formats:
         raise InputError(f"the format of {signal.name} follows from their bits; it takes no other")
@@ -241,7 +241,7 @@ def ranges_of_copies(program: Program, settings: Settings, copied: Mapping[str, 
     accepted = {}
     for signal in counted(program):
         largest = largest_magnitude(program, signal, settings)
-        argument = _counted(signal, largest, settings, settings.input_bits).argument(0)
+        argument = _counts_format(signal, largest, settings, settings.input_bits).argument(0)
         accepted[signal.name] = rounded_limit(max(-argument.low, argument.high) * argument.unit)
     return {state: accepted[name] for state, name in copied.items() if name in accepted}
 

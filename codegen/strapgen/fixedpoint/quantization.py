@@ -49,10 +49,10 @@ _WORSE = Fraction(101, 100)
 
 def lowered(program: Program, settings: Settings) -> FixedProgram:
     """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
-    quantities, plan = _planned(program, settings)
-    finest = _walked(program, settings, quantities, plan, {})
+    quantities, plan = _plan(program, settings)
+    finest = _walk(program, settings, quantities, plan, {})
     coarser = aligning(finest.body, finest.values, plan.forced)
-    shorter = _walked(program, settings, quantities, plan, coarser)
+    shorter = _walk(program, settings, quantities, plan, coarser)
     context, fixed = finest, _fixed_program(finest)
     aligned = _fixed_program(shorter)
     if not _is_worse(aligned, fixed):
@@ -71,7 +71,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     return replace(fixed, interface=interface)
 
 
-def _planned(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:
+def _plan(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:
     """Return the exact quantities and the formats of the inputs, with guard bits if they make sums of inputs exact."""
     stated = limits(program, settings)
     first = _with_guard_bits(program, settings, stated, 0)
@@ -104,7 +104,7 @@ def _splits(program: Program, settings: Settings) -> bool:
     return settings.carry == "state" or (settings.carry == "full" and through_vector)
 
 
-def _walked(
+def _walk(
     program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, most: Mapping[str, int]
 ) -> Quantization:
     """Lower the quantities one by one, and return all that is known then."""
@@ -132,12 +132,12 @@ def _feedback_names(program: Program, settings: Settings, quantities: Quantities
     if settings.carry == "none":
         return {}
     elements = [
-        name for result in _handed_on(program, settings) for name in quantities.results[result.signal.name]
+        name for result in _feed_back(program, settings) for name in quantities.results[result.signal.name]
     ]
     return {name: f"residual_{name}" for name in elements if isinstance(name, str)}
 
 
-def _handed_on(program: Program, settings: Settings) -> list[Result]:
+def _feed_back(program: Program, settings: Settings) -> list[Result]:
     """Return the results whose rounding errors go into the next call."""
     first, result = program.inputs[0], program.outputs[0]
     is_state = (first.shape, first.constraint) == (result.signal.shape, result.signal.constraint)

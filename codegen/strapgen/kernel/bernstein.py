@@ -124,7 +124,7 @@ def eigenvalue_bounds(
     if not largest:
         return Fraction(0), Fraction(0)
     unit = largest / (1 << _BITS)
-    reached = np.array([_reached(form, unit * common, samples) for form, common in forms])
+    reached = np.array([_sampled_eigenvalues(form, unit * common, samples) for form, common in forms])
     low, high = (
         _bound(
             [_BernsteinForms.of(form * sign, unit * common) for form, common in forms],
@@ -173,7 +173,9 @@ def _bernstein(matrix: Sequence[Sequence[Powers]]) -> tuple[NDArray[Any], int]:
     return form, common
 
 
-def _reached(form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]) -> tuple[float, float]:
+def _sampled_eigenvalues(
+    form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]
+) -> tuple[float, float]:
     """Return the smallest and the largest eigenvalue at points, in a unit."""
     values = (form * unit.denominator // unit.numerator).astype(np.float64)[None]
     for x in samples.T:

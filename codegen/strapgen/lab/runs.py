@@ -433,7 +433,7 @@ def _in_digits(motion: Motion, backend: Backend) -> tuple[_Steps, _Truth]:
     """Return the increments of the steps of a back end, and the true attitude, of a motion."""
     if isinstance(motion, UsersMotion):
         return _of_functions(motion, backend)
-    row, truth = _integrated(motion) if isinstance(motion, RateMotion) else _closed(motion)
+    row, truth = _of_rate(motion) if isinstance(motion, RateMotion) else _of_catalogue(motion)
     samples = backend.increments
 
     def steps_of(length: Fraction, count: int) -> Iterator[list[Any]]:
@@ -444,7 +444,7 @@ def _in_digits(motion: Motion, backend: Backend) -> tuple[_Steps, _Truth]:
     return steps_of, truth
 
 
-def _closed(motion: Motion) -> tuple[_Row, _Truth]:
+def _of_catalogue(motion: Motion) -> tuple[_Row, _Truth]:
     """Return the increments and the attitude of a motion of the catalogue."""
     if motion.name not in MOTIONS:
         raise InputError(
@@ -461,7 +461,7 @@ def _closed(motion: Motion) -> tuple[_Row, _Truth]:
     return row, lambda time: list(truth([number(time)], *parameters))
 
 
-def _integrated(motion: RateMotion) -> tuple[_Row, _Truth]:
+def _of_rate(motion: RateMotion) -> tuple[_Row, _Truth]:
     """Return the increments and the attitude of a rate expression."""
     return motion.samples_in_digits, motion.attitude_in_digits
 

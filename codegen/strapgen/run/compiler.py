@@ -148,7 +148,7 @@ def load(sources: Sources) -> Any:
     if key not in _loaded:
         with timed("build", f"{sources.kernel} for {sources.target}"):
             if _compiler_of(sources):
-                _loaded[key] = _compiled(sources)
+                _loaded[key] = _compile_module(sources)
             elif language == "Python":
                 _loaded[key] = _import_text(sources)
             else:
@@ -213,7 +213,7 @@ def _import_text(sources: Sources) -> ModuleType:
     return module
 
 
-def _compiled(sources: Sources) -> Any:
+def _compile_module(sources: Sources) -> Any:
     key = build_key([sources])
 
     def module() -> Any:

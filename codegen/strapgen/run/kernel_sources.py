@@ -89,10 +89,10 @@ class StepSources:
         if isinstance(known, str):
             raise InputError(known)
         if known is None:
-            known = self.beside[kernel, target] = self._generated(kernel, target)
+            known = self.beside[kernel, target] = self._generate(kernel, target)
         return known
 
-    def _generated(self, kernel: str, target: str) -> Sources:
+    def _generate(self, kernel: str, target: str) -> Sources:
         fixed = self.step.fixed if target == self.step.target else None
         settings = fixed.companion_settings if fixed else None
         if self.choice is not None:

@@ -302,9 +302,9 @@ def _angle(value: float) -> str:
 def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
     """Return the bounds of a program with the names that are printed."""
     # A value on the way may have the name of an input or of an output.
-    inputs = _renamed([s.name for s in program.inputs], [s.name for s in named.inputs])
-    values = _renamed([a.name for a in program.body], [a.name for a in named.body])
-    outputs = _renamed([r.signal.name for r in program.outputs], [r.signal.name for r in named.outputs])
+    inputs = _rename([s.name for s in program.inputs], [s.name for s in named.inputs])
+    values = _rename([a.name for a in program.body], [a.name for a in named.body])
+    outputs = _rename([r.signal.name for r in program.outputs], [r.signal.name for r in named.outputs])
 
     def renamed(condition: Condition, names: dict[str, str]) -> Condition:
         words, space, name = condition.value.rpartition(" ")
@@ -318,7 +318,7 @@ def with_names(bounds: RoundingBounds, program: Program, named: Program) -> Roun
     )
 
 
-def _renamed(names: list[str], printed: list[str]) -> dict[str, str]:
+def _rename(names: list[str], printed: list[str]) -> dict[str, str]:
     return dict(zip(names, printed, strict=True))
 
 

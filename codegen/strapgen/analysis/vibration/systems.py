@@ -79,7 +79,7 @@ def of(
 
     `unit`: for a recursion that sums coning and sculling, the one to assess: "rad" or "m/s".
     """
-    sampled = [signal for signal in checked(kernel).inputs if signal.name in SAMPLES]
+    sampled = [signal for signal in require_kernel(kernel).inputs if signal.name in SAMPLES]
     if not any(signal.unit == "rad" for signal in sampled):
         raise InputError(
             f"kernel {kernel.name} takes no samples of a vibration; allowed: {', '.join(NAMES)}, or a kernel of your "
@@ -99,7 +99,7 @@ def _check_beside(signal: Signal, previous: int, ahead: int) -> None:
     checks.count("ahead", ahead, smallest=0, largest=signal.size // 3 - 1 - before)
 
 
-def checked(kernel: Any) -> Kernel:
+def require_kernel(kernel: Any) -> Kernel:
     """Return the argument if it is a kernel."""
     if not isinstance(kernel, Kernel):
         raise InputTypeError(f"kernel is {kernel!r}; a Kernel is needed")
