@@ -117,7 +117,7 @@ def _needs(command: Any, name: str, context: Any) -> str:
 
 
 def _meaning(parameter: Any, context: Any) -> str:
-    """Return the help of a parameter, to stand behind a colon."""
+    """Return the help of a parameter, for use after a colon."""
     text = re.sub(r"\s*\[.*\]$", "", _help_text(parameter, context)).rstrip(".")
     return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
 
@@ -305,7 +305,7 @@ def _add_own(*names: str) -> None:
 
 
 def _add_asked(words: Sequence[str], completing: bool) -> None:
-    """Add the command of a command line alone; all of them where that is not enough, or a shell completes words."""
+    """Add only the command of a command line; all commands if that is not enough or a shell completes words."""
     asked = next((word for word in words if not word.startswith("-")), "")
     if completing or (asked and asked not in _OWN):
         _add_own(*_OWN)

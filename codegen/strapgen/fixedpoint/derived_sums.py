@@ -234,7 +234,7 @@ def store(
 
 
 def stem(name: str) -> str:
-    """Return a name without the suffixes of operations: of a part of a part, the last suffix says enough."""
+    """Return a name without the suffixes of operations; a part of a part keeps the last suffix only."""
     for suffix in (*_SUFFIXES.values(), "numerator", "denominator"):
         name = name.removesuffix(f"_{suffix}")
     return name

@@ -95,7 +95,7 @@ def _with_guard_bits(
 
 
 def _splits(program: Program, settings: Settings) -> bool:
-    """Tell whether the increments are split off the transition: where the rounding of that has no feedback of its own.
+    """Return whether the increments are split off the transition, whose rounding has no error feedback then.
 
     A rotation vector that is a word of its own is rounded before the transition, out of reach of the feedback.
     """
@@ -107,7 +107,7 @@ def _splits(program: Program, settings: Settings) -> bool:
 def _walk(
     program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, most: Mapping[str, int]
 ) -> Quantization:
-    """Lower the quantities one by one, and return all that is known then."""
+    """Lower the quantities one by one, and return the final state of the walk."""
     names = _feedback_names(program, settings, quantities)
     context = Quantization(program, settings, quantities, plan, most, names)
     for quantity in quantities.items.values():
@@ -138,7 +138,7 @@ def _feedback_names(program: Program, settings: Settings, quantities: Quantities
 
 
 def _feed_back(program: Program, settings: Settings) -> list[Result]:
-    """Return the results whose rounding errors go into the next call."""
+    """Return the results whose rounding errors are fed back into the next call."""
     first, result = program.inputs[0], program.outputs[0]
     is_state = (first.shape, first.constraint) == (result.signal.shape, result.signal.constraint)
     handed_on = [result] if is_state else []
@@ -173,7 +173,7 @@ def _fixed_program(context: Quantization) -> FixedProgram:
 
 
 def _require_last(context: Quantization) -> None:
-    """Refuse a program that goes on with a value that saturates: it may be far from the exact one."""
+    """Refuse a program that uses a saturated value further: it may be far from the exact one."""
     saturated = {value.name for value in context.body if value.saturated}
     for value in context.body:
         if saturated.intersection(used_by(value)):
@@ -423,7 +423,7 @@ _FED_BACK = 4
 
 
 def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Container[str]) -> dict[str, int]:
-    """Return, by name, the most fraction bits of values that are finer than the sums that use them can tell.
+    """Return, by name, the largest useful number of fraction bits of values that are finer than the sums that use them.
 
     In `body` every value has its finest format; values in `fixed` keep theirs.
     """

@@ -192,7 +192,7 @@ class Settings:
             Format.parse(text, self.word)
 
     def _check_inputs(self) -> None:
-        """Check the bits of an increment, and fill in those of a usual gyro."""
+        """Check the bits of an increment, and fill in the default for a gyro with counts."""
         if self.input_bits is None:
             object.__setattr__(self, "input_bits", self.default_input_bits)
         bits = self.input_bits

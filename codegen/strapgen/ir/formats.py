@@ -82,7 +82,7 @@ class Format:
 
 
 def finest(largest: Fraction, word: int) -> int:
-    """Return the most fraction bits with which a word holds a magnitude."""
+    """Return the largest number of fraction bits with which a word holds a magnitude."""
     top = (1 << (word - 1)) - 1
     if not largest:
         return word - 1

@@ -176,7 +176,7 @@ def _bernstein(matrix: Sequence[Sequence[Powers]]) -> tuple[NDArray[Any], int]:
 def _sampled_eigenvalues(
     form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Return the smallest and the largest eigenvalue at points, in a unit."""
+    """Return the smallest and the largest eigenvalue at sample points, as multiples of a unit."""
     values = (form * unit.denominator // unit.numerator).astype(np.float64)[None]
     for x in samples.T:
         degree = values.shape[2] - 1

@@ -31,7 +31,7 @@ def add_tangents(
     ending: str,
     unit: str,
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Add a stage for the change of every stage that changes, and return the changes of all symbols.
+    """Add a stage for the derivative of every stage that changes, and return the derivatives of all symbols.
 
     `ending` ends the names of these stages; where a stage is an angle in rad, its change has the `unit`.
 

@@ -61,7 +61,7 @@ def evaluate_stages(
     number: Callable[[sp.Rational], Any] | None = None,
     function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the given values together with those of all elements of the stages, each of which may use those before.
+    """Return the given values and those of all elements of the stages, evaluated in order.
 
     There is a value for every symbol that no stage defines; `number` and `function` are those of `algebra.evaluate`.
     """
@@ -121,7 +121,7 @@ class Kernel(KernelInfo):
 
     @property
     def info(self) -> KernelInfo:
-        """What programs and sources of the kernel have of it."""
+        """Names, source, orders and recursion, which programs and sources of the kernel keep."""
         return KernelInfo(**{field.name: getattr(self, field.name) for field in fields(KernelInfo)})
 
     @property

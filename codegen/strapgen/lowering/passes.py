@@ -101,7 +101,7 @@ def _scaled_product(node: Operation) -> Node:
 
 
 def scaling(node: Node) -> tuple[Fraction, Node | None]:
-    """Return a node as a number times another node; None stands for the latter if the node is a number."""
+    """Return a node as a factor and another node, which is None if the node is a number."""
     if isinstance(node, Constant):
         return node.value, None
     if isinstance(node, Operation):

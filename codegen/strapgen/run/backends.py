@@ -186,7 +186,7 @@ class Backend:
         return np.asarray(of_sources(self._parts.sources(self.attitude, NUMPY))(states))
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
-        """Return a certified bound of what rounding does to a run without orthonormalization.
+        """Return a certified bound of the rounding error of a run without orthonormalization.
 
         Parameters
         ----------
@@ -585,7 +585,7 @@ def backend(
 
 
 def sources_to_build(choice: Choice, backend: str, settings: Settings | None = None) -> list[Sources]:
-    """Return what a back end of an attitude step builds: the step, and the kernel that orthonormalizes its state.
+    """Return the sources that a back end of an attitude step builds: the step, and its orthonormalization.
 
     `strapgen.compile_together` compiles those of many steps in one call of the compiler.
     """

@@ -1,4 +1,4 @@
-"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into what each step takes."""
+"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into those of each step."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ class _Process:
         return [part.reshape(shape, order="F") for part, shape in zip(parts, shapes, strict=True)]
 
     def _path(self, sources: Sequence[Sources]) -> tuple[list[str], list[str]]:
-        """Return the folders that leave the path of Octave, and those that come, so that it has these very sources.
+        """Return the folders to remove from the path of Octave and those to add, so that it finds these sources.
 
         A change costs Octave many times what a call does: a folder stays until another has a function of the same name.
         """

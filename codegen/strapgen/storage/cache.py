@@ -158,7 +158,7 @@ def _fill(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
 
 
 def persistently(work: Callable[[], Result]) -> Result:
-    """Return what some work with entries returns; begin it again if another process removes one meanwhile.
+    """Return the result of work with entries; repeat it if another process removes one meanwhile.
 
     A clock that was set wrong makes entries look as if nobody had used them for long.
     """
@@ -262,7 +262,7 @@ def _hashes(folder: Path) -> dict[str, str]:
 
 
 def _is_whole(place: Path) -> bool:
-    """Return whether an entry is there, the user's alone and undamaged; one that is others' is told of."""
+    """Return whether an entry exists, undamaged and owned by the user; warn of one with another owner."""
     try:
         with ownership.private_folder(place, _PRIVATE) as folder:
             hashes = {name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST}

@@ -212,7 +212,7 @@ class StatementPrinter:
         return name
 
     def _declared(self, kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
-        """Return a declaration, its value on a line of its own where the first line would be too long."""
+        """Return a declaration, with its value on the next line if the first line would be too long."""
         indent, start = " " * 8, self.start(kind, name, constant)
         statement = fill_expression(f"{start} {text};", indent, 92)
         if len(statement.partition("\n")[0]) > 92:

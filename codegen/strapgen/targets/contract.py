@@ -117,7 +117,7 @@ def _accumulation_text(accumulation: RoundingAccumulation, program: Program, sta
 
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
-    """Return advice on normalizing the state of a step, before and after an error code; "" for another kernel."""
+    """Return the instructions on normalizing the state of a step; "" for another kernel."""
     if program.attitude_step is None or program.attitude_step.orthonormalize is None:
         return ""
     kernel = program.attitude_step.orthonormalize

@@ -258,7 +258,7 @@ def printed(
 
 
 def _choose(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]) -> dict[Key, str]:
-    """Return a name for every mark: the kernel's where it is free, otherwise a similar one."""
+    """Return a name for every mark: that of the kernel if it is free, otherwise a similar one."""
     reserved = [{name for name in scope if _MARK not in name} for scope in scopes]
     places: dict[str, list[tuple[str, set[str]]]] = {mark: [] for mark in marks.values()}
     for scope, names in zip(scopes, reserved, strict=True):

@@ -381,7 +381,7 @@ def _terms(form: Form) -> int:
 
 
 def _outlook(decomposition: Decomposition) -> int:
-    """Return a first guess at the number of operations of a decomposition."""
+    """Return a quick estimate of the number of operations of a decomposition."""
     polynomials = decomposition.coefficients()
     vectors = len(decomposition.vector) + len(decomposition.symmetric)
     axes = {c[0] for c in decomposition.symmetric if c}

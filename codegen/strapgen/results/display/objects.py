@@ -44,7 +44,7 @@ _DECIMALS = 4
 
 @singledispatch
 def latex(value: Any) -> str | None:
-    """Return an object as LaTeX; None where a reader would not see it at a glance."""
+    """Return an object as LaTeX; None if it is too long to read."""
     return None
 
 

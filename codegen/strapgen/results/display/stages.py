@@ -340,7 +340,7 @@ def _powers(letters: Sequence[str]) -> str:
 
 
 def _sum(terms: Sum, names: Mapping[str, str], products: Mapping[tuple[str, ...], str]) -> str:
-    """Return a sum of vectors and cross products; a weight of several terms stands in brackets."""
+    """Return a sum of vectors and cross products; a weight of several terms is in brackets."""
     text = ""
     for vector, weight in sorted(terms.items(), key=lambda term: len(term[0])):
         shown = r" \times ".join(names[name] for name in vector)
