@@ -161,6 +161,7 @@ def series(
             "--motion",
             metavar="NAME",
             help=f"Motion: general (any smooth rate), {MOTION_NAMES}, or a Python file with a rate in SymPy.",
+            words="strapgen.catalogue:MOTIONS",
             panel="Input",
         ),
     ] = "general",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import Needs, grouped, rules
 from strapgen.cli.options import Duration, GyroRate, option
 from strapgen.cli.output import Output
@@ -133,7 +134,7 @@ def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Pat
         brief, best, algorithm_named(best, brief, file), report, f"strapgen design {shlex.quote(str(file))}"
     )
     for path in SourceOptions(out=folder).write(files):
-        typer.echo(f"wrote {path}", err=True)
+        terminal.remark(f"wrote {path}")
 
 
 @dataclass(frozen=True)

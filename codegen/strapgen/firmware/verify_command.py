@@ -26,10 +26,10 @@ def verify(
     ],
     *,
     algorithms: Annotated[
-        list[str] | None,
+        tuple[str, ...] | None,
         option(
             "--algorithm",
-            metavar="NAME",
+            metavar="NAME,...",
             help="Your own algorithm that the header names; it runs as a program, and only if you name it here.",
             panel="Input",
         ),
@@ -58,8 +58,8 @@ def verify(
         if stated(source):
             raise InputError("a motion or a recording goes with the file of one function")
         output.check(header)
-        return _verify_whole(header, algorithms or [], run_differing, output)
-    request = header_command.header_command_of(file).request(algorithms or [])
+        return _verify_whole(header, algorithms or (), run_differing, output)
+    request = header_command.header_command_of(file).request(algorithms or ())
     increments = None
     if stated(source):
         source.check()
@@ -71,7 +71,7 @@ def verify(
         raise typer.Exit(1)
 
 
-def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, output: Output) -> None:
+def _verify_whole(header: Path, algorithms: tuple[str, ...], run_differing: bool, output: Output) -> None:
     """Verify the C of a system, of two speeds or of a commit-late unit; exit with 1 if it fails."""
     from strapgen.cli.progress import waiting
     from strapgen.firmware import header_command

@@ -51,6 +51,7 @@ class _Ladder:
             "--motion",
             metavar="NAME",
             help=f"Motion: {MOTION_NAMES}, or a Python file of your own.  [default: coning]",
+            words="strapgen.catalogue:MOTIONS",
             read=a_motion,
         ),
     ] = None

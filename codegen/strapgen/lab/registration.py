@@ -47,5 +47,6 @@ REGISTRATION = Registration(
         "random-runs": f"{__package__}.random_runs:RandomRunsResult",
         "sensor-errors": f"{__package__}.sensor_error_study:SensorErrorResult",
     },
+    extensions={"cli.processors": f"{__package__}.processors:PROCESSORS"},
     lists={"motions": f"{__package__}.motions.motions:titles"},
 )

@@ -444,6 +444,7 @@ class FlightOptions:
             "--force",
             metavar="NAME",
             help="Specific force in body axes: constant, random, oscillation, or lever for sensors on an arm.",
+            words=("constant", "random", "oscillation", "lever"),
         ),
     ] = "random"
     force_settings: Annotated[
@@ -553,6 +554,7 @@ def rate_table(
             metavar="NAME,...",
             help="Algorithms, with commas between: dcm, euler, cayley-klein, two-speed.  [default: all]",
             panel="Algorithm",
+            words=("dcm", "euler", "cayley-klein", "two-speed"),
         ),
     ] = None,
     method: Annotated[

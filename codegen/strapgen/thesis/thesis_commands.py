@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from strapgen.cli import terminal
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Excludes, Shown, grouped, rules
 from strapgen.cli.options import FastBackends, option
@@ -115,7 +114,7 @@ def runnable() -> tuple[str, ...]:
     try:
         compiler.C.path()
     except CompilerError as error:
-        typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
+        terminal.remark(f"strapgen: only numpy is shown: {error}")
         return ("numpy",)
     return DEFAULT_BACKENDS
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import MethodOptions, option
+from strapgen.cli.options import MethodOptions, argument, option
 from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
 from strapgen.cli.progress import waiting
 from strapgen.ir import checks
@@ -127,9 +127,10 @@ class TableauOutput(Output):
 def tableau(
     method: Annotated[
         str,
-        typer.Argument(
-            metavar="NAME|FILE",
+        argument(
+            "NAME|FILE",
             help="A Runge-Kutta method that strapgen list methods shows, or a TOML file with a tableau.",
+            words="strapgen.catalogue.methods.tableaux:TABLEAUX",
         ),
     ],
     *,

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 
 #: The damping of a gyro of second order, beside its natural frequency.
-GYRO_DAMPING = option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
+_DAMPING = "Damping of that gyro, as 0.7071."
+GYRO_DAMPING = option("--gyro-damping", metavar="RATIO", help=_DAMPING)
 #: Either option of that gyro needs the other
 GYRO_RULES = (Needs("--gyro-bandwidth-hz", "--gyro-damping"), Needs("--gyro-damping", "--gyro-bandwidth-hz"))
 
@@ -166,12 +167,14 @@ class VibrationSource:
         tuple[Positive, ...] | None,
         option(
             "--gyro-bandwidth-hz",
-            metavar="HZ",
+            metavar="HZ,...",
             help="Natural frequency of a gyro of second order, through which the algorithm sees the angles; X,Y for "
             "one about each axis.",
         ),
     ] = None
-    gyro_damping: Annotated[tuple[Positive, ...] | None, GYRO_DAMPING] = None
+    gyro_damping: Annotated[
+        tuple[Positive, ...] | None, option("--gyro-damping", metavar="RATIO,...", help=_DAMPING)
+    ] = None
 
     def through_gyro(self, assessment: Assessment) -> Assessment:
         """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
