@@ -385,7 +385,7 @@ def test_length_of_a_row_is_rounded_up():
     assert 5 <= commit_late_fixed._row_length(rows) < Fraction(5) + Fraction(1, 2**60)
 
 
-def test_transition_stretches_by_what_its_series_leaves_out():
+def test_transition_stretches_by_the_truncation_of_its_series():
     """At 1/4 rad the rotation vector is at least sqrt(3)/4 long, and a series to second order leaves out its third."""
     late = parts("window-3-3")
     program = commit_late_sources.pipeline.program(commit_late_sources.kernels(late.filters, "euler")[1])

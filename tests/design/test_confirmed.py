@@ -60,7 +60,7 @@ def judged(tmp_path, text, methods=METHODS):
         (STRONG, 5.7e-7, 0.041, ("4", "2", "3")),
     ],
 )
-def test_what_is_of_higher_order_is_predicted(text, first, ran, parts, tmp_path):
+def test_higher_order_drift_is_predicted(text, first, ran, parts, tmp_path):
     path, brief, ordered = judged(tmp_path, text)
     by_name = {one.name: one for one in ordered}
     one = by_name["euler coning-compressed:8"]

@@ -125,7 +125,7 @@ def test_a_file_that_exists_keeps_its_permissions(mode, tmp_path):
     assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("y", mode)
 
 
-def test_what_replaces_a_private_file_is_private_before_it_is_whole(tmp_path, monkeypatch):
+def test_replacement_of_a_private_file_is_private_from_the_start(tmp_path, monkeypatch):
     path = write_file(tmp_path / "a", "x")
     path.chmod(0o600)
     modes = []
@@ -238,7 +238,7 @@ def forgotten(folder: Path, *names: str) -> Path:
 
 
 @pytest.mark.parametrize("where", [".", "deep/er"])
-def test_what_a_killed_process_left_is_removed(tmp_path, where):
+def test_leftovers_of_killed_processes_are_removed(tmp_path, where):
     place = forgotten(tmp_path / where, "0", "1", "17")
     write_files(tmp_path, FILES)
     assert not place.exists()
@@ -313,7 +313,7 @@ def test_a_draft_is_private_and_gone_after_the_block(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_renamed_stays(tmp_path):
+def test_renamed_folders_stay(tmp_path):
     with drafts.draft_folder(tmp_path, ".draft-") as place:
         (place / "file").write_text("x")
         place.rename(tmp_path / "whole")

@@ -127,7 +127,7 @@ def test_a_widened_input_is_refused_and_nothing_is_touched():
                 assert (list(out) == [5] * 4 and list(residuals) == [7] * 8) == refused
 
 
-def test_what_is_refused_on_the_way_leaves_outputs_and_residuals_alone(rng):
+def test_refused_calls_leave_outputs_and_residuals_alone(rng):
     in_c, _ = pair(Choice("dcm-orthonormalize-second-order"), Settings(16, carry="full"))
     ffi, call = in_c.module.ffi, getattr(in_c.module.lib, in_c.function.name)
     (argument,) = in_c.interface.inputs
@@ -214,7 +214,7 @@ def test_strict_compilers_are_silent(word, methods, tmp_path):
         assert not done.returncode, done.stderr
 
 
-def test_a_note_stands_behind_a_statement_as_long_as_the_line_has_room():
+def test_note_follows_a_statement_if_the_line_has_room():
     """A function indents by 4, so that 95 of its own are 99 of the file."""
     statement, end = "x = y;", " /* note */"
     for width in (95, 96):

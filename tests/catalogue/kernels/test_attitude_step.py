@@ -199,7 +199,7 @@ def test_a_step_by_a_tableau_of_a_file_says_the_command_that_makes_it(tmp_path):
     assert kernel.source.endswith(HEUN.split('"')[3])
 
 
-def test_titles_count_what_is_given():
+def test_titles_count_the_given_samples():
     def given(*chosen: object, **rest: object) -> str:
         return derive("euler", *chosen, **rest).title.split(" from ")[1]
 

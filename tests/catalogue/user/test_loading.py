@@ -132,7 +132,7 @@ def test_names_of_the_catalogue_are_not_hidden_by_entry_points(monkeypatch):
 
 
 @pytest.mark.long
-def test_what_a_file_says_now_counts(folder):
+def test_changed_file_is_derived_anew(folder):
     assert strapgen.backend("picard.py").propagate(np.full((1, 2, 3), 0.1))[-1][3] < 1
     text = (folder / "picard.py").read_text()
     (folder / "picard.py").write_text(text.replace("1 - square / 2]", "1]"))
@@ -352,7 +352,7 @@ def test_the_step_of_the_refusals_is_right(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", WRONG)
-def test_what_cannot_be_used_is_refused_in_one_line(case, tmp_path, monkeypatch, capsys):
+def test_invalid_input_is_refused_in_one_line(case, tmp_path, monkeypatch, capsys):
     old, new, said = WRONG[case]
     assert STEP.count(old) == 1
     monkeypatch.chdir(tmp_path)
@@ -480,7 +480,7 @@ def test_a_program_is_the_same_polynomial_as_a_user_s_kernel(here):
     assert [ring(element) for element in result["next"]] == kernel.polynomials()["next"]
 
 
-def test_what_lies_beside_a_file_can_be_imported_and_what_it_prints_is_no_output(tmp_path, capsys):
+def test_neighbour_modules_import_and_their_prints_are_no_output(tmp_path, capsys):
     (tmp_path / "coefficients.py").write_text("FACTOR = 2\n")
     text = STEP.replace(
         "import sympy as sp", "import sympy as sp\nfrom coefficients import FACTOR\nprint('hello')"
