@@ -598,7 +598,7 @@ LONG = "x" * 5000
         f"{CONSTANT} {'x ' * 3000}",
     ],
 )
-def test_what_is_long_is_not_repeated_in_full(command, folder, capsys):
+def test_long_input_is_shortened_in_messages(command, folder, capsys):
     with pytest.raises(SystemExit) as stop:
         main(shlex.split(command))
     said = capsys.readouterr()

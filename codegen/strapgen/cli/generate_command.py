@@ -153,13 +153,13 @@ class SourceOptions:
         return write_files(folder, files)
 
     def compare(self, files: Mapping[str, str]) -> str:
-        """Return the difference of the files in the folder from generated ones; "" if there is none."""
+        """Return a diff from the files in the folder to generated ones; "" if there is none."""
         from strapgen.run.standard_tree import difference
 
         return difference(self.out or Path(), files)
 
     def show_difference(self, files: Mapping[str, str], format: str) -> None:
-        """Print the difference of the files in the folder from generated ones, and exit with 1 if there is one."""
+        """Print a diff from the files in the folder to generated ones, and exit with 1 if there is one."""
         folder, difference = self.out or Path(), self.compare(files)
         show_step(difference, format)
         if difference:
@@ -345,6 +345,6 @@ def show_step(difference: str, format: str) -> None:
 
 
 def refuse_out_of_step(folder: Path, again: str) -> None:
-    """Say on stderr that files differ from generated ones, and how to make them again; exit with 1."""
+    """Print to stderr that files differ from generated ones, with the command that makes them; exit with 1."""
     terminal.write(f"strapgen: {folder} is out of step; {again}", err=True)
     raise typer.Exit(1)

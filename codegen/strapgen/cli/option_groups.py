@@ -45,7 +45,7 @@ VARIANT = Parameter(
 
 
 def grouped(command: Command) -> Command:
-    """Let Typer read the options of a command, and give the command typed values and objects of its groups.
+    """Decorate a command for Typer, so that it takes typed values and objects of its groups of options.
 
     A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. Its class variable
     `panel` is the heading of its options, and `rules` says which of them go together.
@@ -118,7 +118,7 @@ class Group(NamedTuple):
 
 
 class CommandOptions:
-    """The options of a command in the order of its help, its groups, and the rules of what goes with what."""
+    """The options of a command in the order of its help, its groups, and the rules between options."""
 
     def __init__(self, command: Callable[..., Any]) -> None:
         self.options: dict[str, Option] = {}
@@ -215,7 +215,7 @@ def _option(name: str, hint: Any, default: Any, panel: str | None = None) -> Opt
 
 
 def stated(group: Any) -> dict[str, Any]:
-    """Return the options of a group that have not their defaults, with their values."""
+    """Return the options of a group whose values differ from the defaults."""
     return {
         option.spelling: value
         for option in _fields(type(group), ())
@@ -243,7 +243,7 @@ def command_line(command: str, *parts: Any, files_by_name: bool = False) -> str:
 
 
 def rules(*table: Rule) -> Callable[[Command], Command]:
-    """Declare what goes together of the options of a command."""
+    """Declare which options of a command need or exclude each other."""
 
     def declare(command: Command) -> Command:
         command.__dict__["rules"] = table
@@ -274,7 +274,7 @@ class CommandLine(NamedTuple):
         return self._replace(values={name: self.values[name] for name in options})
 
     def stated(self, conditions: str) -> list[str]:
-        """Return the options of conditions that are given and have not their defaults; "@group" is all of a group."""
+        """Return the options of conditions whose values differ from the defaults; "@group" stands for a whole group."""
         several = [
             name
             for condition in conditions.split()

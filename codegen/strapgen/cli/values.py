@@ -78,7 +78,7 @@ def line(option: str, text: str) -> str:
 
 
 def single(option: str, text: str) -> str:
-    """Read one name, which no list is taken for."""
+    """Read one name; refuse a list."""
     if "," in text:
         raise InputError(f"{option} {text} is a list; one name is needed here")
     return text
@@ -125,7 +125,7 @@ def split(kind: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def reader(kind: Any, read: Reader | None) -> Reader | None:
-    """Return what reads the values of a type; `read` reads one of several. None for what is taken as it is."""
+    """Return the reader of values of a type; `read` reads one of several. None for text without conversion."""
     whole_kind, parts = split(kind)
     if whole_kind is tuple:
         return _tuple_reader(
@@ -200,5 +200,5 @@ def filled(kind: type[Record], settings: Mapping[str, Fraction] | None) -> Recor
 
 
 def written(value: Any) -> str:
-    """Return a value as it stands on a command line."""
+    """Return a value as on a command line."""
     return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -341,20 +341,20 @@ def check_names(system: str, inputs: Iterable[str], stages: Iterable[str]) -> No
     """
     stages = list(stages)
     if system in _HEADERS or not _is_free(system):
-        raise _refused("the name", system)
+        raise _refuse("the name", system)
     for name in stages:
         if _FUNCTIONS.fullmatch(name) or _USED.fullmatch(name) or not _is_free(name):
-            raise _refused("stage", name)
+            raise _refuse("stage", name)
     for name in inputs:
         rest = name.removeprefix(f"{system}_")
         shadowed = rest != name and (_FUNCTIONS.fullmatch(rest) or rest in stages)
         if shadowed or _FUNCTIONS.fullmatch(name) or _USED.fullmatch(name) or not _is_free(name):
-            raise _refused("input", name)
+            raise _refuse("input", name)
 
 
 def _is_free(name: str) -> bool:
     return C.allows(name) and PYTHON.allows(name)
 
 
-def _refused(what: str, name: str) -> InputError:
+def _refuse(what: str, name: str) -> InputError:
     return InputError(f"{what} {name!r} has a meaning in generated code; another name is needed")
