@@ -33,6 +33,9 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
+    from strapgen.catalogue.names import ALGORITHMS as ALGORITHMS
+    from strapgen.catalogue.names import KERNELS as KERNELS
+    from strapgen.catalogue.names import METHODS as METHODS
     from strapgen.design import family as _family
     from strapgen.design.commit_late.commit_late import CommitLate as CommitLate
     from strapgen.design.commit_late.late_recording import recording_attitudes as recording_attitudes
@@ -69,6 +72,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.comparison import compare as compare
     from strapgen.lab.convergence import Convergence as Convergence
     from strapgen.lab.convergence import converge as converge
+    from strapgen.lab.motions.motion_names import MOTIONS as MOTIONS
     from strapgen.lab.motions.motions import Motion as Motion
     from strapgen.lab.motions.motions import motion as motion
     from strapgen.lab.motions.users_motions import read_motion as read_motion
@@ -143,6 +147,11 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
+    "catalogue.names": (
+        "ALGORITHMS",
+        "KERNELS",
+        "METHODS",
+    ),
     "catalogue.methods.method": (
         "Samples",
         "increments_signal",
@@ -196,6 +205,7 @@ _NAMES = {
         "Course",
         "course",
     ),
+    "lab.motions.motion_names": ("MOTIONS",),
     "lab.motions.motions": (
         "Motion",
         "motion",

@@ -16,6 +16,8 @@ from typing import Any
 
 #: Most lines of a `repr`, and most characters of a line.
 LINES, WIDTH = 5, 100
+#: Most lines of a table of names.
+NAMES = 24
 #: Most characters of one field.
 _FIELD = 60
 #: Most characters of a number that is written exactly.
@@ -62,6 +64,17 @@ def notebook_html(value: Any) -> str | None:
     """Return an object as HTML for a notebook; a class takes this function as its ``_repr_html_``."""
     text: str | None = _display(value, "objects").html(value)
     return text
+
+
+def names_table(titles: Mapping[str, str]) -> Any:
+    """Return names with their titles as a table; of many the first ones, and how to see all."""
+    table = importlib.import_module("strapgen.results.table")
+    names = list(titles)
+    shown = names if len(names) <= NAMES else names[: NAMES - 1]
+    rows = [(name, textwrap.shorten(titles[name], WIDTH - 20, placeholder="...")) for name in shown]
+    if len(names) > len(shown):
+        rows.append(("...", f"{len(names) - len(shown)} more; list() of this mapping gives all names"))
+    return table.TextTable((table.Column(align="<"), table.Column(align="<")), rows)
 
 
 def to_pandas(value: Any) -> Any:
