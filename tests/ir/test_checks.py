@@ -253,10 +253,10 @@ def test_a_value_that_is_no_text_or_very_long_stays_on_one_line():
 
 
 CALLS = {
-    "increments is 'a'; an array of numbers is needed": lambda: strapgen.gyro.pulses("a", 1),
-    "increments has shape (3,); (..., N, K, 3) is needed": lambda: strapgen.gyro.pulses([1, 2, 3], 1),
-    "increments is 'b'; an array of numbers": lambda: strapgen.gyro.windows("b", 1),
-    "increments is 'c'; an array of numbers": lambda: strapgen.exact.propagate(
+    "samples is 'a'; an array of numbers is needed": lambda: strapgen.gyro.pulses("a", 1),
+    "samples has shape (3,); (..., N, K, 3) is needed": lambda: strapgen.gyro.pulses([1, 2, 3], 1),
+    "samples is 'b'; an array of numbers": lambda: strapgen.gyro.windows("b", 1),
+    "samples is 'c'; an array of numbers": lambda: strapgen.exact.propagate(
         strapgen.lower(strapgen.derive("euler")), "c"
     ),
     "path is None; the path of a file is needed": lambda: strapgen.read_rates(None, "rad/s"),
