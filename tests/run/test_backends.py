@@ -497,10 +497,10 @@ def test_samples_keep_their_old_name_with_a_warning():
         (lambda **given: strapgen.gyro.windows(count=2, **given), turn[:, 0]),
         (lambda **given: strapgen.exact.propagate(program, **given), turn),
     ]
-    for call, given in calls:
+    for call, array in calls:
         with pytest.warns(DeprecationWarning, match=r"^increments is now samples$"):
-            old = call(increments=given)
-        np.testing.assert_array_equal(old, call(samples=given))
+            old = call(increments=array)
+        np.testing.assert_array_equal(old, call(samples=array))
     with pytest.warns(DeprecationWarning, match=r"^Backend\.samples is now samples_per_step$"):
         assert made.samples == made.samples_per_step == 2
 

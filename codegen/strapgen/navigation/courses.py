@@ -129,8 +129,8 @@ def course(
     array([0.   , 0.   , 1.962])
     """
     checks.choice("backend", backend, BACKENDS)
-    checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
-    checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
+    fast_cycles = checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
+    slow_cycles = checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
     of_cycle = fast_cycles * slow_cycles
     cycles, unused = divmod(len(recording.samples), of_cycle)
     if cycles < 1:

@@ -380,7 +380,8 @@ class Backend:
                 f"samples has shape {d.shape}; (..., steps, {self.samples_per_step}, 3) is needed"
             )
         schedule = self._schedule(record_every, orthonormalize_every)
-        checks.count("jobs", jobs)
+        record_every = schedule["record_every"]
+        jobs = checks.count("jobs", jobs)
         start = self._start(initial)
         batch, steps = d.shape[:-3], d.shape[-3]
         try:
@@ -430,7 +431,9 @@ class Backend:
         """
         if steps <= PART:
             return self.propagate(part(0, steps), record_every, orthonormalize_every, initial)
-        schedule = self._schedule(record_every, orthonormalize_every) | {"record_every": 1}
+        schedule = self._schedule(record_every, orthonormalize_every)
+        record_every, orthonormalize_every = schedule["record_every"], schedule.get("restore_every")
+        schedule["record_every"] = 1
         history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
         history[0] = start = self._start(initial)
         loop = self._begun(np.broadcast_to(start, self.state_shape)[None])
@@ -468,10 +471,10 @@ class Backend:
 
     def _schedule(self, record_every: int, orthonormalize_every: int | None) -> dict[str, Any]:
         """Return the fields of a `Loop` that say when states are recorded and orthonormalized, checked."""
-        checks.count("record_every", record_every, largest=checks.MOST)
+        record_every = checks.count("record_every", record_every, largest=checks.MOST)
         if orthonormalize_every is None:
             return {"record_every": record_every}
-        checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
+        orthonormalize_every = checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
         restore = self.beside(self._need_orthonormalization())
         return {"record_every": record_every, "restore_every": orthonormalize_every, "restore": restore}
 

@@ -50,8 +50,8 @@ def windows(samples: Any, count: int, beside: int = 0) -> NDArray[np.float64]:
            [ 6.,  9., 12.]])
     """
     row = np.ascontiguousarray(checks.numbers("samples", samples))
-    checks.count("count", count)
-    checks.count("beside", beside, smallest=0)
+    count = checks.count("count", count)
+    beside = checks.count("beside", beside, smallest=0)
     if row.ndim != 2 or row.shape[1] != 3 or (len(row) - beside) % count or len(row) < beside:
         raise InputError(
             f"samples has shape {row.shape}; ({beside} + a multiple of {count}, 3) is needed for whole steps"
