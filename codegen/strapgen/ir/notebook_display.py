@@ -82,10 +82,23 @@ def to_pandas(value: Any) -> Any:
     return _display(value, "frames").pandas_frame(value)
 
 
+def hold_arrays(value: Any) -> None:
+    """Hold views of a dataclass's arrays that cannot be written; the arrays that it was made of stay as they are."""
+    for field in fields(value):
+        array = getattr(value, field.name)
+        if hasattr(array, "setflags"):
+            view = array.view()
+            view.setflags(write=False)
+            object.__setattr__(value, field.name, view)
+
+
 class Records:
-    """Records along a time: a plot, and the forms of other libraries."""
+    """Records along a time, whose arrays cannot be written: a plot, and the forms of other libraries."""
 
     __slots__ = ()
+
+    def __post_init__(self) -> None:
+        hold_arrays(self)
 
     def plot(self, path: Any = None, title: str = "") -> Any:
         """Return a plot of the records against time as a figure of matplotlib, or write it to a file."""

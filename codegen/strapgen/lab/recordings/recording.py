@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
 from strapgen.ir.renamed import renamed
 from strapgen.lab.recordings.recorded_header import (
     ColumnLayout,
@@ -77,6 +77,9 @@ class Recording:
     remarks: tuple[str, ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        hold_arrays(self)
 
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"
