@@ -61,10 +61,10 @@ def compare(
         ),
     ] = "numpy",
     files: Annotated[
-        list[Path] | None,
+        tuple[Path, ...] | None,
         option(
             "--source",
-            metavar="FILE",
+            metavar="FILE,...",
             help="C file that strapgen generated, as one more back end, in its own formats.",
             panel="Algorithm",
         ),

@@ -41,7 +41,7 @@ MOST_ERROR = 0.3
 
 
 @dataclass(frozen=True)
-class Rung:
+class StepError:
     """One step length of a ladder."""
 
     #: Step in s
@@ -82,7 +82,7 @@ class Convergence(Record):
     kernel, backend : str
     order : Order or None
         Orders in theory; None where a user's algorithm states none.
-    rungs : tuple of Rung
+    rungs : tuple of StepError
         From the longest step to the shortest.
     observed : float or None
         Slope of the logarithm of the error, fitted to the finest rungs whose error is truncation; None where no two
@@ -96,7 +96,7 @@ class Convergence(Record):
     kernel: str
     backend: str
     order: Order | None = field(metadata=entry(spread=True, write=PredictedOrders.of, kind=PredictedOrders))
-    rungs: tuple[Rung, ...]
+    rungs: tuple[StepError, ...]
     observed: float | None = field(metadata=entry(key="observed_order"))
     arguments: str = field(default="", metadata=INTERNAL)
     label: str | None = field(default=None, metadata=entry(optional=True))
@@ -271,7 +271,9 @@ def fitted(
     if len(chosen) > 1:
         logs = np.array([(math.log(rungs[k][0]), math.log(rungs[k][1] or 1.0)) for k in chosen])
         observed = float(np.polyfit(logs[:, 0], logs[:, 1], 1)[0])
-    ladder = tuple(Rung(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs))
+    ladder = tuple(
+        StepError(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs)
+    )
     return Convergence(kernel, backend, order, ladder, observed)
 
 
