@@ -1,7 +1,24 @@
 """strapgen: attitude algorithms derived symbolically, generated as numpy and C code, and compared with truth.
 
-The stages in order: `derive` a kernel, `lower` it to straight-line code, `generate` source text, `build` a back
-end, `simulate` it against a closed-form motion. `backend` does the first four at once, from the cache.
+Begin with one object: ``alg = strapgen.algorithm("euler", "rk4", increments=2)``.
+
+  formulas   alg.formulas, which prints, with .latex, .program and .operations; alg.series()
+  runs       alg.simulate("coning", ...), alg.compare(), alg.converge(), alg.check()
+  code       alg.generate("c"), alg.generate("c-fixed", word=32, max_rate_deg_s=400, step="0.01"),
+             alg.quantize(...), alg.cost("cortex-m3")
+
+What there is, each a table of names: ALGORITHMS, METHODS, KERNELS, MOTIONS, TARGETS, BACKENDS, TABLEAUX, WINDOWS.
+Functions take the object, a name or a Choice alike:
+
+  stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
+  motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
+  judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
+  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
+  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
+  notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
+
+Units are SI and angles rad, unless a name says otherwise; matrices lead from body to reference axes. Wrong input
+raises a StrapgenError with one line. ``help(strapgen.NAME)`` has shapes, units, errors and an example of each.
 """
 
 import importlib as _importlib

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -515,3 +516,5 @@ def test_a_recording_keeps_the_old_name_of_its_samples():
             recording = make(increments=rows)
         with pytest.warns(DeprecationWarning, match=r"increments is now samples$"):
             assert np.shares_memory(recording.increments, rows)
+        with pytest.warns(DeprecationWarning, match=r"^increments is now samples$"):
+            assert replace(recording, increments=2 * rows).samples.tolist() == (2 * rows).tolist()

@@ -181,7 +181,7 @@ def measured_recording(recording: Recorded, errors: InstrumentErrors, run: int =
         angle[part], sensed = unit(np.asarray(recording.samples[part]), of_part)
         if inertial:
             velocity[part] = sensed
-    changes: dict[str, Any] = {"increments": angle} | ({"velocity_increments": velocity} if inertial else {})
+    changes: dict[str, Any] = {"samples": angle} | ({"velocity_increments": velocity} if inertial else {})
     return replace(recording, **changes)
 
 
