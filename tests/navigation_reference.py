@@ -24,7 +24,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-class Flight:
+class TestProfile:
     """An aircraft that turns at random along its way, while its body turns at random with up to 70 deg/s.
 
     The specific force follows from a law of guidance, so that the flight stays near a height: gravity taken off, turns
@@ -187,7 +187,7 @@ def frame_of(states: np.ndarray) -> Shown:
 
 
 def predicted_errors(
-    flight: Flight, seconds: int, cycle: float, free: bool
+    flight: TestProfile, seconds: int, cycle: float, free: bool
 ) -> tuple[np.ndarray, Frame, np.ndarray]:
     """Return the errors after every second of a navigator with cycles of `cycle` seconds, to second order in them.
 

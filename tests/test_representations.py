@@ -120,6 +120,7 @@ def heun() -> UnknownTableau:
 
 #: An object of each class of a public module, and of some that functions of one return.
 MODULE_OBJECTS: dict[str, Callable[[], Any]] = {
+    "formulas.Formulas": lambda: strapgen.algorithm("euler", "rk4", increments=2).formulas,
     "unknowns.Equation": lambda: heun().conditions()[0],
     "unknowns.ErrorSeries": lambda: strapgen.algorithm("euler", "rk4", increments=2).series(terms=1).step,
     "unknowns.Family": lambda: heun().solve().families[0],
@@ -271,7 +272,7 @@ def test_the_noun_and_the_functions_agree():
     algorithm = strapgen.algorithm("euler", "rk4", increments=2)
     assert algorithm.derive() == kernel()
     assert algorithm.program() == program()
-    assert algorithm.c().files == strapgen.generate(program(), "c").files
+    assert algorithm.generate().files == strapgen.generate(program(), "c").files
     assert algorithm.name == kernel().name
     motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
     runs = [

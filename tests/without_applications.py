@@ -29,7 +29,9 @@ LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlin
     "layers"
 ]
 #: The applications, each after those that it needs.
-APPLICATIONS = LAYERS[: LAYERS.index("cli")][::-1]
+APPLICATIONS = [
+    name for name in LAYERS[: LAYERS.index("cli")][::-1] if (ROOT / "codegen" / "strapgen" / name).is_dir()
+]
 #: What a copy leaves out.
 LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "_build", "build", "dist")
 

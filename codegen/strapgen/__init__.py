@@ -12,9 +12,9 @@ from strapgen.ir.version import VERSION as __version__  # noqa: N811
 # For type checkers; a test holds it against the table below, from which Python loads a name when it is first used.
 if _typing.TYPE_CHECKING:
     from strapgen.analysis import vibration as vibration
-    from strapgen.analysis.algorithm import AttitudeAlgorithm as AttitudeAlgorithm
-    from strapgen.analysis.algorithm import algorithm as algorithm
     from strapgen.analysis.unknowns import unknowns as unknowns
+    from strapgen.attitude_algorithm import AttitudeAlgorithm as AttitudeAlgorithm
+    from strapgen.attitude_algorithm import algorithm as algorithm
     from strapgen.catalogue import Choice as Choice
     from strapgen.catalogue import choose as choose
     from strapgen.catalogue import choose_step as choose_step
@@ -155,7 +155,7 @@ _NAMES = {
     ),
     "catalogue.methods.window": ("Window",),
     "catalogue.methods.windows": ("WINDOWS",),
-    "analysis.algorithm": (
+    "attitude_algorithm": (
         "AttitudeAlgorithm",
         "algorithm",
     ),

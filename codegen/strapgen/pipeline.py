@@ -11,12 +11,11 @@ proved ranges and error bounds. `strapgen.build` makes a back end of the sources
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from strapgen import catalogue, fixedpoint, targets
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice, named
 from strapgen.ir import checks
 from strapgen.ir.checks import some
 from strapgen.ir.exceptions import InputError, InputTypeError
@@ -52,7 +51,8 @@ def compile(
 ) -> Sources:
     """Compile a choice for a target; a user may name the functions of its code."""
     if targets.TARGETS[target].fixed:
-        return generate(naming.of(fixed_program(choice, settings or _DEFAULTS)), target)
+        chosen = (settings or _DEFAULTS).for_program(choice.increments, choice.kernel)
+        return generate(naming.of(fixed_program(choice, chosen)), target)
     return generate(naming.of(program(choice)), target)
 
 
@@ -69,7 +69,7 @@ def program(choice: Choice) -> Program:
 
 
 def derive(
-    algorithm: str | Choice,
+    algorithm: AnyAlgorithm,
     method: AnyMethod | None = None,
     increments: int | None = None,
     *,
@@ -83,9 +83,9 @@ def derive(
 
     Parameters
     ----------
-    algorithm : str or Choice
+    algorithm : str, path, Choice or AttitudeAlgorithm
         An attitude algorithm ("dcm", "euler", "cayley-klein") or another kernel that ``strapgen list`` shows; a Python
-        file; or what `strapgen.choose` returned, to which the other parameters do not apply.
+        file; or what `strapgen.algorithm` or `strapgen.choose` returned, with which the other parameters do not go.
     method : str, Tableau, Window or ShapedConing, optional
         Integration method of an attitude algorithm, by name, as a tableau or as a window; by default "rk4".
     increments : int, optional
@@ -114,9 +114,9 @@ def derive(
     >>> derive("temperature-coefficient", constants={"slope_above": 0.5, "slope_below": "1/2"}).outputs[0].expressions
     (difference/2 + nominal,)
     """
-    checks.require("derive", algorithm, str, os.PathLike, Choice)
+    name = named("derive", algorithm)
     return catalogue.derive(
-        catalogue.choose(algorithm, method, increments, rates, previous, ahead, constants, layout)
+        catalogue.choose(name, method, increments, rates, previous, ahead, constants, layout)
     )
 
 
@@ -169,7 +169,8 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
     checks.require("quantize", program, Program)
     _require_settings(settings)
     with timed("quantize", program.kernel):
-        return fixedpoint.quantize(program, settings or Settings())
+        chosen = (settings or _DEFAULTS).for_program(program.increments_per_step, program.kernel)
+        return fixedpoint.quantize(program, chosen)
 
 
 def generate(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:

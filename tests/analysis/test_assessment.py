@@ -433,14 +433,12 @@ def test_what_cannot_be_assessed_is_refused(kernel, said):
         vibration.drift(kernel)
 
 
-@pytest.mark.parametrize("thing", [None, 3, "euler", ("euler", "rk4", 2, 0)])
+@pytest.mark.parametrize("thing", [None, 3, ("euler", "rk4", 2, 0)])
 def test_what_is_no_choice_and_no_kernel(thing):
-    for assess, what in (
-        (vibration.of, "choice"),
-        (vibration.drift, "kernel"),
-        (vibration.sculling, "kernel"),
-    ):
-        with pytest.raises(InputTypeError, match=f"{what} is .*; (what strapgen.choose returns|a Kernel) is"):
+    with pytest.raises(InputTypeError, match="choose takes a name or a path or a Choice, not "):
+        vibration.of(thing)
+    for assess in (vibration.drift, vibration.sculling):
+        with pytest.raises(InputTypeError, match=r"kernel is .*; a Kernel is"):
             assess(thing)
 
 

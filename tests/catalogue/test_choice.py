@@ -150,10 +150,10 @@ def test_each_has_its_own_analysis(chosen):
 def test_each_is_compared_and_checked_for_itself(chosen, rng):
     d = rng.normal(scale=0.02, size=(20, 2, 3))
     for method, choice in chosen.items():
-        (row,) = compare(choice, backends=["numpy"], increments=d, reference="exact")
+        (row,) = compare(choice, backends=["numpy"], samples=d, reference="exact")
         (wanted,) = compare("euler", method, None, ["numpy"], d, reference="exact")
         assert (row.max_abs_rad, row.drift_deg) == (wanted.max_abs_rad, wanted.drift_deg)
-    findings = {finding.name: finding for finding in conformance.check(chosen["rk2"])}
+    findings = {finding.name: finding for finding in conformance.findings(chosen["rk2"])}
     assert findings["order"].measured == pytest.approx(2, abs=0.15)
 
 

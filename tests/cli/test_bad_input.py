@@ -21,7 +21,14 @@ TIMES = "--step 0.125 --duration 1"
 CONSTANT = f"--motion constant --set x_deg_s=1 {TIMES}"
 CONING = "--motion coning --step 0.125 --duration 1 --set"
 EVEN = f"--rates-csv {DATA}/rates_even.csv"
-WAVE = "--step 0.01 --frequency-hz 10 --theta-x-rad 1 --phase-rad 1"
+
+
+def at(hertz: object, amplitude: object = 1, step: object = 0.01) -> str:
+    """Return the options of a vibration."""
+    return f"--step {step} --frequency-hz {hertz} --theta-x-rad {amplitude} --phase-rad 1"
+
+
+WAVE = at(10)
 ASSESSED = (
     "allowed: dcm, euler, cayley-klein, rotation-vector, sculling, velocity-position, coning-fast, sculling-fast-1, "
     "sculling-fast-2, two-speed-fast-1, two-speed-fast-2, two-speed, or a Python file"
@@ -163,8 +170,8 @@ BAD = {
     f"vibration euler {WAVE} --theta-y-rad 1 --plot-hz 1,2": "--plot-hz needs --plot",
     f"vibration euler {WAVE} --theta-y-rad 1 --plot a.png --plot-hz 1": "--plot-hz is '1'; two numbers with commas",
     f"vibration euler {WAVE} --theta-y-rad 1 --plot a.docx": "file type 'docx' is not known",
-    f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 0": "frequency-hz is 0; a number above 0 is needed",
-    f"vibration euler {WAVE} --theta-y-rad 1 --method rk1 --frequency-hz 100": "euler-rk1-2 has no mean rate",
+    f"vibration euler {at(0)} --theta-y-rad 1": "frequency-hz is 0; a number above 0 is needed",
+    f"vibration euler {at(100)} --theta-y-rad 1 --method rk1": "euler-rk1-2 has no mean rate",
     f"vibration coning-fast {WAVE} --theta-y-rad 1": "--increments must say how many of its cycles make a step",
     f"vibration two-speed {WAVE} --theta-y-rad 1": "two-speed is in two speeds: --increments must say how many",
     f"vibration two-speed {WAVE} --theta-y-rad 1 --increments 9 --method rk4": "two-speed takes no --method",
@@ -183,10 +190,10 @@ BAD = {
             ("1,far", "plot-hz is 'far'; a finite number is needed"),
         )
     },
-    f"vibration euler {WAVE} --theta-y-rad 1 --frequency-hz 1e9 --plot a.png": "frequency-hz is 1e+09; a plot takes",
-    f"vibration euler {WAVE} --theta-y-rad 1 --step 1e-310 --plot a.png": "a plot takes",
+    f"vibration euler {at('1e9')} --theta-y-rad 1 --plot a.png": "frequency-hz is 1e+09; a plot takes",
+    f"vibration euler {at(10, step='1e-310')} --theta-y-rad 1 --plot a.png": "a plot takes",
     f"vibration euler {WAVE} --acceleration-y ''": "acceleration-y is ''; a finite number is needed",
-    f"vibration euler {WAVE} --theta-y-rad 1e154 --theta-x-rad 1e150 --frequency-hz 1000": (
+    f"vibration euler {at(1000, '1e150')} --theta-y-rad 1e154": (
         "euler-rk4-2: the error in deg/h is beyond the range of double; take smaller amplitudes"
     ),
     "vibration euler --step 0.005 --spectrum wide.csv": "over 100000 panels to integrate",

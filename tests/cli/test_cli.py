@@ -82,7 +82,7 @@ def unwrapped(text: str) -> str:
     return " ".join(text.split())
 
 
-@pytest.mark.parametrize("words", ["", "-h", "--help"])
+@pytest.mark.parametrize("words", ["help", "-h", "--help"])
 def test_help_names_every_command(words, strapgen_says):
     said = strapgen_says(words)
     for command in COMMANDS:

@@ -88,7 +88,7 @@ def test_programs_show_code_and_counts():
     assert "sigma_dot_sigma" in text
     fixed = strapgen.quantize(ALGORITHM.program())._repr_html_()
     assert "Q1.30" in fixed and "<td" in fixed
-    sources = ALGORITHM.c()._repr_html_()
+    sources = ALGORITHM.generate()._repr_html_()
     assert sources.count("<summary>") == 2 and "#include &lt;" in sources
 
 

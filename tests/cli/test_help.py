@@ -1,4 +1,4 @@
-"""The help of every command, completion of words, spellings that stay, progress on stderr."""
+"""The help of every command, spellings that stay, progress on stderr."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_help_of_the_program_has_its_options(capsys):
     assert labels == [_label(option) for option in options]
     known = {label: text for label, text in help_layout.PROGRAM.panels["Options"]}
     assert all(known[_label(option)] == option.help for option in options if option.help)
-    for words in ([], ["-h"], ["--help"], ["--verbose", "--help"]):
+    for words in (["-h"], ["--help"], ["help"], ["--verbose", "--help"]):
         with pytest.raises(SystemExit) as stop:
             main(words)
         assert (stop.value.code, capsys.readouterr().out) == (0, f"{help_layout.program_help()}\n")
@@ -144,26 +144,6 @@ def test_every_synonym_leads_to_a_name_that_exists():
         for synonym, meant in synonyms.items():
             assert {*meant} <= {*names[kind]}, (kind, synonym)
             assert kind in ("algorithm", "kernel") or synonym not in names[kind], (kind, synonym)
-
-
-@pytest.mark.parametrize(
-    ("words", "answer"),
-    [
-        ("strapgen simulate euler --step 0.1 --du", "--duration"),
-        ("strapgen generate euler --target ", ""),
-        ("strapgen simulate --motion ", ""),
-        ("strapgen generate euler --out ", ""),
-        ("strapgen nowhere --st", ""),
-    ],
-)
-def test_completion_prints_words_alone(words, answer, capsys, monkeypatch):
-    monkeypatch.setenv("_STRAPGEN_COMPLETE", "complete_bash")
-    monkeypatch.setenv("COMP_WORDS", words)
-    monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
-    with pytest.raises(SystemExit) as stop:
-        main([])
-    said = capsys.readouterr()
-    assert (said.out.strip(), said.err) == (answer, "") and stop.value.code == 0
 
 
 DATA = Path(__file__).resolve().parents[1] / "data"

@@ -78,8 +78,8 @@ def test_candidates_that_cannot_be_chosen(name, words):
 
 @pytest.mark.long
 def test_costs_are_those_of_the_program_for_each_sample(study):
-    _, _, standings = study
-    by_name = {standing.name: standing for standing in standings}
+    _, _, drifts_and_costs = study
+    by_name = {drift_and_cost.name: drift_and_cost for drift_and_cost in drifts_and_costs}
     rk4 = by_name["rk4:2"]  # 38 multiplications and 30 additions in a step, as in docs/canonical-form.md
     assert (rk4.multiply, rk4.add, rk4.other) == (38, 30, 0)
     assert rk4.per_second(100) == 1900
@@ -90,8 +90,8 @@ def test_drifts_are_those_of_the_closed_forms(study):
     """A cone of a small half-angle: two samples, by 4/3 of their cross product at b = 2 pi f T."""
     from math import cos, degrees, pi, radians, sin
 
-    _, _, standings = study
-    rk4 = standings[1]
+    _, _, drifts_and_costs = study
+    rk4 = drifts_and_costs[1]
     b, angle = 2 * pi * 5 / 100, radians(0.1)
     left = (2 * b - sin(2 * b)) / 2 - 2 / 3 * 2 * sin(b) * (1 - cos(b))
     assert rk4.drifts["cone 0.1/5"] == pytest.approx(degrees(left * angle**2 / 0.02) * 3600, rel=0.01)
@@ -101,7 +101,7 @@ def on_cone(method: str, half_angle: str, frequency: str, duration: str) -> floa
     """Return the drift of one algorithm on a cone, as the command shows it."""
     (one,) = candidates([method])
     cone = {"cone": ("cone", {"half_angle_deg": half_angle, "frequency_hz": frequency})}
-    return frontier._drift(one.choice, "cone", frontier.Trial(one, "100", duration, cone))
+    return frontier._drift(one.choice, "cone", frontier.RunSpec(one, "100", duration, cone))
 
 
 @pytest.mark.parametrize("half_angle", ["0.01", "0.001"])
@@ -125,19 +125,23 @@ def test_both_arithmetics_agree_where_both_show_a_drift(monkeypatch):
 
 
 def test_results_come_in_the_order_of_the_candidates(study):
-    several, _, standings = study
-    assert [standing.name for standing in standings] == [one.name for one in several] == list(FEW)
-    assert all(list(standing.drifts) == list(MOTIONS) for standing in standings)
+    several, _, drifts_and_costs = study
+    assert (
+        [drift_and_cost.name for drift_and_cost in drifts_and_costs]
+        == [one.name for one in several]
+        == list(FEW)
+    )
+    assert all(list(drift_and_cost.drifts) == list(MOTIONS) for drift_and_cost in drifts_and_costs)
 
 
 def test_a_study_goes_on_where_it_was(study, monkeypatch):
-    several, path, standings = study
+    several, path, drifts_and_costs = study
 
     def never(trial):
         raise AssertionError("a result that is there is not worked out again")
 
-    monkeypatch.setattr(frontier, "run_trial", never)
-    assert in_order(frontier.frontier(several, "100", "2", path, 1), several) == standings
+    monkeypatch.setattr(frontier, "run_case", never)
+    assert in_order(frontier.frontier(several, "100", "2", path, 1), several) == drifts_and_costs
     with pytest.raises(InputError, match='holds another study: duration_s is "2" there and "3" here'):
         list(frontier.frontier(several, "100", "3", path, 1))
     with pytest.raises(InputError, match='holds another study: sample_hz is "100" there and "50" here'):
@@ -154,17 +158,19 @@ def test_a_step_longer_than_the_run_is_refused():
 
 
 def test_a_run_that_leaves_its_numbers_has_no_drift():
-    trial = frontier.Trial(Candidate("rk4", 1), "1", "600")
+    trial = frontier.RunSpec(Candidate("rk4", 1), "1", "600")
     assert frontier._drift(trial.candidate.choice, "cone 15/20", trial) is None
 
 
 def test_a_users_motion_stands_alone():
     mine = {"coning": ("coning", {"a_rad_s": "1", "b_rad_s": "1.5", "g_rad_s": "0.6"})}
     several = candidates(["rk1:2", "rk4:2"])
-    standings = in_order(frontier.frontier(several, "100", "2", jobs=1, motions=mine), several)
-    assert all(list(one.drifts) == ["coning"] for one in standings)
-    assert standings[1].drifts["coning"] < 1e-5 * standings[0].drifts["coning"]  # orders 1 and 4 at 1/50 rad
-    report = FrontierResult(standings, 100.0, 2.0, mine)
+    drifts_and_costs = in_order(frontier.frontier(several, "100", "2", jobs=1, motions=mine), several)
+    assert all(list(one.drifts) == ["coning"] for one in drifts_and_costs)
+    assert (
+        drifts_and_costs[1].drifts["coning"] < 1e-5 * drifts_and_costs[0].drifts["coning"]
+    )  # orders 1 and 4 at 1/50 rad
+    report = FrontierResult(drifts_and_costs, 100.0, 2.0, mine)
     data = json.loads(report.written("json"))
     assert data["motions"] == {"coning": {"motion": "coning", **mine["coning"][1]}}
     assert report.written("csv").splitlines()[0].endswith(",multiply_per_s,coning deg/h")
@@ -198,11 +204,11 @@ def test_the_frontier_is_what_nothing_undercuts():
 
 
 def test_reports_have_every_figure(study, tmp_path):
-    _, _, standings = study
-    report = FrontierResult(standings, 100.0, 2.0)
+    _, _, drifts_and_costs = study
+    report = FrontierResult(drifts_and_costs, 100.0, 2.0)
     data = json.loads(report.written("json"))
     assert [row["algorithm"] for row in data["algorithms"]] == list(FEW)
-    assert data["algorithms"][1]["drift_deg_h"] == standings[1].drifts
+    assert data["algorithms"][1]["drift_deg_h"] == drifts_and_costs[1].drifts
     lines = report.written("csv").splitlines()
     assert len(lines) == 4 and all(f"{label} deg/h" in lines[0] for label in MOTIONS)
     text = report.written("text")
@@ -214,5 +220,7 @@ def test_reports_have_every_figure(study, tmp_path):
 
 @pytest.mark.long
 def test_the_plot_is_an_image(study, tmp_path):
-    _, _, standings = study
-    assert frontier_image(FrontierResult(standings, 100.0, 2.0), tmp_path / "a.png").startswith(b"\x89PNG")
+    _, _, drifts_and_costs = study
+    assert frontier_image(FrontierResult(drifts_and_costs, 100.0, 2.0), tmp_path / "a.png").startswith(
+        b"\x89PNG"
+    )

@@ -15,7 +15,14 @@ from strapgen.cli import main
 from strapgen.design.brief import BudgetBrief, ProcessorBrief, RecordedEnvironment, read_brief
 from strapgen.design.selection import causes
 from strapgen.design.selection.candidates import STATES, choice_of, contenders
-from strapgen.design.selection.judgement import CAUSES, Question, in_order, judged, judgements, verdicts
+from strapgen.design.selection.judgement import (
+    CAUSES,
+    JudgementSpec,
+    in_order,
+    judge_states,
+    judgements,
+    verdicts,
+)
 from strapgen.design.selection.simulated import algorithm_named, run, vibration
 from strapgen.navigation.two_speed.two_speed_selection import TwoSpeedLoops
 from strapgen.results.records import plain
@@ -144,7 +151,7 @@ def require_that_it_binds(limit, folder):
     path = folder / f"{binding}.toml"
     text = (BRIEFS / "ahrs.toml").read_text()
     path.write_text(text.replace("operations_per_s = 50_000", limit))
-    (euler, _) = judged(Question(str(path), contenders(read_brief(path), ["rk3:2"])[0]))
+    (euler, _) = judge_states(JudgementSpec(str(path), contenders(read_brief(path), ["rk3:2"])[0]))
     assert (euler["meets"], euler["binding"]) == (False, binding)
 
 

@@ -14,6 +14,7 @@ from derived import program, quantized
 from hypothesis import given
 from hypothesis import strategies as st
 
+import strapgen
 from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.catalogue import Choice
 from strapgen.ir import formats
@@ -249,3 +250,74 @@ def test_settings_are_read_as_they_are_written(stated):
 def test_what_makes_no_scale_is_refused(stated, said):
     with pytest.raises(InputError, match=said):
         Settings.of(**stated)
+
+
+STATED = {"max_rate_deg_s": 400, "step": "0.01"}
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        ("euler", "rk4", 1),
+        ("euler", "rk4", 2),
+        ("dcm", "rk3", 3, False, 2),
+        ("velocity-position", "coning-combined", 2, False, 1),
+        ("rotation-vector", "coning-combined", 3),
+    ],
+)
+def test_the_program_gives_the_increments_that_are_not_stated(chosen):
+    choice = strapgen.choose(*chosen)
+    program = strapgen.lower(strapgen.derive(choice))
+    assert program.increments_per_step == choice.increments == chosen[2]
+    open_number, stated = Settings.of(**STATED), Settings.of(increments=chosen[2], **STATED)
+    assert open_number.for_program(program.increments_per_step, choice.kernel) == stated
+    assert (open_number == stated) is False
+    assert Settings.from_dict(open_number.as_dict()) == open_number
+
+
+def test_every_way_into_fixed_point_resolves_the_increments():
+    choice, program = strapgen.choose("euler"), strapgen.lower(strapgen.derive("euler"))
+    stated, open_number = Settings.of(increments=2, **STATED), Settings.of(**STATED)
+    wanted = strapgen.quantize(program, stated)
+    assert strapgen.quantize(program, open_number) == wanted
+    assert pipeline.fixed_program(choice, open_number) == wanted
+    assert (
+        pipeline.compile(choice, "c-fixed", open_number).files == strapgen.generate(wanted, "c-fixed").files
+    )
+    for name in ("c-fixed16", "fixed-model"):
+        one, other = (
+            strapgen.backend(choice, backend=name, settings=settings) for settings in (open_number, stated)
+        )
+        assert one.interface == other.interface
+        assert one.interface.settings.largest_angle == stated.largest_angle
+    bounds = [
+        strapgen.rounding_bounds(program, settings=settings) for settings in (open_number, stated, Settings())
+    ]
+    assert bounds[0] == bounds[1] != bounds[2]
+
+
+def test_a_gyro_that_counts_has_its_scale_from_the_program():
+    program = strapgen.lower(strapgen.derive("euler"))
+    gyro = {"step": "0.02", "lsb": "0.0175dps"}
+    open_number, stated = Settings.of(**gyro), Settings.of(increments=2, **gyro)
+    assert open_number.sensor != stated.sensor
+    assert strapgen.quantize(program, open_number) == strapgen.quantize(program, stated)
+
+
+def test_other_increments_than_the_program_s_are_refused():
+    settings = Settings.of(increments=3, **STATED)
+    said = r"^increments is 3, but euler-rk4-2 takes 2 increments a step$"
+    for take in (
+        lambda: strapgen.quantize(strapgen.lower(strapgen.derive("euler")), settings),
+        lambda: strapgen.backend("euler", backend="c-fixed32", settings=settings),
+        lambda: strapgen.generate(strapgen.lower(strapgen.derive("euler")), "c-fixed", settings),
+    ):
+        with pytest.raises(InputError, match=said):
+            take()
+
+
+def test_a_wide_step_is_divided_before_its_angle_is_refused():
+    wide = Settings.of(max_rate_deg_s=400, step=1)
+    assert wide.for_program(2, "two") == Settings.of(max_rate_deg_s=400, step=1, increments=2)
+    with pytest.raises(InputError, match=r"largest angle increment is 6\.98132 rad"):
+        wide.for_program(1, "one")

@@ -16,7 +16,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.lab import comparison
 from strapgen.lab.comparison_report import ComparedKernel, ComparisonResult
-from strapgen.run.backends import BACKENDS
+from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS
 from strapgen.targets.registry import BUILT_IN
 
 
@@ -125,7 +125,7 @@ def test_a_choice_is_compared_like_its_name(increments):
     by_name = comparison.compare("euler", "rk2", 2, ["numpy", "c-fixed32"], increments, reference="exact")
     choice = strapgen.choose("euler", "rk2", 2)
     by_choice = comparison.compare(
-        choice, backends=["numpy", "c-fixed32"], increments=increments, reference="exact"
+        choice, backends=["numpy", "c-fixed32"], samples=increments, reference="exact"
     )
     for one, other in zip(by_name, by_choice, strict=True):
         assert one.as_dict() | {"ns_per_step": 0} == other.as_dict() | {"ns_per_step": 0}
@@ -134,16 +134,40 @@ def test_a_choice_is_compared_like_its_name(increments):
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [
-        ({"increments": None}, InputTypeError, "increments is None"),
+        ({"samples": "turn"}, InputTypeError, "samples is 'turn'; an array of numbers is needed"),
         ({"method": "rk4"}, InputError, "method is 'rk4', but the choice of euler-rk2-2 has its own"),
-        ({"samples": 2}, InputError, "increments is 2, but the choice of euler-rk2-2 has its own"),
+        ({"increments": 2}, InputError, "increments is 2, but the choice of euler-rk2-2 has its own"),
     ],
 )
 def test_arguments_that_contradict_a_choice_are_refused(options, error, said):
     with pytest.raises(error, match=said):
-        comparison.compare(
-            strapgen.choose("euler", "rk2", 2), **({"increments": np.zeros((2, 2, 3))} | options)
-        )
+        comparison.compare(strapgen.choose("euler", "rk2", 2), **({"samples": np.zeros((2, 2, 3))} | options))
+
+
+def test_samples_and_increments_keep_their_old_names_with_a_warning(increments):
+    wanted = comparison.compare("euler", "rk2", 2, ["numpy"], increments, reference="exact")
+    for old in ({"samples": 2, "increments": increments}, {"increments": increments}):
+        with pytest.warns(DeprecationWarning, match=r"^compare\(samples=count, increments=array\) is now"):
+            (row,) = comparison.compare("euler", "rk2", backends=["numpy"], reference="exact", **old)
+        assert row.max_abs_rad == wanted[0].max_abs_rad
+
+
+def test_a_comparison_without_samples_takes_those_of_coning():
+    (row,) = comparison.compare("euler", "rk4", 2, ["numpy"])
+    motion = strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10)
+    run = strapgen.simulate(strapgen.backend("euler", "rk4", 2), motion, "0.01", 10)
+    assert row.drift_deg == pytest.approx(math.degrees(run.mean_drift), rel=1e-9) and row.drift_deg > 0
+
+
+def test_the_back_ends_of_a_comparison_that_names_none_run_here(monkeypatch):
+    choice = strapgen.choose("euler")
+    assert comparison.usable_backends(choice) == DEFAULT_BACKENDS
+    monkeypatch.setattr(comparison.fixedpoint, "can_lower", lambda program: False)
+    assert comparison.usable_backends(choice) == ("numpy", "c", "c-float")
+    monkeypatch.setenv("CC", "/nowhere/cc")
+    assert comparison.usable_backends(choice) == ("numpy",)
+    (row,) = comparison.compare(choice)
+    assert row.backend == "numpy" and row.max_abs_rad == 0
 
 
 def test_all_back_ends_take_the_counts_of_a_gyro(increments):

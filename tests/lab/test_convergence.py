@@ -17,7 +17,7 @@ from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Order
-from strapgen.lab.convergence import Convergence, Rung, converge
+from strapgen.lab.convergence import Convergence, StepError, converge
 from strapgen.lab.convergence_report import ConvergenceResult, ladder_table
 
 #: How far an observed order may be from the one of theory: the next term of the series is still there at these steps.
@@ -159,7 +159,7 @@ FOUND = Convergence(
     "euler-butcher6-3",
     "exact",
     Order(6, 6, 3, 4),
-    (Rung(0.5, None), Rung(0.25, 1e-2, None, True), Rung(0.125, 1e-2 / 16, 4.0, True)),
+    (StepError(0.5, None), StepError(0.25, 1e-2, None, True), StepError(0.125, 1e-2 / 16, 4.0, True)),
     4.0,
 )
 

@@ -16,12 +16,12 @@ from strapgen.analysis.analysis_plots import vibration_image
 from strapgen.analysis.vibration.mean_rates import Curve
 from strapgen.analysis.vibration.vibration_report import VibrationResult
 from strapgen.design.design_plots import frontier_image
-from strapgen.design.frontier import MOTIONS, FrontierResult, Standing
+from strapgen.design.frontier import MOTIONS, DriftAndCost, FrontierResult
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.ir.kernel_info import Order
 from strapgen.lab.comparison import AngleHistory, Comparison
 from strapgen.lab.comparison_report import ComparedKernel, ComparisonResult, comparison_image
-from strapgen.lab.convergence import Convergence, Rung
+from strapgen.lab.convergence import Convergence, StepError
 from strapgen.lab.convergence_report import ConvergenceResult, convergence_image
 from strapgen.lab.recordings.recording import History
 from strapgen.lab.runs import Run, simulate
@@ -97,10 +97,10 @@ def test_history_has_an_axis_for_each_element(shape, grid, figures, rng):
 
 
 def test_convergence_has_a_line_and_a_theory_for_each_algorithm(figures):
-    rungs = tuple(Rung(2.0**-k, 2.0 ** (-4 * k), None if k == 1 else 4.0, k > 2) for k in range(1, 6))
+    rungs = tuple(StepError(2.0**-k, 2.0 ** (-4 * k), None if k == 1 else 4.0, k > 2) for k in range(1, 6))
     found = [
         Convergence("euler-rk4-2", "exact", Order(4, 4, 2, 4), rungs, 4.0),
-        Convergence("mine", "exact", None, (Rung(0.5, None), *rungs[1:]), None),
+        Convergence("mine", "exact", None, (StepError(0.5, None), *rungs[1:]), None),
     ]
     convergence_image(ConvergenceResult(found, "A title"), "orders.png")
     (figure,) = figures
@@ -207,20 +207,20 @@ def test_labels_beside_points_do_not_overlap():
     pyplot.close(figure)
 
 
-def standing(name: str, multiply: int, drift: float | None) -> Standing:
-    return Standing(name, name, "source", 1, multiply, 0, 0, dict.fromkeys(MOTIONS, drift))
+def drift_and_cost(name: str, multiply: int, drift: float | None) -> DriftAndCost:
+    return DriftAndCost(name, name, "source", 1, multiply, 0, 0, dict.fromkeys(MOTIONS, drift))
 
 
 @pytest.mark.long
 def test_the_frontier_has_a_panel_a_motion_and_labels_for_the_best(figures):
-    standings = [
-        standing("cheap", 10, 5.0),
-        standing("worse", 20, 6.0),
-        standing("little better", 30, 4.9),
-        standing("good", 40, 1e-3),
-        standing("lost", 50, None),
+    drifts_and_costs = [
+        drift_and_cost("cheap", 10, 5.0),
+        drift_and_cost("worse", 20, 6.0),
+        drift_and_cost("little better", 30, 4.9),
+        drift_and_cost("good", 40, 1e-3),
+        drift_and_cost("lost", 50, None),
     ]
-    frontier_image(FrontierResult(standings, 100.0, 2.0), "a.png")
+    frontier_image(FrontierResult(drifts_and_costs, 100.0, 2.0), "a.png")
     (figure,) = figures
     assert [axes.get_title("left") for axes in figure.axes][:2] == [
         "cone of 1 deg at 10 Hz",

@@ -10,13 +10,13 @@ import pytest
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.motions.specific_forces import force
-from strapgen.navigation.translations import DEFAULT, Flight, candidates, study
+from strapgen.navigation.translations import DEFAULT, TestProfile, candidates, study
 
 
 def flight(backend="numpy", duration="2", hertz=10):
     cone = motion("cone", half_angle_deg=1, frequency_hz=hertz)
     swing = force("oscillation", swing_y_g=1, frequency_hz=hertz)
-    return Flight(cone, swing, Fraction(100), Fraction(duration), backend)
+    return TestProfile(cone, swing, Fraction(100), Fraction(duration), backend)
 
 
 def test_every_method_has_a_velocity_and_windows_beat_the_recursion():

@@ -9,7 +9,7 @@ from navigation_reference import (
     MU,
     RADIUS,
     RATE,
-    Flight,
+    TestProfile,
     frame_start,
     local_axes,
     predicted_errors,
@@ -300,7 +300,7 @@ def test_a_latitude_entered_late_gives_the_attitude_of_one_known_in_time():
     assert 3.9 < errors[0] / errors[1] < 4.1 and errors[1] < 1e-7
 
 
-def hour_of(flight: Flight, seconds: int, cycle: float, azimuth: str) -> tuple[np.ndarray, np.ndarray]:
+def hour_of(flight: TestProfile, seconds: int, cycle: float, azimuth: str) -> tuple[np.ndarray, np.ndarray]:
     """Run the chain beside the reference, and return its errors every second, and those that the series predicts."""
     every = round(1 / cycle)
     times = np.arange(seconds * every + 1) * cycle
@@ -329,14 +329,14 @@ def test_the_chain_is_off_by_what_the_series_predicts(azimuth, seconds, cycle):
     # Turns of up to 70 deg/s, speeds of 200 to 460 m/s, climbs of 1 km; the vertical channel is not held, and
     # multiplies what it is off by 5 in a quarter of an hour. What the prediction leaves out is of third order in the
     # cycle: a hundredth of the largest error at 10 Hz, twice that at 5 Hz.
-    errors, predicted = hour_of(Flight(5), seconds, cycle, azimuth)
+    errors, predicted = hour_of(TestProfile(5), seconds, cycle, azimuth)
     largest = np.abs(predicted).max(axis=0)
     assert np.all(np.abs(errors - predicted).max(axis=0) < 0.1 * cycle * largest)
     place, velocity, angle = largest[:3], largest[3:6], largest[6:]
     assert np.all(place < 0.2) and np.all(velocity < 2e-4) and np.all(angle < 1e-8)
 
 
-def sensed(flight: Flight, seconds: int, sample: float) -> tuple[np.ndarray, ...]:
+def sensed(flight: TestProfile, seconds: int, sample: float) -> tuple[np.ndarray, ...]:
     """Return rate and specific force in body axes at four nodes of every sample, their increments, and the states.
 
     The increments are Gauss-Legendre quadratures.
@@ -365,7 +365,7 @@ def test_the_whole_chain_loses_what_the_velocity_in_two_speeds_loses():
     # Fast loops of s = 10 ms, slow ones of T = 20 and 40 ms, the frame at 5 Hz. S2 of the source leaves out
     # w x (w x f) T^2/6 for slow cycles, and (w x f' - w' x f) s^2/12 within fast ones, with derivatives in body axes.
     # At 70 deg/s that is far more than the frame's error. What remains is of third order.
-    flight, seconds, sample, cycle = Flight(5), 40, 0.01, 0.2
+    flight, seconds, sample, cycle = TestProfile(5), 40, 0.01, 0.2
     w, f, d, dv, times, flown = sensed(flight, seconds, sample)
     attitudes = flight.attitude(times)
     coning, sculling, slow_loop, velocity, update = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from strapgen.analysis.algorithm import AttitudeAlgorithm
 from strapgen.analysis.error_analysis import ErrorAnalysis, invariant_rows
 from strapgen.analysis.growth import Stability, stability_latex
 from strapgen.analysis.series.series import PARTS, STEP, ErrorSeries
@@ -11,7 +10,6 @@ from strapgen.analysis.unknowns import unknowns_report
 from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
 from strapgen.analysis.unknowns.solving import LeadingError, SolvedStep
 from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
-from strapgen.results.display import formulas
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import equations
 from strapgen.results.display.objects import latex
@@ -65,8 +63,3 @@ def _(series: ErrorSeries) -> str | None:
                 ]
     text = equations(rows) if rows else "$0$"
     return text if len(text.splitlines()) <= _LINES else None
-
-
-@latex.register
-def _(algorithm: AttitudeAlgorithm) -> str | None:
-    return formulas.short_latex(algorithm.derive())

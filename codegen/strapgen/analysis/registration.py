@@ -25,12 +25,12 @@ REGISTRATION = Registration(
         "vibration": Command(
             f"{__package__}.vibration.vibration_command:vibration",
             "Analyse",
-            summary="Show the drift that an algorithm computes under vibration",
+            summary="Show the drift of an algorithm under vibration",
         ),
         "stability": Command(
             f"{__package__}.series_command:stability",
             "Analyse",
-            summary="Show at which constant rates the state grows in a step",
+            summary="Show the limits of stability of a step at constant rates",
         ),
     },
     files={"tableau-with-unknowns": f"{__package__}.unknowns.unknown_tableau:UNKNOWN_TABLEAU"},

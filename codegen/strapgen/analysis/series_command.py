@@ -161,6 +161,7 @@ def series(
             "--motion",
             metavar="NAME",
             help=f"Motion: general (any smooth rate), {MOTION_NAMES}, or a Python file with a rate in SymPy.",
+            words="strapgen.catalogue:MOTIONS",
             panel="Input",
         ),
     ] = "general",
@@ -283,7 +284,7 @@ def stability(
     methods: Annotated[SteppedMethods, Shown(only=STEP_OPTIONS)],
     output: Output,
 ) -> None:
-    """Show at which constant rates the state grows in a step.
+    """Show the limits of stability of a step at constant rates.
 
     At a constant rate w a step of length h turns by the angle x = |w| h. It stretches the part of the state across the
     axis by a factor, whose square is shown exactly, with the angles x at which the factor is at most 1.

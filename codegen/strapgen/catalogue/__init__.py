@@ -6,7 +6,7 @@ loaded when it is derived.
 
 from __future__ import annotations
 
-from strapgen.catalogue.choice import Choice, orthonormalizations
+from strapgen.catalogue.choice import AnyAlgorithm, Choice, named, orthonormalizations
 from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
@@ -37,6 +37,7 @@ __all__ = [
     "TWO_SPEED",
     "UPDATE_ORDERS",
     "VECTORS",
+    "AnyAlgorithm",
     "Choice",
     "Integrator",
     "Recipe",
@@ -46,6 +47,7 @@ __all__ = [
     "companion",
     "derive",
     "enough",
+    "named",
     "nodes",
     "orthonormalizations",
     "reserved",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Context, Decimal
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from strapgen.catalogue.methods.method_spec import MethodSpec
 from strapgen.catalogue.methods.window import Window
@@ -170,6 +171,25 @@ class Choice:
             for kernel in self.user_kernel.kernel.bundled_kernels
             if kernel.name == name
         )
+
+
+class AlgorithmObject(Protocol):
+    """An object for an algorithm, as `strapgen.algorithm` returns one."""
+
+    @property
+    def choice(self) -> Choice:
+        """The choice of its kernel."""
+
+
+#: What names an algorithm to every stage: its name, the path of a user's file, a choice, or an object that holds one.
+AnyAlgorithm: TypeAlias = str | os.PathLike[str] | Choice | AlgorithmObject
+
+
+def named(function: str, algorithm: AnyAlgorithm) -> str | os.PathLike[str] | Choice:
+    """Return a name, a path, or the choice of an object; refuse what is none of them for a function."""
+    value = getattr(algorithm, "choice", algorithm)
+    checks.require(function, value, str, os.PathLike, Choice)
+    return value  # type: ignore[return-value]
 
 
 def orthonormalizations(algorithm: str) -> list[str]:

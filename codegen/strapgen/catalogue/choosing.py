@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapgen import registration
-from strapgen.catalogue.choice import AnyMethod, Choice, constant_options, read_constants
+from strapgen.catalogue.choice import (
+    AnyAlgorithm,
+    AnyMethod,
+    Choice,
+    constant_options,
+    named,
+    read_constants,
+)
 from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS, Asked, MethodSpec
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
@@ -30,7 +37,7 @@ from strapgen.catalogue.names import (
 from strapgen.catalogue.user import loading
 from strapgen.ir import checks
 from strapgen.ir.checks import some
-from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.kernel_info import Description
 
 if TYPE_CHECKING:
@@ -42,7 +49,7 @@ _FILE = "a Python file"
 
 
 def choose(
-    name: str | os.PathLike[str] | Choice,
+    name: AnyAlgorithm,
     method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
@@ -55,9 +62,9 @@ def choose(
 
     Parameters
     ----------
-    name : str, path or Choice
-        A name of the catalogue, a user's Python file, or the entry point of one. A choice is returned as it is; the
-        other parameters do not go with it.
+    name : str, path, Choice or AttitudeAlgorithm
+        A name of the catalogue, a user's Python file, or the entry point of one. A choice, and that of an algorithm
+        object, is returned as it is; the other parameters do not go with it.
     method : str, Tableau, Window or ShapedConing, optional
     increments : int, optional
         Increments in a step.
@@ -85,6 +92,7 @@ def choose(
     >>> choose("temperature-coefficient", constants={"slope_above": 0}).constants
     (('slope_above', (Fraction(0, 1),)),)
     """
+    name = named("choose", name)
     if isinstance(name, Choice):
         stated: dict[str, Any] = {"method": method, "increments": increments, "rates": rates or None}
         stated |= {"previous": previous, "ahead": ahead, "constants": constants, "layout": layout}
@@ -92,10 +100,7 @@ def choose(
             if value is not None:
                 raise InputError(f"{option} is {value!r}, but the choice of {name.kernel} has its own")
         return name
-    if isinstance(name, os.PathLike):
-        name = os.fspath(name)
-    if not isinstance(name, str):
-        raise InputTypeError(f"algorithm is {name!r}; a name or the path of a Python file is needed")
+    name = os.fspath(name)
     asked = Asked(increments, rates, previous, ahead)
     if name.endswith(".py") or (name not in reserved() and name in loading.installed()):
         choice = _choose_users(name, method, asked)
@@ -235,7 +240,7 @@ def _tableau_name(method: str) -> str:
 
 
 def choose_step(
-    name: str | os.PathLike[str] | Choice,
+    name: AnyAlgorithm,
     method: AnyMethod | None = None,
     increments: int | None = None,
     rates: bool = False,
@@ -253,7 +258,9 @@ def choose_step(
             checks.choice("algorithm", name, _algorithms(), _FILE)
     choice = choose(name, method, increments, rates, previous, ahead, constants)
     if choice.takes_velocity:
-        raise InputError(f"algorithm {name} is a step of velocity and position; an attitude step is needed")
+        raise InputError(
+            f"algorithm {choice.name} is a step of velocity and position; an attitude step is needed"
+        )
     return choice
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from strapgen import registration
-from strapgen.cli import help_layout
+from strapgen.cli import completion, help_layout
 from strapgen.ir.exceptions import StrapgenError
 
 #: Most characters of a word that a message repeats, what is left of a longer one, and most characters of a message.
@@ -28,8 +28,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line on stderr for input that cannot be used."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by whoever started us
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115, PTH123
-    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if completion.is_asked():
+        sys.exit(completion.answer(_run_program))
     try:
         status = _run(words)
         sys.stdout.flush()
@@ -65,19 +67,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(words: list[str]) -> Any:
     """Run a command line, and return its exit status; the help of the program needs no library."""
-    if words in (["--help"], ["-h"]) and not _is_completing():
-        sys.stdout.write(f"{help_layout.program_help()}\n")
+    if not words or words in (["--help"], ["-h"]):
+        sys.stdout.write(f"{help_layout.program_help() if words else help_layout.first_steps()}\n")
         return 0
-    from strapgen.cli import program
     from strapgen.run.processes import prepare_for_derivations
 
     prepare_for_derivations()
-    return program.run(_spread_settings(words), _is_completing())
+    return _run_program(_spread_settings(_asked_help(words)))
 
 
-def _is_completing() -> bool:
-    """Tell whether a shell asks for the words that may follow."""
-    return "_STRAPGEN_COMPLETE" in os.environ
+def _run_program(words: list[str]) -> Any:
+    from strapgen.cli import program
+
+    return program.run(words)
+
+
+def _asked_help(words: list[str]) -> list[str]:
+    """Return ``help COMMAND`` as ``COMMAND --help``."""
+    return [*words[1:], "--help"] if words[0] == "help" else words
 
 
 def _interrupted() -> None:
@@ -91,8 +98,6 @@ def _drop_output() -> None:
 
 
 def _fail(message: str) -> None:
-    if _is_completing():  # words that are not complete yet are no mistake; a line would stand in the prompt
-        sys.exit(0)
     message = "".join(letter if letter.isprintable() else " " for letter in message)
     line = " ".join(word if len(word) <= _LONGEST_WORD else f"{word[:_CUT]}..." for word in message.split())
     sys.stderr.write(f"strapgen: {line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + '...'}\n")

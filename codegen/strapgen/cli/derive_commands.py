@@ -10,7 +10,7 @@ import typer
 
 from strapgen import registration
 from strapgen.cli.option_groups import Needs, Shown, grouped, rules
-from strapgen.cli.options import Algorithm, MethodOptions, option
+from strapgen.cli.options import Algorithm, MethodOptions, argument, option
 from strapgen.cli.output import TEXT_OUTPUT, Folder, Output
 from strapgen.cli.values import names
 from strapgen.ir import checks
@@ -32,7 +32,7 @@ KINDS = (
 def list_names(
     kind: Annotated[
         str | None,
-        typer.Argument(metavar="KIND", help=f"Kind of names: {', '.join(KINDS)}.  [default: all]"),
+        argument("KIND", help=f"Kind of names: {', '.join(KINDS)}.  [default: all]", words=KINDS),
     ] = None,
     *,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
@@ -188,7 +188,11 @@ def derive(
 def schema(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Name of a result or of a kind of files.  [default: list them]"),
+        argument(
+            "NAME",
+            help="Name of a result or of a kind of files.  [default: list them]",
+            words="strapgen.registration:schemas",
+        ),
     ] = None,
     *,
     all_: Annotated[

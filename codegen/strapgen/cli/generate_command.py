@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen import registration
+from strapgen.cli import terminal
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Excludes, OneOf, grouped, rules, stated
 from strapgen.cli.options import MethodOptions, OptionalAlgorithm, option
@@ -132,7 +133,7 @@ class SourceOptions:
         if difference:
             refuse_out_of_step(folder, "the same command without --check writes the files again")
         if format == "text":
-            typer.echo(f"{folder}: {len(files)} files, in step")
+            terminal.write(f"{folder}: {len(files)} files, in step")
 
 
 @grouped
@@ -290,7 +291,7 @@ def _generate_all(targets: tuple[str, ...] | None, output: SourceOptions, format
             kinds = f" --target {','.join(targets)}" if targets else ""
             refuse_out_of_step(out, f"strapgen generate --all{kinds} rebuilds it{remove}")
         if format == "text":
-            typer.echo(f"{out}: {len(files)} files, in step")
+            terminal.write(f"{out}: {len(files)} files, in step")
         return
     written = standard_tree.write(out, files)
     from strapgen.cli.generated_result import CatalogueResult
@@ -308,5 +309,5 @@ def show_step(difference: str, format: str) -> None:
 
 def refuse_out_of_step(folder: Path, again: str) -> None:
     """Say on stderr that files differ from generated ones, and how to make them again; exit with 1."""
-    typer.echo(f"strapgen: {folder} is out of step; {again}", err=True)
+    terminal.write(f"strapgen: {folder} is out of step; {again}", err=True)
     raise typer.Exit(1)

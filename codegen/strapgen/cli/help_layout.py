@@ -28,6 +28,7 @@ PROGRAM = CommandHelp(
     usage="strapgen [OPTIONS] COMMAND [ARGS]...",
     paragraphs=(
         "Derive strapdown attitude algorithms, generate numpy and C code for them, and test it against truth.",
+        "strapgen help COMMAND shows the help of a command.",
     ),
     examples=(
         "strapgen simulate euler --backend c --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 "
@@ -35,8 +36,9 @@ PROGRAM = CommandHelp(
     ),
     panels={
         "Options": (
-            ("--version", "Show the versions of strapgen and of what its output depends on."),
+            ("-V, --version", "Show the versions of strapgen and of what its output depends on."),
             ("--verbose", "Show on stderr how long each stage takes, and what comes from the cache."),
+            ("--quiet", "Show neither progress nor remarks on stderr; errors stay."),
             ("--install-completion", "Install completion for the current shell."),
             (
                 "--show-completion",
@@ -46,6 +48,30 @@ PROGRAM = CommandHelp(
         )
     },
 )
+
+
+#: Five jobs, each with a command that runs as it stands.
+_JOBS = {
+    "derive": ("the formulas of an attitude step", "strapgen derive euler --method rk4 --increments 2"),
+    "generate": ("its code in C", "strapgen generate euler --method rk4 --target c --out firmware"),
+    "simulate": (
+        "its errors against a known attitude",
+        "strapgen simulate euler --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180",
+    ),
+    "compare": (
+        "its code in numpy, C and fixed point side by side",
+        "strapgen compare euler --motion constant --set x_deg_s=10 --step 0.01 --duration 1",
+    ),
+    "series": ("the error of a step as a power series", "strapgen series euler --method rk4"),
+}
+
+
+def first_steps() -> str:
+    """Return what strapgen does in five jobs, for a command line without words."""
+    lines = [*_filled(PROGRAM.paragraphs[0], "", "")]
+    for name, (what, command) in _JOBS.items():
+        lines += ["", *_filled(f"{name}: {what}", "", "  "), *_command_lines(command)]
+    return "\n".join([*lines, "", "strapgen --help shows all commands and options."])
 
 
 def program_help() -> str:

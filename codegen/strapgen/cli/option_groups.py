@@ -18,7 +18,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 import typer
 from typer.models import OptionInfo, ParameterInfo
 
-from strapgen.cli import values
+from strapgen.cli import completion, values
 from strapgen.cli.values import written
 from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
@@ -37,6 +37,7 @@ VARIANT = Parameter(
             "--variant",
             metavar="NAME",
             help="Take options from this variant of strapgen.toml; those that you state here win.",
+            autocompletion=completion.of_parameter("--variant", None),
         ),
     ],
 )
@@ -188,17 +189,24 @@ def _option(name: str, hint: Any, default: Any, panel: str | None = None) -> Opt
     )
     if info is None:
         return Option((name,), hint, parameter, None)
-    kind, _ = values.split(hint.__origin__)
-    read, info.parser = values.reader(hint.__origin__, info.parser), None  # type: ignore[arg-type]
+    kind, parts = values.split(hint.__origin__)
+    read_one, info.parser = info.parser, None
+    read = values.reader(hint.__origin__, read_one)  # type: ignore[arg-type]
     info.rich_help_panel = panel or info.rich_help_panel
     # In an annotation Typer takes the first name of an option for its default.
     named = isinstance(info, OptionInfo)
     spellings = (str(info.default), *(info.param_decls or ())) if named else (info.metavar or name,)
+    # Options of several values and settings add up; of others the last one would count.
+    adds_up = issubclass(kind, Mapping) or (kind is tuple and ... in parts)
+    if info.autocompletion is None:
+        allowed = read_one.allowed if isinstance(read_one, values.Names) else None
+        info.autocompletion = completion.of_parameter(spellings[0], allowed)
     words: Any = hint.__origin__
     if read is not None and kind is not Path:
-        words = list[str] if issubclass(kind, Mapping) else str
+        words = list[str] if adds_up else str
         words = words | None if default is None else words
-        default = default if default in (None, Parameter.empty) else values.written(default)
+        if default not in (None, Parameter.empty):
+            default = [values.written(default)] if adds_up else values.written(default)
     return Option(
         spellings, kind, parameter.replace(default=default, annotation=Annotated[words, info]), read
     )

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import typer
 
+from strapgen.cli import completion
+from strapgen.cli.completion import Words
 from strapgen.cli.option_groups import OneOf, Rule
 from strapgen.cli.progress import waiting
 from strapgen.cli.values import Positive, Reader, folder, names, single
@@ -23,19 +25,38 @@ _Text = str | None
 
 
 def option(
-    *names: str, metavar: str | None = None, help: str, panel: str | None = None, read: Reader | None = None
+    *names: str,
+    metavar: str | None = None,
+    help: str,
+    panel: str | None = None,
+    read: Reader | None = None,
+    words: Words | None = None,
 ) -> Any:
     """Return an option of a command; the names after the first one are aliases, which the help does not show.
 
     A default of the parameter is shown if it is not None; one that the command finds stands in the help. `read` reads
-    one value, where the type of the parameter does not say how.
+    one value, where the type of the parameter does not say how. `words` are names for a shell to complete, where
+    neither `read` nor the option's name says which.
     """
     read = read or (folder if metavar == "FOLDER" else None)
-    return typer.Option(*names, metavar=metavar, help=help, rich_help_panel=panel, parser=read)  # type: ignore[arg-type]
+    return typer.Option(
+        *names,
+        metavar=metavar,
+        help=help,
+        rich_help_panel=panel,
+        parser=read,  # type: ignore[arg-type]
+        autocompletion=None if words is None else completion.of(words),
+    )
 
 
-def _argument(help: str) -> Any:
-    return typer.Argument(metavar="ALGORITHM", help=help, show_default=False)
+def argument(metavar: str, *, help: str, words: Words | None = None) -> Any:
+    """Return an argument of a command, as `option` does an option."""
+    complete = None if words is None else completion.of(words)
+    return typer.Argument(metavar=metavar, help=help, show_default=False, autocompletion=complete)
+
+
+def _argument(help: str, words: Words | None = None) -> Any:
+    return argument("ALGORITHM", help=help, words=words)
 
 
 Algorithm = Annotated[
@@ -50,18 +71,23 @@ OptionalAlgorithm = Annotated[
         "dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file of your own."
     ),
 ]
-StepAlgorithm = Annotated[str, _argument("dcm, euler or cayley-klein, or a Python file of your own.")]
+#: The attitude algorithms
+_STEPS = "strapgen.catalogue:ALGORITHMS"
+StepAlgorithm = Annotated[str, _argument("dcm, euler or cayley-klein, or a Python file of your own.", _STEPS)]
 RunAlgorithm = Annotated[
-    str, _argument("dcm, euler or cayley-klein, a Python file of your own, or a described system.")
+    str, _argument("dcm, euler or cayley-klein, a Python file of your own, or a described system.", _STEPS)
 ]
 CheckedAlgorithm = Annotated[
-    str, _argument("dcm, euler or cayley-klein, or a Python file of your own, or one in C or C++.")
+    str, _argument("dcm, euler or cayley-klein, or a Python file of your own, or one in C or C++.", _STEPS)
 ]
 OptionalStepAlgorithm = Annotated[
-    _Text, _argument("dcm, euler or cayley-klein, or a Python file of your own.")
+    _Text, _argument("dcm, euler or cayley-klein, or a Python file of your own.", _STEPS)
 ]
-TwoSpeedAlgorithm = Annotated[str, _argument("dcm or euler.")]
-StrapdownAlgorithm = Annotated[str, _argument("dcm or euler in two speeds, or a described system.")]
+_TWO_SPEED = ("dcm", "euler")
+TwoSpeedAlgorithm = Annotated[str, _argument("dcm or euler.", _TWO_SPEED)]
+StrapdownAlgorithm = Annotated[
+    str, _argument("dcm or euler in two speeds, or a described system.", _TWO_SPEED)
+]
 
 _SHOWN_BACKENDS = "strapgen list backends shows all."
 #: Reads the name of a back end.
@@ -128,12 +154,19 @@ StepName = Annotated[
         metavar="NAME",
         help="Algorithm: dcm, euler or cayley-klein.",
         panel="Algorithm",
-        read=names("strapgen.catalogue:ALGORITHMS"),
+        read=names(_STEPS),
     ),
 ]
 #: A language of microcontrollers
 CTarget = Annotated[
-    str, option("--target", metavar="NAME", help="Kind of code: c, c-float or c-fixed.", panel="Algorithm")
+    str,
+    option(
+        "--target",
+        metavar="NAME",
+        help="Kind of code: c, c-float or c-fixed.",
+        panel="Algorithm",
+        words=("c", "c-float", "c-fixed"),
+    ),
 ]
 #: A processor whose instructions are counted
 Processor = Annotated[
@@ -209,7 +242,7 @@ class MethodOptions:
         option(
             "--previous",
             metavar="N",
-            help="Number of increments from before the step that it uses as well, 0 to 32.  [default: 0]",
+            help="Number of increments before the step that it also uses, 0 to 32.  [default: 0]",
         ),
     ] = None
     ahead: Annotated[
@@ -217,14 +250,14 @@ class MethodOptions:
         option(
             "--ahead",
             metavar="N",
-            help="Number of increments from after the step that it uses as well, 0 to 32.  [default: 0]",
+            help="Number of increments after the step that it also uses, 0 to 32.  [default: 0]",
         ),
     ] = None
     rates: Annotated[
         bool,
         option(
             "--rates",
-            help="Let the step take, in place of increments, body rates at the method's nodes, times the step length.",
+            help="Take body rates at the method's nodes, times the step length, in place of increments.",
         ),
     ] = False
 
@@ -233,8 +266,8 @@ class MethodOptions:
         option(
             "--constant",
             metavar="NAME=VALUE,...",
-            help="Value of the input NAME in its unit, row by row, which the code then has as a constant; or of an "
-            "unknown of your own algorithm.",
+            help="Value of the input NAME in its unit, row by row, as a constant in the code; or value of an unknown "
+            "of your own algorithm.",
         ),
     ] = None
 
@@ -243,7 +276,7 @@ class MethodOptions:
         option(
             "--layout",
             metavar="FILE",
-            help="TOML file with the gyros whose rate and acceleration separate separates.",
+            help="TOML file with the layout of gyros for the kernels separate and measure.",
         ),
     ] = None
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import typer
-
+from strapgen.cli import terminal
 from strapgen.cli.options import option
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives
@@ -30,6 +29,7 @@ def format_option(formats: tuple[str, ...], default: str = "") -> Any:
         metavar="NAME",
         help=f"Format of the output: {alternatives([*formats])}.{default}",
         panel="Output",
+        words=formats,
     )
 
 
@@ -124,9 +124,9 @@ class Output:
             files[str(self.plot)] = image
         written = write_files(Path(), files)
         if self.file is None:
-            typer.echo(text)
+            terminal.write(text)
         if written:
-            typer.echo(f"wrote {' and '.join(map(str, written))}", err=True)
+            terminal.remark(f"wrote {' and '.join(map(str, written))}")
 
 
 #: The options of a result without a picture.
@@ -140,4 +140,4 @@ def check_format(value: str) -> str:
 
 def show(result: Result, format: str) -> None:
     """Print the result of a command that writes source files."""
-    typer.echo(result.written(format).rstrip("\n"))
+    terminal.write(result.written(format).rstrip("\n"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any
@@ -12,7 +13,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from strapgen import registration
-from strapgen.cli import help_layout
+from strapgen.cli import completion, help_layout, terminal
 from strapgen.cli.help_layout import CommandHelp, lay_out, summary
 from strapgen.cli.option_groups import CommandOptions
 from strapgen.ir.checks import alternatives, suggestions
@@ -29,10 +30,11 @@ class PlainCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line; an option's name is not the value of the option before it."""
-        _refuse_missing_values(self, ctx, args)
-        if name := _value_of("--variant", args):
-            words = registration.extension("cli.variant", "--variant")
-            ctx.default_map = words(name, ctx.command_path.partition(" ")[2], args)
+        if not ctx.resilient_parsing:  # else a shell completes the line
+            _refuse_missing_values(self, ctx, args)
+            _refuse_second_values(self, ctx, args)
+            if name := _value_of("--variant", args):
+                ctx.default_map = _words_of_variant(self, ctx, name, args)
         return list(super().parse_args(ctx, args))
 
     def invoke(self, ctx: Any) -> Any:
@@ -57,6 +59,17 @@ class PlainGroup(TyperGroup):
     def get_help(self, ctx: Any) -> str:
         """Return usage, text, options and the commands under their headings."""
         return lay_out(help_parts(self, ctx), self.listed())
+
+
+def _words_of_variant(command: Any, context: Any, name: str, words: Sequence[str]) -> dict[str, Any]:
+    """Return what a variant states for the parameters of a command, as the parser takes it."""
+    stated = registration.extension("cli.variant", "--variant")(
+        name, context.command_path.partition(" ")[2], words
+    )
+    several = {parameter.name for parameter in command.params if getattr(parameter, "multiple", False)}
+    return {
+        key: [value] if key in several and isinstance(value, str) else value for key, value in stated.items()
+    }
 
 
 def _value_of(option: str, words: Sequence[str]) -> str:
@@ -146,6 +159,15 @@ def _refuse_missing_values(command: Any, context: Any, words: Sequence[str]) -> 
             before = word
     if before in takes and not takes[before].is_flag:
         context.fail(_needs(command, before, context))
+
+
+def _refuse_second_values(command: Any, context: Any, words: Sequence[str]) -> None:
+    """Refuse an option of one value that is given twice; those of several values and settings add up."""
+    *_, order = command.make_parser(context).parse_args(list(words))
+    given = Counter(parameter.name for parameter in order)
+    for option in _options_of(command, context):
+        if given[option.name] > 1 and not option.is_flag and not option.multiple:
+            context.fail(f"{option.opts[0]} is given twice; one is needed")
 
 
 def _in_options(command: Any, message: str) -> str:
@@ -242,14 +264,14 @@ def app() -> typer.Typer:
     return _app
 
 
-def run(words: Sequence[str], completing: bool = False) -> Any:
-    """Run a command line, and return its exit status."""
-    _add_asked(words, completing)
+def run(words: Sequence[str]) -> Any:
+    """Run a command line, or complete it where a shell asks for that, and return its exit status."""
+    _add_asked(words)
     return _app(words, prog_name="strapgen", standalone_mode=False)
 
 
 def _show_versions(chosen: bool) -> None:
-    if not chosen:
+    if not chosen or completion.is_asked():
         return
     from strapgen.run.compiler import versions
 
@@ -260,9 +282,12 @@ def _show_versions(chosen: bool) -> None:
 @_app.callback()
 def _program_options(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", callback=_show_versions, is_eager=True)] = False,
+    version: Annotated[bool, typer.Option("--version", "-V", callback=_show_versions, is_eager=True)] = False,
     verbose: Annotated[bool, typer.Option("--verbose")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet")] = False,
 ) -> None:
+    if quiet:
+        context.call_on_close(terminal.silence())
     if verbose:
         _log_stages(context)
 
@@ -304,10 +329,10 @@ def _add_own(*names: str) -> None:
             _add(name, _OWN[name], registration.load(_OWN[name].function))
 
 
-def _add_asked(words: Sequence[str], completing: bool) -> None:
-    """Add the command of a command line alone; all of them where that is not enough, or a shell completes words."""
+def _add_asked(words: Sequence[str]) -> None:
+    """Add the command of a command line alone; all of them where that is not enough, or a shell asks for one."""
     asked = next((word for word in words if not word.startswith("-")), "")
-    if completing or (asked and asked not in _OWN):
+    if asked not in _OWN and (asked or completion.is_asked()):
         _add_own(*_OWN)
     elif asked:
         _add_own(asked, *(name for name in _OWN if name.startswith(f"{asked} ")))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, ClassVar, Self, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin, get_type_hints
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -14,6 +15,8 @@ from strapgen.ir.exceptions import InputError
 #: Reads a word of the command line: the option's name and the word, which is a path where the type is one.
 Reader = Callable[[str, Any], Any]
 Record = TypeVar("Record")
+#: The comma before the next of several settings; others are in the value of one.
+_NEXT_PAIR = re.compile(r",\s*(?=[A-Za-z_][\w.:-]*=)")
 _IN_WORDS = {2: "two", 3: "three"}
 
 
@@ -80,18 +83,20 @@ def single(option: str, text: str) -> str:
     return text
 
 
-def names(allowed: str | tuple[str, ...]) -> Reader:
-    """Return a reader of one name: of several, or of those that a registry "module:name" has when it is asked."""
+class Names(NamedTuple):
+    """A reader of one name: of several, or of those that a registry "module:name" has when it is asked."""
 
-    def read(option: str, text: str) -> str:
-        return checks.choice(option[2:], single(option, text), known())
+    allowed: str | tuple[str, ...]
 
-    def known() -> Iterable[str]:
+    def __call__(self, option: str, text: str) -> str:
+        """Read the name."""
         from strapgen import registration
 
-        return registration.load(allowed) if isinstance(allowed, str) else allowed
+        known = registration.load(self.allowed) if isinstance(self.allowed, str) else self.allowed
+        return checks.choice(option[2:], single(option, text), known)
 
-    return read
+
+names = Names
 
 
 def whole(smallest: int, largest: int | None = None) -> Reader:
@@ -122,7 +127,9 @@ def reader(kind: Any, read: Reader | None) -> Reader | None:
     """Return what reads the values of a type; `read` reads one of several. None for what is taken as it is."""
     whole_kind, parts = split(kind)
     if whole_kind is tuple:
-        return _tuple_reader(parts, read or reader(parts[0], None) or _as_it_is)
+        return _tuple_reader(
+            parts, read or reader(parts[0], None) or (_path if parts[0] is Path else _as_it_is)
+        )
     if issubclass(whole_kind, Mapping):
         return _pairs_reader(read or reader(parts[1], None) or _as_it_is)
     if read is not None:
@@ -131,6 +138,10 @@ def reader(kind: Any, read: Reader | None) -> Reader | None:
         return whole_kind.read  # type: ignore[no-any-return]
     readers: dict[Any, Reader] = {int: checks.whole, Fraction: checks.number}
     return readers.get(whole_kind)
+
+
+def _path(option: str, text: str) -> Path:
+    return Path(text)
 
 
 def _as_it_is(option: str, text: str) -> str:
@@ -146,7 +157,9 @@ def listed(option: str, text: str) -> list[str]:
 
 
 def _tuple_reader(parts: tuple[Any, ...], read: Reader) -> Reader:
-    def several(option: str, text: str) -> tuple[Any, ...]:
+    def several(option: str, text: str | Sequence[str]) -> tuple[Any, ...]:
+        if not isinstance(text, str):  # given several times
+            text = ",".join(text)
         if ... in parts:
             return tuple(read(option, value) for value in listed(option, text))
         values = text.split(",")
@@ -161,7 +174,7 @@ def _tuple_reader(parts: tuple[Any, ...], read: Reader) -> Reader:
 def _pairs_reader(read: Reader) -> Reader:
     def pairs(option: str, texts: Iterable[str]) -> dict[str, Any]:
         values: dict[str, Any] = {}
-        for text in texts:
+        for text in (part for several in texts for part in _NEXT_PAIR.split(several)):
             name, equals, value = text.partition("=")
             if not equals or not name or not value:
                 raise InputError(f"{option} {text!r} is no setting; NAME=VALUE is needed")

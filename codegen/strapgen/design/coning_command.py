@@ -65,7 +65,7 @@ class ConingDesign(BandOptions):
         option(
             "--powers",
             metavar="N",
-            help="Powers of the frequency, from the third on, that the drift of the design has not.  [default: 0]",
+            help="Number of powers of the frequency, from the third on, that vanish in the drift.  [default: 0]",
         ),
     ] = None
     products: Annotated[
@@ -156,7 +156,7 @@ def coning(
         option(
             "--previous",
             metavar="N",
-            help="Number of samples from before the slow cycle that it uses as well, 0 to 32.",
+            help="Number of samples before the slow cycle that it also uses, 0 to 32.",
             panel="Algorithm",
             read=whole(0, 32),
         ),
@@ -183,7 +183,7 @@ def coning(
     design: ConingDesign,
     output: Annotated[ConingOutput, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Derive coning coefficients and the drift that remains.
+    """Derive coning coefficients and their residual drift.
 
     A coefficient multiplies the cross product older sample x newer sample. The pairs are in the order of the newer
     sample, then of the older one, so that the newest pair is last. The residual is the mean drift on coning in rad/s,
@@ -191,7 +191,7 @@ def coning(
     (half-angle of the cone in rad), omega (its frequency in rad/s) and T (time between samples in s).
 
     With --objective the newest sample is crossed with a weighted sum of older ones, whose weights are the best ones
-    for a band or a spectrum of vibration. Such coefficients answer coning alone. --format toml writes the file that
+    for a band or a spectrum of vibration. Such coefficients correct coning alone. --format toml writes the file that
     --coning takes.
 
     Example: strapgen coning --samples 4 --form combined

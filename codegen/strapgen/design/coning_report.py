@@ -1,4 +1,4 @@
-"""Coning coefficients, exact ones and those for a band or a spectrum, with the drift that remains, as results."""
+"""Coning coefficients, exact or designed for a band or a spectrum, with their residual drift, as results."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _POINTS, _WIDEST = 16, 3.0
 
 @dataclass(frozen=True)
 class ConingResult(Result):
-    """Coning coefficients, and the drift that remains; coefficients and residual are text that SymPy can read."""
+    """Coning coefficients and their residual drift; coefficients and residual are text that SymPy can read."""
 
     design: Design = field(metadata=INTERNAL)
     coefficients: list[str]
@@ -85,7 +85,7 @@ class ConingResult(Result):
         return coning_latex(self.design)
 
     def text(self) -> str:
-        """Return the coefficients, the drift that remains, and the terms of higher order."""
+        """Return the coefficients, the residual drift, and the terms of higher order."""
         design = self.design
         lines = [
             f"{design.form} coning coefficients, {_samples_text(design)}",

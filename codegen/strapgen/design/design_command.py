@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import Needs, grouped, rules
 from strapgen.cli.options import Duration, GyroRate, option
 from strapgen.cli.output import Output
@@ -35,7 +36,7 @@ def design(
         option(
             *("--method", "--methods"),
             metavar="NAME,...",
-            help="Look at these methods alone, with all their samples or some, as in magnus4 or coning-combined:3+3.  "
+            help="Compare these methods only, with all numbers of samples or some, as magnus4 or coning-combined:3+3.  "
             "[default: all of the catalogue, and coefficients designed for the vibration]",
             panel="Algorithm",
         ),
@@ -45,7 +46,7 @@ def design(
         option(
             "--simulate",
             metavar="N",
-            help="Run the cheapest N algorithms in time, and show their drift beside the predicted one.",
+            help="Simulate the cheapest N algorithms, and show their drift beside the predicted one.",
             panel="Run",
             read=whole(1),
         ),
@@ -64,7 +65,7 @@ def design(
         option(
             "--results",
             metavar="FILE",
-            help="File that keeps each result when it is there; a run that was stopped goes on from it.",
+            help="File for the results of finished cases, from which an interrupted run resumes.",
             panel="Run",
         ),
     ] = None,
@@ -74,8 +75,8 @@ def design(
     """Select the cheapest algorithm that meets a brief.
 
     The brief states the largest rate, the vibration, the gyro, the budget and the processor. You see every algorithm
-    of the catalogue, and coefficients designed for the vibration, with the drift that each cause predicts, what it
-    costs, and what binds those that do not meet the brief. The bound of rounding is certified.
+    of the catalogue, and coefficients designed for the vibration, with its predicted drift by cause, its cost, and the
+    limit that excludes it if it does not meet the brief. The bound of rounding is certified.
 
     Example: strapgen design examples/briefs/ahrs.toml --plot out/ahrs.png
 
@@ -133,7 +134,7 @@ def _write(brief: DesignBrief, file: Path, ordered: list[Judgement], folder: Pat
         brief, best, algorithm_named(best, brief, file), report, f"strapgen design {shlex.quote(str(file))}"
     )
     for path in SourceOptions(out=folder).write(files):
-        typer.echo(f"wrote {path}", err=True)
+        terminal.remark(f"wrote {path}")
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ class StudyRun:
         option(
             "--results",
             metavar="FILE",
-            help="File that keeps each result when it is there; a study that was stopped goes on from it.",
+            help="File for the results of finished cases, from which an interrupted study resumes.",
         ),
     ] = None
 
@@ -178,9 +179,9 @@ def frontier(
 
     All algorithms get the same samples, of cones, cones on a spinning body, random rates, and slews with soft and with
     sharp onsets. You see the largest angle from the true attitude, divided by the duration, beside the multiplications
-    and additions for each sample. The plot shows which algorithms halve the drift of all that cost less.
+    and additions for each sample. The plot marks the algorithms that halve the drift of all cheaper ones.
 
-    With --motion they run on that motion alone.
+    With --motion the algorithms run on that motion only.
 
     A method:N+P+L takes N samples in a step, P from before it and L from after it. The method fit-exact integrates the
     polynomial through its samples exactly, as iterations on it do in the limit.
@@ -199,7 +200,7 @@ def frontier(
     rates, cluster = (str(run.sample_hz), str(run.duration)), workers.workers()
     several = study.candidates(methods)
     runs = study.frontier(several, *rates, run.results, workers.jobs, cluster, motions)
-    standings = study.in_order(track(runs, "running", len(several)), several)
+    drifts_and_costs = study.in_order(track(runs, "running", len(several)), several)
     from strapgen.design.frontier import FrontierResult
 
-    output.show(FrontierResult(standings, float(run.sample_hz), float(run.duration), motions))
+    output.show(FrontierResult(drifts_and_costs, float(run.sample_hz), float(run.duration), motions))

@@ -11,7 +11,7 @@ import numpy as np
 
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.filters import responses
-from strapgen.design.frontier import Standing, pareto
+from strapgen.design.frontier import DriftAndCost, pareto
 from strapgen.design.selection.judgement import SOFTWARE, Judgement
 from strapgen.results import figures
 
@@ -81,18 +81,20 @@ def frontier_image(result: FrontierResult, path: str | Path) -> bytes:
 
     A line of steps joins the algorithms that halve the drift of all that cost less; only they have a label.
     """
-    standings, sample_hz = result.standings, result.sample_hz
-    panels = [label for label in PANELS if label in standings[0].drifts] or list(standings[0].drifts)
+    drifts_and_costs, sample_hz = result.drifts_and_costs, result.sample_hz
+    panels = [label for label in PANELS if label in drifts_and_costs[0].drifts] or list(
+        drifts_and_costs[0].drifts
+    )
     columns = min(_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     figure, grid = figures.grid_of_axes(rows, columns, (6.2 * columns, 0.6 + 3.7 * rows))
     labels = [
-        (axes, _draw_panel(axes, standings, label, sample_hz))
+        (axes, _draw_panel(axes, drifts_and_costs, label, sample_hz))
         for axes, label in zip(grid.flat, panels, strict=True)
     ]
     for axes in grid[-1]:
         axes.set_xlabel("multiplications a second")
-    rates = [one.per_second(sample_hz) for one in standings]
+    rates = [one.per_second(sample_hz) for one in drifts_and_costs]
     grid[0, 0].set_xlim(min(rates) / _LEFT, max(rates) * _RIGHT)  # of all
     figure.draw_without_rendering()  # axes have their places
     for axes, names in labels:
@@ -106,12 +108,12 @@ def frontier_image(result: FrontierResult, path: str | Path) -> bytes:
 
 
 def _draw_panel(
-    axes: Any, standings: Sequence[Standing], label: str, sample_hz: float
+    axes: Any, drifts_and_costs: Sequence[DriftAndCost], label: str, sample_hz: float
 ) -> dict[str, tuple[float, float]]:
     """Draw the algorithms on one motion; return the points on the frontier by their names."""
     points = {
         one.name: (one.per_second(sample_hz), max(value, _LEAST))
-        for one in standings
+        for one in drifts_and_costs
         if (value := one.drifts[label]) is not None
     }
     axes.set_xscale("log")

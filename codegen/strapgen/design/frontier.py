@@ -1,7 +1,7 @@
 """Compares attitude algorithms by their drift on many motions and by what they cost, at one sampling rate.
 
-Every algorithm takes the same samples. One that takes several in a step moves on by as many; its cost is counted from
-its program, for each sample.
+Every algorithm takes the same samples. The cost of a step is counted from its program, and divided by the samples
+of the step.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ CANDIDATES = tuple(
 
 
 @dataclass(frozen=True)
-class Standing:
-    """What an algorithm costs, and how it drifts."""
+class DriftAndCost:
+    """Operations of an algorithm in a step, and its drift on each motion."""
 
     #: Of the candidate, of its kernel, and where the algorithm comes from
     name: str
@@ -139,8 +139,8 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What a process needs to run a candidate on all motions."""
+class RunSpec:
+    """A candidate with the motions, the sampling rate and the duration of its runs, as a worker process takes it."""
 
     candidate: Candidate
     #: Sampling rate in Hz, and length of the runs in s
@@ -149,8 +149,8 @@ class Trial:
     #: By their labels
     motions: Motions = field(default_factory=lambda: MOTIONS)
 
-    def moved(self, begin: Path, end: Path) -> Trial:
-        """Return the trial with the files of the user in another folder, see `parallel_cases.Bundle`."""
+    def moved(self, begin: Path, end: Path) -> RunSpec:
+        """Return the specification with the user's files in another folder, see `parallel_cases.Bundle`."""
         one, motions = self.candidate, dict(self.motions)
         if one.method.endswith(".py"):
             one = replace(one, method=moved(one.method, begin, end))
@@ -187,7 +187,7 @@ def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
 
 
 def _of_method(method: str) -> list[Candidate]:
-    """Return the candidates of a method; one of its own samples if there are none."""
+    """Return the candidates of a method; without any, one with the number of samples that the method needs."""
     several = [candidate for candidate in CANDIDATES if candidate.method == method]
     if several:
         return several
@@ -220,25 +220,25 @@ def frontier(
     jobs: int | None = None,
     cluster: Cluster | None = None,
     motions: Motions = MOTIONS,
-) -> Iterator[Standing]:
-    """Run algorithms on motions, and yield what each costs and how it drifts when its runs end.
+) -> Iterator[DriftAndCost]:
+    """Run algorithms on motions, and yield drift and cost of each when its runs end.
 
     `sample_hz, duration`: sampling rate in Hz, and length of the runs in s.
     """
     rate, length = require_steps(several, sample_hz, duration)
     for name, settings in motions.values():
         any_motion(name, str(length), settings)  # refuses what is not known
-    cases = {one.name: Trial(one, str(rate), str(length), motions) for one in several}
+    cases = {one.name: RunSpec(one, str(rate), str(length), motions) for one in several}
     users = [one.method for one in several if one.method.endswith(".py")]
     users += [name for name, _ in motions.values() if is_file(name)]
     files = None if cluster is None else Bundle.of(users)
     if results is None:
-        finished = side_by_side(run_trial, cases, jobs, cluster, files)
+        finished = side_by_side(run_case, cases, jobs, cluster, files)
     else:
         about = identity(str(rate), str(length), motions)
-        finished = resume(run_trial, cases, results, about, jobs, cluster, files)
+        finished = resume(run_case, cases, results, about, jobs, cluster, files)
     for _, data in finished:
-        yield Standing(**data)
+        yield DriftAndCost(**data)
 
 
 def require_steps(several: Sequence[Candidate], sample_hz: str, duration: str) -> tuple[Fraction, Fraction]:
@@ -254,39 +254,39 @@ def require_steps(several: Sequence[Candidate], sample_hz: str, duration: str) -
     return rate, length
 
 
-def in_order(standings: Iterable[Standing], several: Sequence[Candidate]) -> list[Standing]:
-    """Return standings in the order of their candidates."""
-    by_name = {standing.name: standing for standing in standings}
+def in_order(drifts_and_costs: Iterable[DriftAndCost], several: Sequence[Candidate]) -> list[DriftAndCost]:
+    """Return drifts and costs in the order of the candidates."""
+    by_name = {drift_and_cost.name: drift_and_cost for drift_and_cost in drifts_and_costs}
     return [by_name[candidate.name] for candidate in several]
 
 
-def run_trial(trial: Trial) -> dict[str, Any]:
-    """Run a candidate on the motions of its trial; return its standing as plain JSON data."""
-    choice = trial.candidate.choice
+def run_case(spec: RunSpec) -> dict[str, Any]:
+    """Run a candidate on the motions of a specification; return drift and cost as plain JSON data."""
+    choice = spec.candidate.choice
     program = pipeline.program(choice)
     operations = program.operations
     return asdict(
-        Standing(
-            trial.candidate.name,
+        DriftAndCost(
+            spec.candidate.name,
             program.title,
             program.source,
-            trial.candidate.increments,
+            spec.candidate.increments,
             operations["multiply"],
             operations["add"],
             sum(number for kind, number in operations.items() if kind not in ("multiply", "add", "negate")),
-            {label: _drift(choice, label, trial) for label in trial.motions},
+            {label: _drift(choice, label, spec) for label in spec.motions},
         )
     )
 
 
-def _drift(choice: Choice, label: str, trial: Trial) -> float | None:
+def _drift(choice: Choice, label: str, spec: RunSpec) -> float | None:
     """Return the drift on a motion over as many whole steps as the duration holds, in deg/h."""
-    rate, duration = Fraction(trial.sample_hz), Fraction(trial.duration)
-    step = trial.candidate.increments / rate
-    name, settings = trial.motions[label]
+    rate, duration = Fraction(spec.sample_hz), Fraction(spec.duration)
+    step = spec.candidate.increments / rate
+    name, settings = spec.motions[label]
     with np.errstate(all="ignore"):
         try:
-            profile = _motion(name, tuple(settings.items()), trial.duration)
+            profile = _motion(name, tuple(settings.items()), spec.duration)
             value = measured_drift(choice, profile, step, duration // step)
         except InputError:  # the attitude is not finite
             return None
@@ -300,7 +300,7 @@ def _motion(name: str, settings: tuple[tuple[str, str], ...], duration: str) -> 
 
 
 def pareto(points: Mapping[str, tuple[float, float]], gain: float = 0.0) -> list[str]:
-    """Return the names of the points that gain in the second number on all that have a smaller first one.
+    """Return the names of the points on the Pareto front: a second number below all others so far, by the share `gain`.
 
     >>> pareto({"cheap": (1, 9), "worse": (2, 9), "little": (3, 8.9), "good": (4, 1)}, gain=0.1)
     ['cheap', 'good']
@@ -318,7 +318,7 @@ _DRIFT, _COUNT = ANGLE, ".5g"
 
 @dataclass(frozen=True)
 class AlgorithmCost:
-    """What an algorithm costs for each sample, and how it drifts."""
+    """Operations of an algorithm for each sample, and its drift on each motion."""
 
     algorithm: str = field(metadata=entry("algorithm", align="<"))
     title: str
@@ -337,12 +337,12 @@ class AlgorithmCost:
 
 @dataclass(frozen=True)
 class FrontierResult(Result):
-    """What attitude algorithms cost, and how they drift on every motion."""
+    """Operations of attitude algorithms, and their drift on every motion."""
 
     computed = properties(motions=entry(), algorithms=entry())
     drawn_by = "strapgen.design.design_plots:frontier_image"
 
-    standings: Sequence[Standing] = field(metadata=INTERNAL)
+    drifts_and_costs: Sequence[DriftAndCost] = field(metadata=INTERNAL)
     #: Sampling rate
     sample_hz: float
     #: Length of the runs
@@ -369,7 +369,7 @@ class FrontierResult(Result):
                 multiply_per_s=one.per_second(self.sample_hz),
                 drift_deg_h=one.drifts,
             )
-            for one in self.standings
+            for one in self.drifts_and_costs
         ]
 
     def rows(self) -> list[dict[str, Any]]:
@@ -385,7 +385,7 @@ class FrontierResult(Result):
         """Return costs and drifts."""
         costs = reader_table(self.algorithms, AlgorithmCost)
         columns = [*costs.columns, *(Column(label, spec=_DRIFT) for label in self.described)]
-        rows = zip(costs.rows, self.standings, strict=True)
+        rows = zip(costs.rows, self.drifts_and_costs, strict=True)
         return TextTable(columns, [[*row, *one.drifts.values()] for row, one in rows])
 
     def text(self) -> str:
@@ -401,12 +401,12 @@ class FrontierResult(Result):
             *reader_table(self.algorithms, AlgorithmCost).lines(),
         ]
         for title, columns in _tables() if self.described == MOTIONS else _table_of(self.described):
-            rows = [[one.name, *(one.drifts[label] for label in columns)] for one in self.standings]
+            rows = [[one.name, *(one.drifts[label] for label in columns)] for one in self.drifts_and_costs]
             table = TextTable([Column("", "<"), *columns.values()], rows)
             lines += ["", title, "", *table.lines()]
         lines += ["", "sources", ""]
         sources: dict[str, list[str]] = {}
-        for one in self.standings:
+        for one in self.drifts_and_costs:
             sources.setdefault(one.source, []).append(one.name)
         return "\n".join([*lines, *(f"{', '.join(names)}: {source}" for source, names in sources.items())])
 

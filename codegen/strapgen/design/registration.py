@@ -10,7 +10,7 @@ REGISTRATION = Registration(
         "coning": Command(
             f"{__package__}.coning_command:coning",
             "Derive",
-            summary="Derive coning coefficients and the drift that remains",
+            summary="Derive coning coefficients and their residual drift",
         ),
         "window": Command(
             f"{__package__}.window_command:app",

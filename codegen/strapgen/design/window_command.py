@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.analysis.vibration.vibration_command import BandOptions
+from strapgen.cli import terminal
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.generate_command import SourceOptions
 from strapgen.cli.option_groups import Needs, OneOf, Rule, Shown, command_line, grouped, rules
-from strapgen.cli.options import CTarget, option
+from strapgen.cli.options import CTarget, argument, option
 from strapgen.cli.output import Format, Output, check_format, show
 from strapgen.cli.program import PlainCommand, PlainGroup
 from strapgen.cli.progress import waiting
@@ -32,7 +33,11 @@ if TYPE_CHECKING:
 #: The argument for a window.
 WindowArgument = Annotated[
     str,
-    typer.Argument(metavar="NAME|FILE", help="A window as window-7-7, or a TOML file with one."),
+    argument(
+        "NAME|FILE",
+        help="A window as window-7-7, or a TOML file with one.",
+        words="strapgen.catalogue.methods.windows:WINDOWS",
+    ),
 ]
 
 
@@ -196,7 +201,7 @@ def design(
         warnings = window_warnings(window)
     output.deliver(text)
     for warning in warnings:
-        typer.echo(f"strapgen: {warning}", err=True)
+        terminal.remark(f"strapgen: {warning}")
 
 
 def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:

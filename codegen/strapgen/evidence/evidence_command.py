@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Excludes, Needs, OneOf, grouped, rules
-from strapgen.cli.options import MethodOptions, option
+from strapgen.cli.options import MethodOptions, argument, option
 from strapgen.cli.output import format_option, show
 from strapgen.cli.progress import track
 from strapgen.navigation.systems.built_in import is_system
@@ -31,11 +32,11 @@ _FORMATS = ("text", "json", "csv", "markdown", "latex")
 def evidence(
     kernels: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="NAME...",
+        argument(
+            "NAME...",
             help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file, "
-            "or a described system, of which every stage is examined.",
-            show_default=False,
+            "or a described system, all of whose stages are verified.",
+            words="strapgen.catalogue.names:reserved",
         ),
     ] = None,
     *,
@@ -47,7 +48,13 @@ def evidence(
     fixed: FixedOptions,
     tool: Annotated[
         tuple[str, ...] | None,
-        option("--tool", metavar="NAME,...", help="Tools to run.  [default: all]", panel="Evidence"),
+        option(
+            "--tool",
+            metavar="NAME,...",
+            help="Tools to run.  [default: all]",
+            panel="Evidence",
+            words="strapgen.evidence.collection:CHECKS",
+        ),
     ] = None,
     complete: Annotated[
         bool,
@@ -74,11 +81,11 @@ def evidence(
     ] = False,
     format: Annotated[str, format_option(_FORMATS)] = "text",
 ) -> None:
-    """Have independent tools examine what generated C promises.
+    """Verify the generated C with external tools.
 
-    From the program of the C come a harness for Frama-C, formulas for a solver, a script for Gappa, runners for
-    processors and a driver for a fuzzer. The tools that are installed say whether any sum can overflow, whether the
-    error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
+    The command writes a harness for Frama-C, formulas for SMT solvers, a script for Gappa, test programs for processors
+    and a driver for a fuzzer, and runs the tools that are installed. They show whether any sum can overflow, whether
+    the error bounds hold, and whether other processors return the same bits. The exit status is 1 if a claim fails.
 
     Example: strapgen evidence euler --method rk4 --out out/evidence
     """
@@ -146,8 +153,12 @@ def _page(page: Path, text: str, check: bool) -> int:
     if not check:
         write_files(Path(), {str(page): text})
         return 0
-    written = page.read_text() if page.is_file() else ""
+    written = page.read_text(encoding="utf-8") if page.is_file() else ""
     same = without_versions(written) == without_versions(text)
     other = ", of other versions" if same and written != text else ""
-    typer.echo(f"{page} is {'in step' if same else 'out of step'} with what the tools{other} say", err=True)
+    said = f"{page} is {'in step' if same else 'out of step'} with what the tools{other} say"
+    if same:
+        terminal.remark(said)
+    else:
+        terminal.write(said, err=True)
     return int(not same)

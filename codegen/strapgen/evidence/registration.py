@@ -10,7 +10,7 @@ REGISTRATION = Registration(
         "evidence": Command(
             f"{__package__}.evidence_command:evidence",
             "Generate",
-            summary="Have independent tools examine what generated C promises",
+            summary="Verify the generated C with external tools",
         ),
     },
     results={"evidence": f"{__package__}.evidence_report:EvidenceResult"},

@@ -15,12 +15,12 @@ REGISTRATION = Registration(
         "verify": Command(
             f"{__package__}.verify_command:verify",
             "Generate",
-            summary="Verify that a generated C file is what its header says",
+            summary="Verify a generated C file against its header",
         ),
         "check": Command(
             f"{__package__}.check_code.check_command:check",
             "Analyse",
-            summary="Test what every attitude step must do; exit with 1 if it fails",
+            summary="Run the conformance tests; exit 1 on failure",
         ),
     },
     results={

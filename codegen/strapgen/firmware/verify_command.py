@@ -26,10 +26,10 @@ def verify(
     ],
     *,
     algorithms: Annotated[
-        list[str] | None,
+        tuple[str, ...] | None,
         option(
             "--algorithm",
-            metavar="NAME",
+            metavar="NAME,...",
             help="Your own algorithm that the header names; it runs as a program, and only if you name it here.",
             panel="Input",
         ),
@@ -38,15 +38,15 @@ def verify(
     source: SampleSource,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Verify that a generated C file is what its header says.
+    """Verify a generated C file against its header.
 
-    The exit status is 1 if it is not. The command in the header is read as data and generated again in memory, and
-    every line that differs is shown. A file in step is then compiled and called on corners, on random input and along a
-    run: in fixed point it must return the integers of the model, and stay within the certified bound of arithmetic with
-    40 digits. The run is a cone, or what --motion or a recording says.
+    The command in the header is parsed, the file is generated again in memory, and every line that differs is shown. A
+    file without differences is then compiled and called on the corners of its ranges, on random input and along a run:
+    in fixed point it must return the integers of the model, and stay within the certified bound of arithmetic with 40
+    digits. The run is a cone, or the motion or recording that the options state. The exit status is 1 on failure.
 
-    Of a described system, two speeds or a commit-late unit, given by its folder or the header of the whole, all files
-    are compared, and every stage is called.
+    FILE may be the folder, or the main header, of a described system, an algorithm in two speeds or a commit-late unit:
+    all files are then compared, and every stage is called.
 
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """
@@ -58,8 +58,8 @@ def verify(
         if stated(source):
             raise InputError("a motion or a recording goes with the file of one function")
         output.check(header)
-        return _verify_whole(header, algorithms or [], run_differing, output)
-    request = header_command.header_command_of(file).request(algorithms or [])
+        return _verify_whole(header, algorithms or (), run_differing, output)
+    request = header_command.header_command_of(file).request(algorithms or ())
     increments = None
     if stated(source):
         source.check()
@@ -71,7 +71,7 @@ def verify(
         raise typer.Exit(1)
 
 
-def _verify_whole(header: Path, algorithms: list[str], run_differing: bool, output: Output) -> None:
+def _verify_whole(header: Path, algorithms: tuple[str, ...], run_differing: bool, output: Output) -> None:
     """Verify the C of a system, of two speeds or of a commit-late unit; exit with 1 if it fails."""
     from strapgen.cli.progress import waiting
     from strapgen.firmware import header_command

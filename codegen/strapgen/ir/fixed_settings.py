@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple, TypedDict, TypeVar, Unpack
 
 from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError
+from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.formats import MULTIPLICATIONS, SHORTEST_WORD, Format, check_rounding, check_word
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.units import DEFAULT_BITS, Sensor
@@ -31,6 +32,8 @@ DEFAULT_ANGLE = Fraction(1, 8)
 #: Increments that formats are chosen for, in rad: from the earth's rate in a microsecond to over half a turn.
 SMALLEST_ANGLE, LARGEST_ANGLE = Fraction(1, 10**11), 4
 DEFAULT_ALLOWANCE = Fraction(1, 16)
+#: Most increments of a step.
+_MOST_INCREMENTS = 8
 #: Names of the inputs that the largest angle bounds.
 TURNING = ("increments", "turns")
 
@@ -38,6 +41,52 @@ TURNING = ("increments", "turns")
 _DEGREE = Fraction(math.ceil(Fraction(3141592653589793239, 180) * 10**3), 10**21)
 #: Stated limits are rounded up to whole multiples of this.
 _LIMIT_UNIT = 1 << 60
+
+
+#: A number: decimals and fractions as text are exact.
+Number = float | str | Fraction
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class StatedSettings(TypedDict, total=False):
+    """What a user states of fixed point, as the keywords of `Settings.of`."""
+
+    word: int
+    max_rate_deg_s: Number | None
+    step: Number | None
+    sample_hz: Number | None
+    increments: int | None
+    largest_angle: Number | None
+    lsb: str | None
+    input_bits: int | None
+    rounding: str
+    carry: str
+    allowance: Number
+    ranges: Mapping[str, Number]
+    formats: Mapping[str, str]
+    state: str
+    multiply: str
+    digits: int
+
+
+def with_settings(function: F) -> F:
+    """Show the keywords of `StatedSettings` one by one in the signature of a function, for help and completion."""
+    signature = inspect.signature(function)
+    shown = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    shown += [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+        for name, kind in StatedSettings.__annotations__.items()
+    ]
+    function.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
+    return function
+
+
+class _WholeStep(NamedTuple):
+    """What settings say of a whole step, until a program tells how many increments it has."""
+
+    step: str
+    max_rate_deg_s: str | None
+    lsb: str | None
 
 
 @dataclass(frozen=True)
@@ -73,6 +122,11 @@ class Settings:
         How products with a constant are computed: "product" or "shift-add".
     digits : int
         Canonical signed digits of a constant that "shift-add" takes; 0 for all that a word has.
+    increments : int or None
+        The number of increments a step that `Settings.of` was told; a program with another number is refused.
+    whole_step : tuple or None
+        The step and the rate of settings that were not told the number: `largest_angle` is then the angle of the whole
+        step, until `for_program` divides it.
 
     Raises
     ------
@@ -98,6 +152,8 @@ class Settings:
     state: str = ""
     multiply: str = "product"
     digits: int = 0
+    increments: int | None = field(default=None, compare=False, repr=False)
+    whole_step: _WholeStep | None = None
 
     __repr__ = short_repr
 
@@ -111,7 +167,8 @@ class Settings:
         checks.count("digits", self.digits, smallest=0, largest=self.word)
         if self.digits and self.multiply != "shift-add":
             raise InputError(f"digits is {self.digits}; it goes with multiply shift-add")
-        if not SMALLEST_ANGLE <= self.largest_angle <= LARGEST_ANGLE:
+        most = LARGEST_ANGLE * (1 if self.whole_step is None else _MOST_INCREMENTS)
+        if not SMALLEST_ANGLE <= self.largest_angle <= most:
             # In the names of Python; the command line turns them into options again.
             stated = self.stated.removeprefix("--").replace("max-rate-deg-s", "max_rate_deg_s")
             stated = stated.replace("sample-hz", "sample_hz")
@@ -165,25 +222,18 @@ class Settings:
         return None if self.sensor is None else min(DEFAULT_BITS, self.word)
 
     @classmethod
-    def of(
-        cls,
-        *,
-        word: int = 32,
-        max_rate_deg_s: Any = None,
-        step: Any = None,
-        increments: int = 1,
-        largest_angle: Any = None,
-        sample_hz: Any = None,
-        lsb: Any = None,
-        **rest: Any,
-    ) -> Settings:
+    @with_settings
+    def of(cls, **stated: Unpack[StatedSettings]) -> Settings:
         """Return settings from what a user states: rates and times as numbers or decimals.
 
         Parameters
         ----------
         max_rate_deg_s, step : number, optional
             Largest body rate on an axis, in deg/s, and the step in s: their product, divided by the number of
-            `increments` a step, bounds an angle increment.
+            increments a step, bounds an angle increment.
+        increments : int, optional
+            That number, which a program knows: where it is left out, the program that the settings are used for gives
+            it, and where it is another one, they are refused.
         largest_angle : number, optional
             That bound itself, in rad.
         sample_hz : number, optional
@@ -191,6 +241,8 @@ class Settings:
         lsb : str, optional
             Scale of a gyro that counts: rate a count, as "0.0175dps", or angle a count, as "3e-6rad". Increments are
             then its counts, and the largest of them is bounded by its bits too.
+        **stated
+            The other parameters of `Settings`.
 
         Examples
         --------
@@ -198,9 +250,41 @@ class Settings:
         >>> settings.input_bits, round(float(settings.largest_angle), 4)
         (16, 0.1001)
         """
+        given: dict[str, Any] = {name: value for name, value in stated.items() if value is not None}
+        for name in given.keys() - StatedSettings.__annotations__.keys():
+            raise InputTypeError(checks.unknown("setting", name, StatedSettings.__annotations__))
+        return cls._of(**given)
+
+    @classmethod
+    def stated_or(cls, settings: Settings | None, stated: StatedSettings) -> Settings | None:
+        """Return settings, or those of keywords; None if there are neither."""
+        given = [name for name, value in stated.items() if value is not None]
+        if not given:
+            return settings
+        if settings is not None:
+            raise InputError(f"settings and {given[0]} are both given; one is needed")
+        return cls.of(**stated)
+
+    @classmethod
+    def _of(
+        cls,
+        *,
+        word: int = 32,
+        max_rate_deg_s: Any = None,
+        step: Any = None,
+        increments: int | None = None,
+        largest_angle: Any = None,
+        sample_hz: Any = None,
+        lsb: Any = None,
+        **rest: Any,
+    ) -> Settings:
+        if increments is not None:
+            increments = checks.count("increments", increments)
+        if "allowance" in rest:
+            rest["allowance"] = checks.number("drift allowance", rest["allowance"])
         if max_rate_deg_s is not None and largest_angle is not None:
             raise InputError("the largest angle and the largest rate are both given; one is needed")
-        interval, heard = _interval(step, sample_hz, increments)
+        interval, heard = _interval(step, sample_hz, increments or 1)
         if max_rate_deg_s is not None and interval is None:
             raise InputError("max_rate_deg_s and step go together; step is missing")
         if max_rate_deg_s is None and step is not None and lsb is None:
@@ -229,7 +313,57 @@ class Settings:
             angle = whole if angle is None else min(angle, whole)
         if angle is None:
             angle = DEFAULT_ANGLE
+        if step is not None and increments is None:
+            rate, scale = (None if value is None else str(value) for value in (max_rate_deg_s, lsb))
+            rest["whole_step"] = _WholeStep(str(step), rate, scale)
+        elif step is not None:  # a sample rate and an angle hold for any number
+            rest["increments"] = increments
         return cls(word, rounded_limit(angle), **rest, stated=" ".join(options), sensor=sensor)
+
+    def for_program(self, increments: int | None, kernel: str) -> Settings:
+        """Return the settings with the angle of one of the increments of a step.
+
+        Parameters
+        ----------
+        increments : int or None
+            Increments that a step of the program takes; None for a program that takes none.
+        kernel : str
+            Name of the kernel, for a refusal.
+
+        Raises
+        ------
+        InputError
+            If another number of increments was stated.
+
+        Examples
+        --------
+        >>> settings = Settings.of(max_rate_deg_s=400, step="0.01")
+        >>> settings.for_program(2, "euler-rk4-2") == Settings.of(max_rate_deg_s=400, step="0.01", increments=2)
+        True
+        """
+        if increments is not None and self.increments not in (None, increments):
+            raise InputError(
+                f"increments is {self.increments}, but {kernel} takes {checks.counted(increments, 'increment')} a step"
+            )
+        if self.whole_step is None:
+            return self if self.increments is None else replace(self, increments=None)
+        step, rate, lsb = self.whole_step
+        bits = None if self.sensor is None else self.input_bits
+        angles = Settings.of(
+            word=self.word,
+            max_rate_deg_s=rate,
+            step=step,
+            increments=increments or 1,
+            lsb=lsb,
+            input_bits=bits,
+        )
+        return replace(
+            self,
+            largest_angle=angles.largest_angle,
+            stated=angles.stated,
+            sensor=angles.sensor,
+            whole_step=None,
+        )
 
     def fitted(self, largest: float) -> Settings:
         """Return the settings with a largest angle of this magnitude, and up to an eighth more.
@@ -246,13 +380,21 @@ class Settings:
             return self  # its counts are what they are
         exponent = math.frexp(largest)[1] - 4
         angle = Fraction(2) ** exponent * math.ceil(math.ldexp(largest, -exponent))
-        return replace(self, largest_angle=angle, stated="")
+        return replace(self, largest_angle=angle, stated="", increments=None, whole_step=None)
 
     def without_counts(self) -> Settings:
         """Return the settings for a kernel that takes no increments from the gyro."""
         if self.input_bits is None:
             return self
-        return replace(self, sensor=None, input_bits=None, largest_angle=DEFAULT_ANGLE, stated="")
+        return replace(
+            self,
+            sensor=None,
+            input_bits=None,
+            largest_angle=DEFAULT_ANGLE,
+            stated="",
+            increments=None,
+            whole_step=None,
+        )
 
     def for_increments(self, largest: float) -> Settings:
         """Return the settings for a run whose largest increment is known; a largest angle that is stated stays."""
@@ -274,12 +416,13 @@ class Settings:
             "state": self.state,
             "multiply": self.multiply,
             "digits": self.digits,
+            **({} if self.whole_step is None else {"whole_step": list(self.whole_step)}),
         }
 
     @property
     def identity(self) -> str:
         """Text that differs between different settings."""
-        return json.dumps(self.as_dict(), sort_keys=True)
+        return json.dumps(self.as_dict() | {"increments": self.increments}, sort_keys=True)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:
@@ -291,6 +434,7 @@ class Settings:
                 "allowance": Fraction(data["allowance"]),
                 "ranges": {name: Fraction(value) for name, value in data["ranges"].items()},
                 "sensor": data["sensor"] and Sensor.from_dict(data["sensor"]),
+                "whole_step": _WholeStep(*data["whole_step"]) if "whole_step" in data else None,
             }
         )
 

@@ -260,6 +260,15 @@ class Program:
         return self.info.recursion
 
     @property
+    def increments_per_step(self) -> int | None:
+        """Number of angle increments of a step, without those from beside it; None if it takes none."""
+        for signal in self.inputs:
+            if signal.name == "increments":
+                beside = [name for name in signal.elements if name.startswith(("past", "ahead"))]
+                return max(1, (signal.size - len(beside)) // 3)
+        return None
+
+    @property
     def results(self) -> tuple[Result, ...]:
         """The outputs, and the transition where there is one."""
         return self.outputs if self.transition is None else (*self.outputs, self.transition)

@@ -1,18 +1,44 @@
-"""Old names of fields and attributes, which keep working for one version with a warning."""
+"""Old names of parameters, fields and attributes, which keep working for one version with a warning."""
 
 from __future__ import annotations
 
 import functools
 import warnings
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 T = TypeVar("T", bound=type)
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def warn(old: str, new: str, level: int = 3) -> None:
     """Warn at the caller's line that a name has changed."""
     warnings.warn(f"{old} is now {new}", DeprecationWarning, stacklevel=level)
+
+
+def renamed_parameters(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorate a function so that keywords keep old names beside the present ones.
+
+    >>> @renamed_parameters(choice="algorithm")
+    ... def derive(algorithm):
+    ...     return algorithm
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     derive(choice="euler"), str(said[0].message)
+    ('euler', 'choice is now algorithm')
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def call(*values: P.args, **rest: P.kwargs) -> R:
+            if names.keys() & rest:
+                return function(*values, **current(dict(rest), names))
+            return function(*values, **rest)
+
+        return call
+
+    return decorate
 
 
 def current(fields: dict[str, Any], renamed: dict[str, str]) -> dict[str, Any]:

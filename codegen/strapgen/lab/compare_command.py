@@ -61,10 +61,10 @@ def compare(
         ),
     ] = "numpy",
     files: Annotated[
-        list[Path] | None,
+        tuple[Path, ...] | None,
         option(
             "--source",
-            metavar="FILE",
+            metavar="FILE,...",
             help="C file that strapgen generated, as one more back end, in its own formats.",
             panel="Algorithm",
         ),
@@ -142,7 +142,7 @@ def _compared(
         rows = comparison.compare(
             choice,
             backends=backends,
-            increments=inputs.increments,
+            samples=inputs.increments,
             reference=reference,
             truth=inputs.truth,
             settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),

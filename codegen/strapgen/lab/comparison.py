@@ -3,32 +3,40 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.catalogue import Choice, choose_step
+from strapgen import fixedpoint, pipeline
+from strapgen.catalogue import AnyAlgorithm, Choice, choose_step, named
 from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.exceptions import CompilerError, InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
+from strapgen.ir.renamed import warn
 from strapgen.lab.cost import code_size
-from strapgen.lab.runs import attitude, drift_between, require_finite
+from strapgen.lab.motions.motions import motion
+from strapgen.lab.runs import attitude, drift_between, require_finite, samples_of_steps
 from strapgen.results.records import INTERNAL, Record, entry
 from strapgen.results.table import ANGLE
 from strapgen.run.backends import BACKENDS, DEFAULT_BACKENDS, Backend, sources_to_build
 from strapgen.run.backends import backend as attitude_backend
-from strapgen.run.compiler import compile_together
+from strapgen.run.compiler import C, compile_together
 from strapgen.run.increments import pulses
+from strapgen.targets import TARGETS
 
 Array = NDArray[np.float64]
 
+#: The motion of a comparison without samples: rates of coning in deg/s, step in s, number of steps.
+CONING_DEG_S, STEP, STEPS = dict.fromkeys(("a_deg_s", "b_deg_s", "g_deg_s"), 10), Fraction(1, 100), 1000
 #: Number of timed runs, of which the shortest counts.
 _TIMED = 3
 #: Number of steps, about, at which a history has the certified bound.
@@ -111,11 +119,11 @@ class Comparisons(list[Comparison]):
 
 
 def compare(
-    algorithm: str | Choice,
+    algorithm: AnyAlgorithm,
     method: AnyMethod | None = None,
-    samples: int | None = None,
-    backends: Sequence[str | Backend] = DEFAULT_BACKENDS,
-    increments: Any = None,
+    increments: int | None = None,
+    backends: Sequence[str | Backend] | None = None,
+    samples: Any = None,
     *,
     reference: str = "numpy",
     truth: Array | None = None,
@@ -125,16 +133,17 @@ def compare(
 
     Parameters
     ----------
-    algorithm, method
-        As for `strapgen.backend`. A choice also says how many increments from before a step it takes.
-    samples : int, optional
-        Number of increments per step.
+    algorithm, method, increments : optional
+        As for `strapgen.backend`. A choice, and that of an algorithm object, has its own method and increments a step.
     backends : sequence of str or Backend, optional
-        Keys of `BACKENDS`, by default all but the slow ones; or back ends of the same step, as
-        `verification.file_backend` makes one of a file.
-    increments : array_like, (N, K, 3)
-        Angle increments of N steps in rad; every back end rounds the same ones to its own format. Where settings state
-        a gyro that counts, all back ends take its counts, and the rest of each goes into the next.
+        Keys of `BACKENDS`, by default all but the slow ones that can run here: those in C need a compiler, those in
+        fixed point an algorithm that it can compute. Or back ends of the same step, as `verification.file_backend`
+        makes one of a file.
+    samples : array_like, (N, K, 3), optional
+        Angle increments of N steps in rad, body axes; every back end rounds the same ones to its own format. Where
+        settings state a gyro that counts, all back ends take its counts, and the rest of each goes into the next. By
+        default those of 1000 steps of 0.01 s of coning with all three parameters at 10 deg/s, whose true attitude is
+        then the truth.
     reference : str, optional
         A key of `BACKENDS`; "exact" shows all rounding.
     truth : array, (1 + N, 3, 3), optional
@@ -150,8 +159,7 @@ def compare(
     Raises
     ------
     InputError, InputTypeError
-        If a name is not allowed, the increments are missing or do not fit, or a run leaves the range of a back end's
-        numbers.
+        If a name is not allowed, the samples do not fit, or a run leaves the range of a back end's numbers.
 
     Examples
     --------
@@ -159,19 +167,24 @@ def compare(
     >>> [row.backend for row in rows], rows[0].max_abs_rad
     (['numpy', 'c'], 0.0)
     """
-    checks.require("compare", algorithm, str, os.PathLike, Choice)
-    choice = choose_step(algorithm, method, samples)
+    if hasattr(increments, "__len__") or isinstance(samples, Integral):
+        warn("compare(samples=count, increments=array)", "compare(increments=count, samples=array)")
+        increments, samples = samples, increments
+    choice = choose_step(named("compare", algorithm), method, increments)
+    if backends is None:
+        backends = usable_backends(choice)
     for name in backends:
         if not isinstance(name, Backend):
             checks.choice("backend", name, BACKENDS)
     checks.choice("reference", reference, BACKENDS)
     if not backends:
         raise InputError("no back end is named; at least one is needed")
-    if increments is None:
-        raise InputTypeError("increments is None; an array (steps, samples, 3) in rad is needed")
     if settings is not None and not isinstance(settings, Settings):
         raise InputTypeError(f"settings is {checks.describe(settings)}; strapgen.Settings is needed")
-    d = np.asarray(increments, np.float64)
+    if samples is None:
+        samples, true = _coning(choice)
+        truth = true if truth is None else truth
+    d = checks.numbers("samples", samples, (None, None, 3))
     fixed = (settings or Settings()).for_increments(float(np.abs(d).max(initial=0.0)))
 
     def settings_of(name: str) -> Settings | None:
@@ -195,6 +208,26 @@ def compare(
         for name in backends
     )
     return Comparisons(replace(row, kernel=choice.kernel) for row in rows)
+
+
+def usable_backends(choice: Choice) -> tuple[str, ...]:
+    """Return the back ends of a comparison that names none: those that run here and can compute the algorithm."""
+    compiler = False
+    with suppress(CompilerError):
+        compiler = bool(C.command())
+    can_fix = fixedpoint.can_lower(pipeline.program(choice))
+    return tuple(
+        name
+        for name in DEFAULT_BACKENDS
+        if (can_fix or not BACKENDS[name].fixed) and (compiler or not TARGETS[BACKENDS[name].target].compiled)
+    )
+
+
+def _coning(choice: Choice) -> tuple[Array, Array]:
+    """Return what the steps of a choice take of a coning motion, and its attitude."""
+    profile = motion("coning", **CONING_DEG_S)
+    read = samples_of_steps(attitude_backend(choice), profile, STEP)
+    return read(0, STEPS), profile.attitude(np.arange(1 + STEPS) * float(STEP))
 
 
 def _compared(

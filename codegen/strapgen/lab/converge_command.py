@@ -51,6 +51,7 @@ class _Ladder:
             "--motion",
             metavar="NAME",
             help=f"Motion: {MOTION_NAMES}, or a Python file of your own.  [default: coning]",
+            words="strapgen.catalogue:MOTIONS",
             read=a_motion,
         ),
     ] = None
@@ -111,7 +112,7 @@ def converge(
     workers: WorkerOptions,
     output: Output,
 ) -> None:
-    """Measure the order of a step and show it beside the predicted one.
+    """Measure the order of a step, and compare it with the predicted one.
 
     The order is the slope of the error on a ladder of step lengths. The back end exact computes with 40 digits and
     shows even high orders. Without --motion the runs are on a coning motion of about 1 rad/s with a steady rate added,

@@ -14,14 +14,16 @@ import mpmath
 import numpy as np
 
 from strapgen import catalogue
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import Order
 from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.motions.motion_names import is_file
-from strapgen.lab.motions.motions import Motion
+from strapgen.lab.motions.motions import GENERAL, Motion
+from strapgen.lab.motions.motions import motion as named_motion
 from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.parallel_cases import Bundle, Cluster, moved, side_by_side
 from strapgen.lab.runs import exact_attitudes, largest_increment, simulate, step_of_increments, uncertainty
@@ -32,12 +34,14 @@ from strapgen.run.backends import backend as attitude_backend
 
 #: Number of steps that the slope is fitted to: the finest of those whose error is truncation.
 FITTED = 3
+#: Step lengths of the ladder by default, in s.
+LADDER = ("1/8", "1/16", "1/32", "1/64", "1/128")
 #: Largest error in rad that the slope is fitted to; beyond it, the terms after the first count too.
 MOST_ERROR = 0.3
 
 
 @dataclass(frozen=True)
-class Rung:
+class StepError:
     """One step length of a ladder."""
 
     #: Step in s
@@ -78,7 +82,7 @@ class Convergence(Record):
     kernel, backend : str
     order : Order or None
         Orders in theory; None where a user's algorithm states none.
-    rungs : tuple of Rung
+    rungs : tuple of StepError
         From the longest step to the shortest.
     observed : float or None
         Slope of the logarithm of the error, fitted to the finest rungs whose error is truncation; None where no two
@@ -92,7 +96,7 @@ class Convergence(Record):
     kernel: str
     backend: str
     order: Order | None = field(metadata=entry(spread=True, write=PredictedOrders.of, kind=PredictedOrders))
-    rungs: tuple[Rung, ...]
+    rungs: tuple[StepError, ...]
     observed: float | None = field(metadata=entry(key="observed_order"))
     arguments: str = field(default="", metadata=INTERNAL)
     label: str | None = field(default=None, metadata=entry(optional=True))
@@ -163,11 +167,12 @@ def converge_all(
         yield int(name), outcome
 
 
+@renamed_parameters(choice="algorithm")
 def converge(
-    choice: Choice,
-    motion: Motion,
-    steps: Sequence[float | str | Fraction],
-    duration: float | str | Fraction,
+    algorithm: AnyAlgorithm,
+    motion: Motion | None = None,
+    steps: Sequence[float | str | Fraction] = LADDER,
+    duration: float | str | Fraction = 1,
     backend: str = "exact",
     settings: Settings | None = None,
 ) -> Convergence:
@@ -178,13 +183,14 @@ def converge(
 
     Parameters
     ----------
-    choice : Choice
+    algorithm : str, path, Choice or AttitudeAlgorithm
         An attitude step that takes increments.
-    motion : Motion
-        A motion whose rate changes direction, to show the order; on others an algorithm may do better.
-    steps : sequence of number
+    motion : Motion, optional
+        A motion whose rate changes direction, to show the order; on others an algorithm may do better. By default a
+        coning motion with rates of 1, 1.5 and 0.6 rad/s.
+    steps : sequence of number, optional
         Steps in s, each a divisor of the duration.
-    duration : number
+    duration : number, optional
         In s.
     backend : str, optional
         A key of `BACKENDS`. "exact" shows the order of any method, since its rounding cannot be seen.
@@ -209,7 +215,10 @@ def converge(
     (2, 2.0)
     """
     checks.choice("backend", backend, BACKENDS)
+    choice = catalogue.choose_step(algorithm)
     kernel = step_of_increments(choice)
+    if motion is None:
+        motion = named_motion("coning", **GENERAL)
     if not isinstance(motion, Motion):
         raise InputTypeError(f"motion is {checks.describe(motion)}; strapgen.motion makes one")
     total = checks.number("duration", duration, positive=True)
@@ -262,7 +271,9 @@ def fitted(
     if len(chosen) > 1:
         logs = np.array([(math.log(rungs[k][0]), math.log(rungs[k][1] or 1.0)) for k in chosen])
         observed = float(np.polyfit(logs[:, 0], logs[:, 1], 1)[0])
-    ladder = tuple(Rung(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs))
+    ladder = tuple(
+        StepError(length, error, slopes[k], k in chosen) for k, (length, error, _) in enumerate(rungs)
+    )
     return Convergence(kernel, backend, order, ladder, observed)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.lab.convergence import Convergence, Rung, labels
+from strapgen.lab.convergence import Convergence, StepError, labels
 from strapgen.results import figures
 from strapgen.results.result import Result
 from strapgen.results.table import ERROR, SECONDS, Column, TextTable
@@ -78,7 +78,7 @@ def _side_by_side(outcomes: Sequence[Convergence], names: Sequence[str]) -> Text
     return TextTable([Column("step, s", spec=SECONDS), *map(Column, names)], rows)
 
 
-def _cell(rung: Rung) -> str:
+def _cell(rung: StepError) -> str:
     if rung.error_rad is None:
         return "out of range "
     slope = "" if rung.slope is None else f" ({rung.slope:.2f})"

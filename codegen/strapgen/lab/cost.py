@@ -6,15 +6,18 @@ import math
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 from strapgen import catalogue, fixedpoint, pipeline
+from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_settings import Settings
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.lab.processors import PROCESSORS, executed, run_tool, version
@@ -128,6 +131,20 @@ def catalogue_costs(cpus: Sequence[str]) -> Iterator[Cost]:
                 yield cost(pipeline.compile(choice, "c-fixed"), cpu)
 
 
+def costs_of(
+    choices: Iterable[Choice],
+    target: str = "c-fixed",
+    settings: Settings | None = None,
+    cpus: Sequence[str] = (),
+    cross: str | None = None,
+) -> CostResult:
+    """Measure kernels on processors, by default on all whose compiler is installed."""
+    checks.choice("target", target, [name for name, entry in TARGETS.items() if entry.compiled])
+    names = processors(cross, cpus)
+    every = [pipeline.compile(choice, target, settings) for choice in choices]
+    return CostResult([cost(sources, name) for sources in every for name in names])
+
+
 @cache
 def _library(compiler: str) -> list[str]:
     """Return the flags that find the headers of a C library, if there is one for the compiler."""
@@ -199,6 +216,11 @@ class CostResult(Result):
     costs: Sequence[Cost]
     #: Whether they are all of the standard catalogue, which is a page in Markdown
     of_catalogue: bool = False
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return ", ".join(f"{one.kernel} on {one.cpu}: {one.instructions} instructions" for one in self.costs)
 
     def table(self) -> TextTable:
         """Return the numbers without the compiler."""

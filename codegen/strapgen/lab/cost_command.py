@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Excludes, OneOf, Shown, grouped, rules
-from strapgen.cli.options import MethodOptions, option
+from strapgen.cli.options import MethodOptions, argument, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import waiting
 from strapgen.ir.exceptions import InputError
@@ -22,10 +20,10 @@ from strapgen.ir.exceptions import InputError
 def cost(
     kernels: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="NAME...",
+        argument(
+            "NAME...",
             help="dcm, euler, cayley-klein, any other kernel that strapgen list kernels shows, or a Python file.",
-            show_default=False,
+            words="strapgen.catalogue.names:reserved",
         ),
     ] = None,
     *,
@@ -45,6 +43,7 @@ def cost(
             "--target",
             metavar="NAME",
             help="Kind of code: c-fixed, c or c-float.  [default: c-fixed]",
+            words=("c-fixed", "c", "c-float"),
             panel="Algorithm",
         ),
     ] = None,
@@ -70,7 +69,7 @@ def cost(
     ] = None,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Measure what the C of a kernel costs on microcontrollers.
+    """Measure size and execution of generated C on microcontrollers.
 
     You get the instructions and the bytes of the object code, the stack, and, where QEMU is installed, the instructions
     that a call executes, from the entry of the function to its return.
@@ -78,7 +77,6 @@ def cost(
     Example: strapgen cost euler dcm --cross arm-none-eabi-gcc --cpu cortex-m3 --max-rate-deg-s 400 --step 0.01
     """
     output.check(*(kernels or ()))
-    from strapgen import pipeline
     from strapgen.ir import checks
     from strapgen.lab import cost as costs
     from strapgen.lab.cost import CostResult
@@ -98,6 +96,5 @@ def cost(
         settings = fixed.settings(choice.increments_per_step)
         if settings is not None and not TARGETS[target].fixed:
             raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
-        sources = pipeline.compile(choice, target, settings)
-        rows += [costs.cost(sources, name) for name in processors]
+        rows += costs.costs_of([choice], target, settings, processors).costs
     output.show(CostResult(rows))

@@ -56,7 +56,7 @@ class _RandomRunOptions:
         ),
     ] = 1_000_000
     seed: Annotated[
-        int, option("--seed", metavar="N", help="Where the random numbers begin.", read=whole(0, 10**9))
+        int, option("--seed", metavar="N", help="Seed of the random numbers.", read=whole(0, 10**9))
     ] = 0
     backend: Annotated[
         str,
@@ -67,7 +67,7 @@ class _RandomRunOptions:
         option(
             "--results",
             metavar="FILE",
-            help="File that keeps each result when it is there; a sweep that was stopped goes on from it.",
+            help="File for the results of finished cases, from which an interrupted sweep resumes.",
         ),
     ] = None
 

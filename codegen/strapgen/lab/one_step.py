@@ -14,9 +14,9 @@ from typing import Any
 import sympy as sp
 
 from strapgen import catalogue, pipeline
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm
 from strapgen.catalogue.coefficients import Number
-from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.exceptions import InputError
 from strapgen.kernel import algebra
 from strapgen.kernel.covariants import Frame
 from strapgen.kernel.kernel import Kernel
@@ -77,10 +77,9 @@ class Step:
         return field(expressions, self.kernel.unknowns)
 
 
-def step(choice: Choice) -> Step:
+def step(algorithm: AnyAlgorithm) -> Step:
     """Return a chosen attitude step."""
-    if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
+    choice = catalogue.choose(algorithm)
     kernel = pipeline.derive(choice)
     if kernel.attitude_step is None:
         raise InputError(f"kernel {kernel.name} is no attitude step")
@@ -89,9 +88,9 @@ def step(choice: Choice) -> Step:
     return Step(kernel, nodes, kernel.order.step + 1 if kernel.order and rounded else 0)
 
 
-def linear_step(choice: Choice) -> Step:
+def linear_step(algorithm: AnyAlgorithm) -> Step:
     """Return a chosen attitude step that is linear in its state, so that its error is the same at any attitude."""
-    attitude_step = step(choice)
+    attitude_step = step(algorithm)
     attitude_step.kernel.require_known()
     if attitude_step.kernel.transition is None:
         raise InputError(

@@ -60,7 +60,7 @@ class SteadyRuns:
     steps: int
     #: Number of runs
     runs: int
-    #: Where the random numbers begin
+    #: Seed of the random numbers
     seed: tuple[int, ...] = (0,)
     #: A key of `strapgen.run.backends.BACKENDS`
     backend: str = "numpy"

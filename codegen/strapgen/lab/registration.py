@@ -20,12 +20,12 @@ REGISTRATION = Registration(
         "converge": Command(
             f"{__package__}.converge_command:converge",
             "Analyse",
-            summary="Measure the order of a step and show it beside the predicted one",
+            summary="Measure the order of a step, and compare it with the predicted one",
         ),
         "cost": Command(
             f"{__package__}.cost_command:cost",
             "Analyse",
-            summary="Measure what the C of a kernel costs on microcontrollers",
+            summary="Measure size and execution of generated C on microcontrollers",
         ),
         "study": Command(
             f"{__package__}.study_command:app",
@@ -47,5 +47,6 @@ REGISTRATION = Registration(
         "random-runs": f"{__package__}.random_runs:RandomRunsResult",
         "sensor-errors": f"{__package__}.sensor_error_study:SensorErrorResult",
     },
+    extensions={"cli.processors": f"{__package__}.processors:PROCESSORS"},
     lists={"motions": f"{__package__}.motions.motions:titles"},
 )

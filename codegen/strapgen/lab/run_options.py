@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 
-import typer
-
 from strapgen import registration
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import Excludes, Needs, OneOf, Rule
 from strapgen.cli.options import option
 from strapgen.cli.output import Output, format_option, plot_option
@@ -60,6 +59,7 @@ SensorFile = Annotated[
         "--errors",
         metavar="FILE",
         help="TOML file of sensor errors, or a class: ins-0.1, ins-1, ahrs or midcourse.  [default: no errors]",
+        words="strapgen.lab.sensor_errors.error_file:CLASSES",
         panel="Input",
     ),
 ]
@@ -145,7 +145,7 @@ class SampleSource:
         ),
     ] = None
     columns: Annotated[
-        _Text,
+        tuple[str, ...] | None,
         option(
             "--columns",
             metavar="NAME,...",
@@ -286,7 +286,7 @@ class SampleSource:
                     self.rates_csv or "",
                     self.rate_unit,
                     self.resample_hz,
-                    columns=self.columns,
+                    columns=None if self.columns is None else ",".join(self.columns),
                     time_unit=self.time_unit,
                     sample_hz=self.sample_hz,
                     bridge_gaps=self.bridge_gaps,
@@ -296,7 +296,7 @@ class SampleSource:
                 else recording.read_increments(self.increments_csv)
             )
         for remark in data.remarks:
-            typer.echo(f"strapgen: {self.file}: {remark}", err=True)
+            terminal.remark(f"strapgen: {self.file}: {remark}")
         return with_errors(data, errors)
 
     def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
@@ -382,6 +382,7 @@ class RunOptions:
             "--scheme",
             metavar="NAME",
             help="Kernel that orthonormalizes; strapgen list kernels shows all.  [default: the thesis's scheme]",
+            words="strapgen.catalogue:KERNELS",
         ),
     ] = None
     record: Annotated[

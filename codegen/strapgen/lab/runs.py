@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from strapgen import catalogue, pipeline
 from strapgen.catalogue import MOTIONS, Choice
 from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import Records, notebook_html, short_repr
 from strapgen.lab.motions.motions import Motion
 from strapgen.lab.motions.rate_motion import RateMotion
@@ -164,7 +164,9 @@ def simulate(
     if hasattr(initial, "as_matrix"):  # a Rotation of SciPy
         initial = initial.as_matrix()
     start = None if initial is None else initial_state(backend, initial)
-    states = backend.propagate_parts(_samples(backend, motion, h, pulse), steps, record_every, every, start)
+    states = backend.propagate_parts(
+        samples_of_steps(backend, motion, h, pulse), steps, record_every, every, start
+    )
     time: Array = np.arange(len(states), dtype=np.float64) * float(interval)
     require_finite(backend, states, time)
     true = motion.attitude(time) if initial is None else np.asarray(initial, float) @ motion.attitude(time)
@@ -276,8 +278,8 @@ def _turns(motion: Motion, step: Fraction, nodes: Sequence[float]) -> Callable[[
     return read
 
 
-def _samples(
-    backend: Backend, motion: Motion, step: Fraction, pulse: float | str | Fraction | None
+def samples_of_steps(
+    backend: Backend, motion: Motion, step: Fraction, pulse: float | str | Fraction | None = None
 ) -> Callable[[int, int], Array]:
     """Return what the steps of a run take, part by part: increments, or rates at nodes."""
     if not backend.nodes:
@@ -387,8 +389,6 @@ def steady_drift(run: Run) -> float:
 
 def step_of_increments(choice: Choice) -> Kernel:
     """Return the kernel of a chosen attitude step."""
-    if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
     kernel = pipeline.derive(choice)
     if kernel.attitude_step is None or kernel.inputs[1].name != "increments":
         raise InputError(f"kernel {kernel.name} takes no increments; a step that does is needed")

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import OneOf, Shown, grouped, rules
-from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepName, option
+from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, StepName, argument, option
 from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import whole
@@ -31,10 +29,10 @@ _MOST_RUNS, _MOST_INCREMENTS = 100_000, 2_000_000
 def study_sensor_errors(
     file: Annotated[
         str,
-        typer.Argument(
-            metavar="FILE",
+        argument(
+            "FILE",
             help="TOML file of sensor errors, or a class: ins-0.1, ins-1, ahrs or midcourse.",
-            show_default=False,
+            words="strapgen.lab.sensor_errors.error_file:CLASSES",
         ),
     ],
     *,
@@ -59,7 +57,7 @@ def study_sensor_errors(
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     output: Output,
 ) -> None:
-    """Show how far sensors with errors lead an attitude astray, over many runs and as predicted in closed form.
+    """Measure the attitude error due to sensor errors over many runs, beside its prediction in closed form.
 
     All causes run together, and then each alone. You see the mean and the standard deviation of the error on each axis
     at the end, with intervals of 95 %, beside what covariance predicts; --plot draws the deviations over time.

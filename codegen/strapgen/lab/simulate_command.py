@@ -38,10 +38,10 @@ def simulate(
     The true attitude of a motion is known, so that you see the drift, scale and skew of the computed attitude; along a
     recording you see the attitude itself.
 
-    With --errors the algorithm takes what sensors with errors measure, and the truth stays that of the motion.
+    With --errors the algorithm takes the increments of sensors with errors; the truth is still that of the motion.
 
     A file of a motion of your own has functions increments and attitude, which are checked against each other. With
-    --rates the step takes the rate itself, so that you see what its extraction from increments costs.
+    --rates the step takes the rate itself, so that you see the error of extracting it from increments.
 
     Recorded times must be evenly spaced unless you give --resample-hz. The rate is then taken as linear from one sample
     to the next, across intervals of up to ten times the median.

@@ -109,7 +109,7 @@ def word_length(
     The integer model runs every combination of method, word, rounding, carry, step and gyro pulse on a motion with
     known attitude. You see the drift from the truth and its three parts: the rounding of the arithmetic, beside its
     certified bound; the rounding of the increments; and the truncation error of the method. Finished runs stay in the
-    cache, so that a study that you stop goes on from there.
+    cache, from which an interrupted study resumes.
 
     Example: strapgen study word-length --word 12,16,20,24,32 --carry none,full --plot out/word-length.png
     """

@@ -20,7 +20,7 @@ REGISTRATION = Registration(
         "redundancy": Command(
             f"{__package__}.redundancy.redundancy_command:redundancy",
             "Generate",
-            summary="Derive what redundant sensors tell of their failures",
+            summary="Derive parity equations and failure isolation of redundant sensors",
         ),
         "strapdown": Command(
             f"{__package__}.strapdown_command:strapdown",

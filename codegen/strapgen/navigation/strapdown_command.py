@@ -131,7 +131,7 @@ def strapdown(
     navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force over the
     cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
-    With --errors the increments of the file are the true ones, and the algorithm takes what sensors measure of them.
+    With --errors the increments of the file are taken as true, and the algorithm gets those of sensors with errors.
 
     A described system, a built-in one or a file, takes the rate of the recording, and you see its outputs at the rate
     of the slowest of them.

@@ -66,8 +66,8 @@ def study_system(
 ) -> None:
     """Run a described system on several back ends, and compare attitude, velocity and position.
 
-    A vehicle stands on one spot, turns to and fro, rolls, pitches and vibrates; its sensors send counts. You see how
-    far the other back ends go from C in double, and this from the truth, and what memory and load they need, beside
+    A vehicle stands on one spot, turns to and fro, rolls, pitches and vibrates; its sensors send counts. You see the
+    differences of the other back ends from C in double, the errors of C in double, and memory and load of all, beside
     those of 1984. Differences add up in a closed run, and no bound is known for them; strapgen compare holds each
     single pass to its bound.
 
@@ -134,10 +134,10 @@ def study_attitude_form(
     fixed: Annotated[FixedOptions, Shown(only=("word",))],
     output: Output,
 ) -> None:
-    """Count what direction cosines, two rows of them, or a quaternion cost in a navigator.
+    """Count the operations of a navigator with direction cosines, two rows of them, or a quaternion.
 
-    You see the operations of each part, and those of each form in a second at your rates. Below stands what the
-    attitude to first order inside a slow cycle, as the sculling integral has it, costs in velocity.
+    You see the operations of each part, and those of each form in a second at your rates. Below them is the velocity
+    error due to the attitude of first order inside a slow cycle, which the sculling integral takes.
 
     Example: strapgen study attitude-form --update-hz 100 --max-rate-deg-s 200
     """
@@ -193,8 +193,8 @@ def study_output_filter(
 ) -> None:
     """Measure a Butterworth filter of second order on several back ends, beside its analog and digital response.
 
-    You also see what is left of a constant input and of none, once the filter has settled, without and with error
-    feedback in fixed point, and the bound for that in a run of any length.
+    You also see the error after the filter has settled, for a constant input and for none, without and with error
+    feedback in fixed point, and its bound in a run of any length.
 
     Example: strapgen study output-filter --cutoff-hz 8 --sample-hz 100
     """
@@ -255,9 +255,9 @@ def study_redundancy(
 ) -> None:
     """Count detected, isolated and missed failures of redundant gyros by Monte Carlo.
 
-    Sensors with quantization, noise, bias, scale factor errors and bending fail one after the other, by steps of many
-    sizes. You see how often an equation fails, which sensor is isolated, and whether the triad is sound: by the rule of
-    the kernel and by the tables.
+    Sensors have quantization, noise, bias, scale factor errors and bending, and fail one after the other, by steps of
+    many sizes. You see how often an equation fails, which sensor is isolated, and whether the triad is sound: by the
+    rule of the kernel and by the tables.
 
     Example: strapgen study redundancy --trials 500 --plot out/redundancy.png
     """
@@ -300,10 +300,10 @@ def study_calibration(
     ] = None,
     output: Output,
 ) -> None:
-    """Show which coefficients of an inertial measurement unit a scheme of positions sees, and how well.
+    """Show which error coefficients of an IMU a set of calibration positions determines, and how accurately.
 
     In each position the errors of rate and acceleration are measured at rest. You see the exact rank, combinations of
-    coefficients that leave no trace, and the standard deviation of every other coefficient by least squares; with
+    coefficients that cannot be observed, and the standard deviation of every other coefficient by least squares; with
     measured errors in the file, the estimates as well.
 
     Example: strapgen study calibration examples/positions-20.toml --plot out/calibration.png
@@ -398,8 +398,8 @@ def study_loops(
 ) -> None:
     """Run levelling, heading and vertical loop of an attitude and heading reference.
 
-    You see the gains of every mode, by pole placement, and where the loops are at its end after an error: by the
-    generated kernels, cycle by cycle, and by the matrix exponential. Unstable gains are refused.
+    You see the gains of every mode by pole placement, and the states at its end after an error: by the generated
+    kernels, cycle by cycle, and by the matrix exponential. Unstable gains are refused.
 
     Example: strapgen study loops --set tilt_deg=2 --plot out/loops.png
     """
@@ -444,6 +444,7 @@ class FlightOptions:
             "--force",
             metavar="NAME",
             help="Specific force in body axes: constant, random, oscillation, or lever for sensors on an arm.",
+            words=("constant", "random", "oscillation", "lever"),
         ),
     ] = "random"
     force_settings: Annotated[
@@ -511,8 +512,8 @@ def study_velocity_position(
     """Measure velocity and position along a motion with a specific force.
 
     Every method of the attitude has one for velocity and position, on the same samples. You see the largest errors of
-    both beside the operations for each sample. Gravity acts along -z; its part is exact. In a back end of fixed point
-    its rounding comes on top.
+    both beside the operations for each sample. Gravity acts along -z; its part is exact. A back end in fixed point adds
+    its rounding.
 
     Example: strapgen study velocity-position --method rk4:2,coning-combined:3+3 --duration 6
 
@@ -530,7 +531,7 @@ def study_velocity_position(
         raise InputError(f"--carry goes with a back end of fixed point, not with {backend}")
     motion_settings, force_settings = flight.stated()
     several = experiment.candidates(methods or experiment.DEFAULT)
-    course = experiment.Flight(
+    course = experiment.TestProfile(
         any_motion(flight.motion, flight.duration, motion_settings),
         force(flight.force, **force_settings),
         flight.sample_hz,
@@ -553,6 +554,7 @@ def rate_table(
             metavar="NAME,...",
             help="Algorithms, with commas between: dcm, euler, cayley-klein, two-speed.  [default: all]",
             panel="Algorithm",
+            words=("dcm", "euler", "cayley-klein", "two-speed"),
         ),
     ] = None,
     method: Annotated[

@@ -139,7 +139,7 @@ _ROOM = Fraction(9, 8)
 
 @dataclass(frozen=True)
 class TranslationRow:
-    """What an algorithm costs for each sample, and the largest errors of its velocity and position."""
+    """Operations of an algorithm for each sample, and its largest errors of velocity and position."""
 
     name: str = field(metadata=entry("algorithm", align="<"))
     multiply: float = field(metadata=entry("multiply", ".4g"))
@@ -149,8 +149,8 @@ class TranslationRow:
 
 
 @dataclass(frozen=True)
-class Flight:
-    """The motion, the force and the sampling that all algorithms share."""
+class TestProfile:
+    """The motion, the specific force and the sampling of the runs of all algorithms."""
 
     motion: Motion
     force: SpecificForce
@@ -187,11 +187,11 @@ def candidates(names: Iterable[str]) -> list[Candidate]:
     return several
 
 
-def study(several: Sequence[Candidate], flight: Flight) -> Iterator[TranslationRow]:
-    """Run algorithms along a flight, and yield what each costs and leads to."""
-    truth = flight.force.translation(flight.motion, 1 / flight.sample_hz, flight.count)
+def study(several: Sequence[Candidate], profile: TestProfile) -> Iterator[TranslationRow]:
+    """Run algorithms along a test profile, and yield cost and errors of each."""
+    truth = profile.force.translation(profile.motion, 1 / profile.sample_hz, profile.count)
     for one in several:
-        run = _recursion(one, flight, truth) if one.method == TWO_SPEED else _steps(one, flight, truth)
+        run = _recursion(one, profile, truth) if one.method == TWO_SPEED else _steps(one, profile, truth)
         operations = _operations(one)
         yield TranslationRow(
             one.name, operations["multiply"], operations["add"], run.velocity_error, run.position_error
@@ -216,48 +216,48 @@ def _operations(one: Candidate) -> dict[str, float]:
     }
 
 
-def _steps(one: Candidate, flight: Flight, truth: tuple[Array, Array]) -> Translation:
+def _steps(one: Candidate, profile: TestProfile, truth: tuple[Array, Array]) -> Translation:
     """Return the run of a step, over as many whole steps as the duration holds."""
-    step = one.increments / flight.sample_hz
-    attitude, change = _settings(one, flight) if BACKENDS[flight.backend].fixed else (None, None)
+    step = one.increments / profile.sample_hz
+    attitude, change = _settings(one, profile) if BACKENDS[profile.backend].fixed else (None, None)
     return translate(
-        backend(one.choice, backend=flight.backend, settings=attitude),
-        evaluator(_change(one), flight.backend, change),
-        flight.motion,
-        flight.force,
+        backend(one.choice, backend=profile.backend, settings=attitude),
+        evaluator(_change(one), profile.backend, change),
+        profile.motion,
+        profile.force,
         step,
-        flight.duration // step * step,
+        profile.duration // step * step,
         truth=truth,
     )
 
 
-def _settings(one: Candidate, flight: Flight) -> tuple[Settings, Settings]:
-    """Return settings of fixed point for the attitude and for the velocity, whose formats hold the increments."""
-    interval, stop = 1 / flight.sample_hz, flight.count + one.ahead
+def _settings(one: Candidate, profile: TestProfile) -> tuple[Settings, Settings]:
+    """Return fixed-point settings for attitude and velocity, with formats that hold the increments."""
+    interval, stop = 1 / profile.sample_hz, profile.count + one.ahead
     largest = [
         float(np.abs(rows).max())
         for rows in (
-            flight.motion.samples(interval, -one.previous, stop),
-            flight.force.velocity_increments(flight.motion, interval, -one.previous, stop),
+            profile.motion.samples(interval, -one.previous, stop),
+            profile.force.velocity_increments(profile.motion, interval, -one.previous, stop),
         )
     ]
     settings = Settings().fitted(largest[0])
-    return replace(settings, carry=flight.carry), replace(
+    return replace(settings, carry=profile.carry), replace(
         settings, ranges={"velocity_increments": Fraction(largest[1]) * _ROOM}
     )
 
 
-def _recursion(one: Candidate, flight: Flight, truth: tuple[Array, Array]) -> Translation:
+def _recursion(one: Candidate, profile: TestProfile, truth: tuple[Array, Array]) -> Translation:
     """Return the run of the recursion in two speeds."""
-    interval, cycles = 1 / flight.sample_hz, flight.count // one.increments
+    interval, cycles = 1 / profile.sample_hz, profile.count // one.increments
     stop = cycles * one.increments
     recording = InertialRecording(
         0.0,
         float(interval),
-        flight.motion.samples(interval, 0, stop),
-        flight.force.velocity_increments(flight.motion, interval, 0, stop),
+        profile.motion.samples(interval, 0, stop),
+        profile.force.velocity_increments(profile.motion, interval, 0, stop),
     )
-    along = course(STATE, recording, fast_cycles=one.increments, backend=flight.backend)
+    along = course(STATE, recording, fast_cycles=one.increments, backend=profile.backend)
     cycle = float(one.increments * interval)
     time = np.arange(cycles + 1, dtype=np.float64) * cycle
     begin = np.zeros((1, 3))
@@ -295,11 +295,11 @@ class TranslationResult(Result):
     algorithms: Sequence[TranslationRow]
 
     @staticmethod
-    def of(rows: Sequence[TranslationRow], flight: Flight, described: str) -> TranslationResult:
-        """Return what algorithms lead to along a flight, which is described in words."""
-        force = {"name": flight.force.name, **flight.force.parameters}
-        rate, duration = float(flight.sample_hz), float(flight.duration)
-        return TranslationResult(described, flight.motion.name, force, rate, duration, flight.backend, rows)
+    def of(rows: Sequence[TranslationRow], profile: TestProfile, described: str) -> TranslationResult:
+        """Return what algorithms lead to along a profile, which is described in words."""
+        force = {"name": profile.force.name, **profile.force.parameters}
+        rate, duration = float(profile.sample_hz), float(profile.duration)
+        return TranslationResult(described, profile.motion.name, force, rate, duration, profile.backend, rows)
 
     def table(self) -> TextTable:
         """Return the algorithms under their headers."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from strapgen.cli.generated_result import GeneratedSources, GenerateResult
-from strapgen.design.frontier import FrontierResult, Standing
+from strapgen.design.frontier import DriftAndCost, FrontierResult
 from strapgen.evidence.collection import Subject
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.ir import checks
@@ -224,11 +224,11 @@ def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> Command
 
 
 def of_frontier(
-    standings: Sequence[Standing], methods: Sequence[str], conditions: Conditions
+    drifts_and_costs: Sequence[DriftAndCost], methods: Sequence[str], conditions: Conditions
 ) -> CommandResult:
     """Return what algorithms cost and how they drift as the result of `frontier`."""
     words = f"--sample-hz {conditions.sample_hz} --duration {conditions.duration}"
     names = shlex.quote(",".join(methods))
     command = f"strapgen frontier --method {names} {conditions.options} {words}"
     hertz, seconds = (float(checks.number("", text)) for text in (conditions.sample_hz, conditions.duration))
-    return _result(command, FrontierResult(standings, hertz, seconds, motions(conditions)).data())
+    return _result(command, FrontierResult(drifts_and_costs, hertz, seconds, motions(conditions)).data())

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from strapgen import pipeline
 from strapgen.catalogue import ALGORITHMS, Choice
 from strapgen.design import frontier
-from strapgen.design.frontier import Candidate, Standing
+from strapgen.design.frontier import Candidate, DriftAndCost
 from strapgen.fixedpoint import can_lower
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
@@ -159,7 +159,7 @@ def _compared(
         return compare(
             choice,
             backends=names,
-            increments=increments,
+            samples=increments,
             reference=REFERENCE,
             truth=truth,
             settings=settings,
@@ -325,9 +325,9 @@ def _gathered(case: tuple[Any, ...]) -> AlgorithmDossier:
     return dossier(*case)
 
 
-def standings(
+def drifts_and_costs(
     several: Sequence[Candidate], conditions: Conditions, jobs: int | None = None
-) -> Iterator[Standing]:
+) -> Iterator[DriftAndCost]:
     """Run algorithms on the motion of some conditions, and yield what each costs and how it drifts."""
     yield from frontier.frontier(
         several, conditions.sample_hz, conditions.duration, jobs=jobs, motions=motions(conditions)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen.design.frontier import Standing, pareto
+from strapgen.design.frontier import DriftAndCost, pareto
 from strapgen.evidence.evidence_report import EvidencePage
 from strapgen.report.algorithm_view import (
     AlgorithmView,
@@ -56,7 +56,7 @@ def report_page(content: Content, versions: Mapping[str, str], digest: str) -> s
     sections = {
         **({"steps": "Attitude steps", "drift": "Drift over time"} if content.steps else {}),
         **({"convergence": "Convergence", "backends": "Back ends compared"} if content.steps else {}),
-        **({"frontier": "Accuracy against cost"} if content.standings else {}),
+        **({"frontier": "Accuracy against cost"} if content.drifts_and_costs else {}),
         **({"thesis": "Tables of the thesis"} if content.tables else {}),
         "evidence": "Evidence",
         "algorithms": "Formulas, formats, code",
@@ -133,8 +133,8 @@ class Content:
     #: The tables of the thesis; empty where no algorithm stands in them
     tables: tuple[TableEntry, ...]
     #: What algorithms cost and how they drift; empty where the page has no attitude step
-    standings: tuple[Standing, ...]
-    #: The methods of `standings`, as `frontier` takes them
+    drifts_and_costs: tuple[DriftAndCost, ...]
+    #: The methods of `drifts_and_costs`, as `frontier` takes them
     methods: tuple[str, ...]
     #: What tools said of generated code
     evidence: EvidencePage | None
@@ -151,8 +151,8 @@ class Content:
         compared: dict[str, CommandResult] = {}
         if self.tables:
             compared[_TABLES] = of_tables(self.tables, self.backends)
-        if self.standings:
-            compared[_FRONTIER] = of_frontier(self.standings, self.methods, self.conditions)
+        if self.drifts_and_costs:
+            compared[_FRONTIER] = of_frontier(self.drifts_and_costs, self.methods, self.conditions)
         return {"": compared, **results}
 
     def data(self) -> dict[str, Any]:
@@ -169,7 +169,7 @@ class Content:
         """The algorithms that drift less than all that take fewer multiplications a sample, by these."""
         points = {
             one.name: (one.multiply / one.increments, drift)
-            for one in self.standings
+            for one in self.drifts_and_costs
             if (drift := one.drifts[self.conditions.motion]) is not None
         }
         return pareto(points)
@@ -226,7 +226,7 @@ class Content:
 
     def frontier_rows(self) -> list[list[_PageCell]]:
         """Return the algorithms that are compared by cost and drift: a row for each."""
-        if not self.standings:
+        if not self.drifts_and_costs:
             return []
         rows = []
         algorithms = self.results[""][_FRONTIER]["data"]["algorithms"]
@@ -251,7 +251,7 @@ class Content:
     @cached_property
     def shared_sources(self) -> list[str]:
         """What all algorithms that are compared come from, besides what each states."""
-        first, *others = [one.source.split(_SOURCES) for one in self.standings] or [[]]
+        first, *others = [one.source.split(_SOURCES) for one in self.drifts_and_costs] or [[]]
         return [part for part in first if all(part in parts for parts in others)] if others else []
 
     def thesis_tables(self) -> list[dict[str, Any]]:
@@ -279,7 +279,9 @@ class Content:
             text = f"{results.count('agrees')} agree, {others} open"
             facts.append(("claims of the C proved", str(results.count("proved")), text))
         if self.front:
-            facts.append(("algorithms compared", str(len(self.standings)), f"{len(self.front)} on the front"))
+            facts.append(
+                ("algorithms compared", str(len(self.drifts_and_costs)), f"{len(self.front)} on the front")
+            )
         return facts
 
     def claim_rows(self) -> list[list[_PageCell]]:

@@ -119,8 +119,8 @@ def report(
 
     The page is one file that opens anywhere, without a network. It holds the formulas and the code of each algorithm,
     its formats and error bounds in fixed point, its drift on a motion and the order that it shows, back ends side by
-    side, accuracy against cost for all methods of the catalogue, the tables of the thesis, and what independent tools
-    have said of the C. Each result stands beside the command that prints it.
+    side, accuracy against cost for all methods of the catalogue, the tables of the thesis, and the results of external
+    tools on the C. Each result is shown with the command that prints it.
 
     Example: strapgen report euler --method rk4 --out out/report.html
     """
@@ -159,7 +159,7 @@ def _page(
     several = dossier.compared(shown, beside)
     frontier.require_steps(several, conditions.sample_hz, conditions.duration)  # before what takes long
     known = [*track(dossier.dossiers(cases), "gathering", len(cases))]
-    standings = [*track(dossier.standings(several, conditions), "comparing", len(several))]
+    drifts_and_costs = [*track(dossier.drifts_and_costs(several, conditions), "comparing", len(several))]
     tables = dossier.tables(shown, places)
     content = Content(
         _title(choices),
@@ -168,7 +168,7 @@ def _page(
         places,
         tuple(sorted(known, key=lambda one: shown.index(one.choice))),
         tuple(tables),
-        tuple(frontier.in_order(standings, several)),
+        tuple(frontier.in_order(drifts_and_costs, several)),
         dossier.named(several, beside),
         _recorded_evidence(),
     )

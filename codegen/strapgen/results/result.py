@@ -35,6 +35,13 @@ class Result(Record):
         """Return the result for a reader."""
         return self.reader().as_text()
 
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        """Show the text at the prompt of IPython."""
+        printer.text(self.text())
+
     def rows(self) -> Any:
         """Return the sequence of the records of its tables; None if it has no tables."""
         return getattr(self, self.rows_in) if self.rows_in else None

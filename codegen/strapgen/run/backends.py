@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from strapgen import catalogue
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice, named
 from strapgen.catalogue.choice import AnyMethod
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
@@ -484,14 +483,14 @@ def fitted(backend: str, settings: Settings | None) -> Settings | None:
     return replace(settings, word=entry.word)
 
 
-def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
+def evaluator(kernel: AnyAlgorithm, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
     """Return a kernel as a callable.
 
     Parameters
     ----------
-    kernel : str or Choice
-        Name of a kernel that takes no method, for instance "dcm-from-euler"; or any choice that `catalogue.choose` or
-        `Choice.companion` returns, of a user's algorithm too.
+    kernel : str, Choice or AttitudeAlgorithm
+        Name of a kernel that takes no method, for instance "dcm-from-euler"; any choice that `strapgen.choose` or
+        `Choice.companion` returns, of a user's algorithm too; or what `strapgen.algorithm` returns.
     backend : str, optional
         A key of `BACKENDS`.
     settings : Settings, optional
@@ -515,16 +514,17 @@ def evaluator(kernel: str | Choice, backend: str = "numpy", settings: Settings |
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    checks.require("evaluator", kernel, str, Choice)
+    name = getattr(kernel, "choice", kernel)
+    checks.require("evaluator", name, str, Choice)
     checks.choice("backend", backend, BACKENDS)
-    if isinstance(kernel, str):
-        checks.choice("kernel", kernel, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
-    choice = catalogue.choose(kernel)
+    if isinstance(name, str):
+        checks.choice("kernel", name, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
+    choice = catalogue.choose(name)
     return of_sources(sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings)))
 
 
 def backend(
-    algorithm: str | Choice,
+    algorithm: AnyAlgorithm,
     method: AnyMethod | None = None,
     increments: int | None = None,
     backend: str = "numpy",
@@ -538,9 +538,9 @@ def backend(
 
     Parameters
     ----------
-    algorithm : str or Choice
-        "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm; or a choice that
-        `catalogue.choose` returns, with which the other parameters of a choice do not go.
+    algorithm : str, path, Choice or AttitudeAlgorithm
+        "dcm", "euler" or "cayley-klein"; a Python file, or the entry point of a user's algorithm; or what
+        `strapgen.algorithm` or `strapgen.choose` returns, with which the other parameters of a choice do not go.
     method : str, Tableau, Window or ShapedConing, optional
         A name that ``strapgen list`` shows, or a tableau; by default "rk4".
     increments : int, optional
@@ -574,9 +574,9 @@ def backend(
     >>> backend(catalogue.choose("dcm", "rk2"), backend="c").name
     'c'
     """
-    checks.require("backend", algorithm, str, os.PathLike, Choice)
+    name = named("backend", algorithm)
     checks.choice("backend", backend, BACKENDS)
-    choice = catalogue.choose_step(algorithm, method, increments, previous=previous, ahead=ahead)
+    choice = catalogue.choose_step(name, method, increments, previous=previous, ahead=ahead)
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
     step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))

@@ -15,7 +15,7 @@ REGISTRATION = Registration(
         "statements": Command(
             f"{__package__}.thesis_commands:statements",
             "Reproduce",
-            summary="Run the statements of the thesis's text, and say whether they hold",
+            summary="Test the statements of the thesis's text by runs",
         ),
     },
     results={

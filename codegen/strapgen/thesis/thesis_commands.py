@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from strapgen.cli import terminal
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.option_groups import Excludes, Shown, grouped, rules
 from strapgen.cli.options import FastBackends, option
@@ -115,17 +114,17 @@ def runnable() -> tuple[str, ...]:
     try:
         compiler.C.path()
     except CompilerError as error:
-        typer.echo(f"strapgen: only numpy is shown: {error}", err=True)
+        terminal.remark(f"strapgen: only numpy is shown: {error}")
         return ("numpy",)
     return DEFAULT_BACKENDS
 
 
 @grouped
 def statements(*, output: Annotated[Output, Shown(only=TEXT_OUTPUT)]) -> None:
-    """Run the statements of the thesis's text, and say whether they hold.
+    """Test the statements of the thesis's text by runs.
 
-    Chapter 5 of the thesis says more than its tables show. Each of fourteen statements stands beside the numbers of the
-    runs that test it, and a verdict.
+    Chapter 5 of the thesis makes fourteen statements beside its tables. Each is shown with the numbers of the runs that
+    test it, and a verdict.
 
     Example: strapgen statements --format markdown
     """

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import grouped
-from strapgen.cli.options import option
+from strapgen.cli.options import argument, option
 from strapgen.cli.output import Format, check_format, show
 from strapgen.ir import checks
 
@@ -16,7 +17,7 @@ from strapgen.ir import checks
 def build(
     variants: Annotated[
         list[str] | None,
-        typer.Argument(metavar="NAME...", help="Variants.  [default: all]", show_default=False),
+        argument("NAME...", help="Variants.  [default: all]", words="@cli.variants"),
     ] = None,
     *,
     check: Annotated[
@@ -46,7 +47,7 @@ def build(
     for step in steps_of.build(chosen, check):
         done.append(step)
         if format == "text":
-            typer.echo(step.line)
+            terminal.write(step.line)
     result = steps_of.BuildResult(tuple(done), all(step.holds for step in done))
     show(result, format)
     if not result.holds:

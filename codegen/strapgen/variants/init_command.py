@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import Excludes, grouped, rules
 from strapgen.cli.options import option
 from strapgen.cli.values import Positive, names
@@ -95,7 +96,7 @@ def init(
     text = _text(name, keys)
     variant_file.parse(place, tomllib.loads(text, parse_float=Decimal))
     for path in write_files(Path(), {str(place): text, WORKFLOW: _workflow(), **files}):
-        typer.echo(f"wrote {path}", err=True)
+        terminal.remark(f"wrote {path}")
     typer.echo("strapgen build generates the code, strapgen build --check holds it")
 
 
@@ -105,7 +106,7 @@ def _answer(question: str, stated: Any, default: Any) -> str:
         return str(stated)
     if sys.stdin is not None and sys.stdin.isatty():
         return str(typer.prompt(question, default=str(default)))
-    typer.echo(f"{question}: {default}", err=True)
+    terminal.remark(f"{question}: {default}")
     return str(default)
 
 
@@ -157,7 +158,7 @@ def _of_brief(file: Path) -> tuple[dict[str, Any], dict[str, str]]:
         raise InputError(
             f"{file}: {best.name} meets the brief, which is no step of its own; strapgen design --generate writes it"
         )
-    typer.echo(f"{best.name} meets the brief", err=True)
+    terminal.remark(f"{best.name} meets the brief")
     keys: dict[str, Any] = {"algorithm": words[2]}
     keys |= {key[2:].replace("-", "_"): value for key, value in zip(words[3::2], words[4::2], strict=False)}
     return keys | {"project": True}, {name: text for name, text in made.items() if name == COEFFICIENTS}

@@ -20,6 +20,9 @@ REGISTRATION = Registration(
     },
     files={"variants": f"{__package__}.variant_file:VARIANTS"},
     results={"build": f"{__package__}.build:BuildResult"},
-    extensions={"cli.variant": f"{__package__}.variant_file:words_of"},
+    extensions={
+        "cli.variant": f"{__package__}.variant_file:words_of",
+        "cli.variants": f"{__package__}.variant_file:titles",
+    },
     requires=("design",),
 )

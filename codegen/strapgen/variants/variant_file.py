@@ -146,6 +146,11 @@ def variants(start: Path | None = None) -> dict[str, Variant]:
     return read(find(start or Path.cwd()))
 
 
+def titles() -> dict[str, str]:
+    """Return the names of the variants of the nearest file, with what each generates."""
+    return {name: str(one.options["algorithm"]) for name, one in variants().items()}
+
+
 def chosen(name: str, start: Path | None = None) -> Variant:
     """Return a variant by name."""
     known = variants(start)

@@ -17,7 +17,7 @@ from strapgen import catalogue, pipeline
 from strapgen.analysis.series import motion_rates
 from strapgen.analysis.series.invariants import Invariants, covariant_text, invariants, matrix, vector_texts
 from strapgen.analysis.series.motion_rates import in_powers_of_the_step
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -148,12 +148,12 @@ def _read(part: str, texts: Sequence[str], unknowns: Sequence[str]) -> Coefficie
     return {power: (row[0], row[1], row[2]) for power, row in sorted(rows.items())}
 
 
-def series(choice: Choice, motion: str = "general", terms: int = 2) -> ErrorSeries:
+def series(choice: AnyAlgorithm, motion: str = "general", terms: int = 2) -> ErrorSeries:
     """Derive the series of the error of a step.
 
     Parameters
     ----------
-    choice : Choice
+    choice : Choice, AttitudeAlgorithm or str
         An attitude step, whose increments or rates are exact. It starts from zero rotation. The steps of the catalogue
         commute with rotations of the reference axes, so the result holds at any attitude, in the axes of the beginning.
     motion : str, optional

@@ -17,7 +17,7 @@ from strapgen import pipeline
 from strapgen.analysis.series import invariants
 from strapgen.analysis.series.invariants import LATEX, TEXT, covariant_text, with_forces
 from strapgen.analysis.series.motion_rates import in_powers_of_the_step
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
@@ -167,12 +167,12 @@ def _of_terms(terms: Sequence[Mapping[str, Any]], unknowns: Sequence[str]) -> Co
     return coefficients
 
 
-def series(choice: Choice, terms: int = 1) -> VelocitySeries:
+def series(choice: AnyAlgorithm, terms: int = 1) -> VelocitySeries:
     """Derive the error of the velocity and position change of a step.
 
     Parameters
     ----------
-    choice : Choice
+    choice : Choice or str
         The kernel "velocity-position" by any method, or a user's step of velocity and position.
     terms : int, optional
         Number of terms of each, counted from its first one that is not zero.
@@ -194,8 +194,8 @@ def series(choice: Choice, terms: int = 1) -> VelocitySeries:
     (2, '-1/12 w0 x f1 + 1/12 w1 x f0')
     """
     checks.count("terms", terms, largest=MOST_TERMS)
-    kernel = pipeline.derive(choice) if isinstance(choice, Choice) else None
-    if kernel is None or not kernel.takes_velocity:
+    kernel = pipeline.derive(choice)
+    if not kernel.takes_velocity:
         raise InputError(
             "a series of velocity and position needs the kernel velocity-position, or one like it"
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from strapgen.cli.option_groups import Shown, grouped
-from strapgen.cli.options import MethodOptions, option
+from strapgen.cli.options import MethodOptions, argument, option
 from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
 from strapgen.cli.progress import waiting
 from strapgen.ir import checks
@@ -55,7 +55,7 @@ def solve(
         option(
             "--on",
             metavar="MOTION=N,...",
-            help="Motions on which it is to have the order N, without =N that of --order: general (any smooth motion); "
+            help="Motions on which the step has the order N, by default that of --order: general (any smooth motion); "
             "polynomial, of the degree that the samples determine; coning, or sculling of a velocity. The last three "
             "hold to products of two vectors. velocity or position: any smooth motion, and that change alone.",
             panel="Input",
@@ -79,10 +79,9 @@ def solve(
     """Solve the conditions on the unknown coefficients of an algorithm.
 
     An algorithm declares them with KernelBuilder.parameter. It is a step of attitude, on increments or on rates at
-    nodes, or one of velocity and position. You see the conditions, every family of coefficients that
-    satisfies them, with its free parameters, and the leading error that it leaves. Linear conditions are solved
-    exactly, polynomial ones by elimination and Groebner bases within stated limits. If there is no solution, the answer
-    says why.
+    nodes, or one of velocity and position. You see the conditions, every family of coefficients that satisfies them
+    with its free parameters, and its leading error. Linear conditions are solved exactly, polynomial ones by
+    elimination and Groebner bases within stated limits. If there is no solution, the answer says why.
 
     Example: strapgen solve examples/three_samples.py --order 5 --on polynomial
 
@@ -128,9 +127,10 @@ class TableauOutput(Output):
 def tableau(
     method: Annotated[
         str,
-        typer.Argument(
-            metavar="NAME|FILE",
+        argument(
+            "NAME|FILE",
             help="A Runge-Kutta method that strapgen list methods shows, or a TOML file with a tableau.",
+            words="strapgen.catalogue.methods.tableaux:TABLEAUX",
         ),
     ],
     *,

@@ -13,7 +13,7 @@ from strapgen import pipeline
 from strapgen.analysis.unknowns import conditions, elimination
 from strapgen.analysis.unknowns.conditions import Demand, attitude_conditions
 from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialSolution
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, choose
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.kernel.kernel import Kernel
@@ -132,12 +132,12 @@ class SolvedStep:
         return self.kernel.substitute(self.values(parameters, family))
 
 
-def solve(choice: Choice, order: int | Mapping[str, int]) -> SolvedStep:
+def solve(choice: AnyAlgorithm, order: int | Mapping[str, int]) -> SolvedStep:
     """State the conditions on the unknowns of a step, and solve them exactly.
 
     Parameters
     ----------
-    choice : Choice
+    choice : Choice, AttitudeAlgorithm or str
         A step with unknowns: of attitude, on increments or on rates at nodes, or of velocity and position.
     order : int or mapping of str to int
         Order on a general motion, or orders by motion: "general" (any smooth rate), "polynomial", of the degree that
@@ -183,9 +183,10 @@ def solve(choice: Choice, order: int | Mapping[str, int]) -> SolvedStep:
     return SolvedStep(kernel, tuple(demands), tuple(equations), solution, leading)
 
 
-def _statement(choice: Choice) -> tuple[Kernel, State]:
-    """Return the kernel of a choice, and what states the conditions on it."""
-    if isinstance(choice, Choice) and choice.takes_velocity:
+def _statement(algorithm: AnyAlgorithm) -> tuple[Kernel, State]:
+    """Return the kernel of an algorithm, and what states the conditions on it."""
+    choice = choose(algorithm)
+    if choice.takes_velocity:
         kernel = pipeline.derive(choice)
         return kernel, partial(conditions.velocity_conditions, kernel)
     attitude_step = one_step.step(choice)

@@ -19,9 +19,9 @@ from strapgen.analysis.vibration import response, systems
 from strapgen.analysis.vibration.mean_rates import Assessment
 from strapgen.analysis.vibration.response import Form, Pair
 from strapgen.analysis.vibration.systems import ANGLES, T_M, VELOCITIES, F, T
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice
 from strapgen.ir import checks
-from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.exceptions import InputError
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel
 
@@ -173,13 +173,13 @@ def quantities(choice: Choice) -> tuple[str, ...]:
     return tuple(assessable)
 
 
-def of(choice: Choice, quantity: str = "drift") -> Assessment:
+def of(choice: AnyAlgorithm, quantity: str = "drift") -> Assessment:
     """Assess a kernel of the catalogue.
 
     Parameters
     ----------
-    choice : Choice
-        A kernel, from `catalogue.choose`.
+    choice : Choice, AttitudeAlgorithm or str
+        A kernel, as `strapgen.choose` or `strapgen.algorithm` returns one, or its name.
     quantity : str, optional
         "drift" or "sculling".
 
@@ -190,7 +190,7 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     Raises
     ------
     InputTypeError
-        If `choice` is no `Choice`.
+        If `choice` is none of these.
     InputError
         As for `drift` and `sculling`.
 
@@ -201,8 +201,7 @@ def of(choice: Choice, quantity: str = "drift") -> Assessment:
     >>> [float(f"{rate:.6g}") for rate in rates]
     [-0.00264356, -0.00263046, 1.31029e-05]
     """
-    if not isinstance(choice, Choice):
-        raise InputTypeError(f"choice is {choice!r}; what strapgen.choose returns is needed")
+    choice = catalogue.choose(choice)
     checks.choice("quantity", quantity, ("drift", "sculling"))
     if choice.user_kernel is not None:  # whose file may change: not to be held for good
         return _of(choice, quantity)

@@ -25,7 +25,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
@@ -272,7 +272,7 @@ class Rectification:
         return [term for term in self.terms if order in (None, term.order)]
 
 
-def rectified(choice: Choice, step: float | str | Fraction, tones: Sequence[Tone]) -> Rectification:
+def rectified(choice: AnyAlgorithm, step: float | str | Fraction, tones: Sequence[Tone]) -> Rectification:
     """Return the error of the mean rate that an attitude step computes under tones, to fourth order.
 
     Where a frequency is the sum of two others, or twice another, there is a mean of third order. It depends on the
@@ -281,7 +281,7 @@ def rectified(choice: Choice, step: float | str | Fraction, tones: Sequence[Tone
 
     Parameters
     ----------
-    choice : Choice
+    choice : Choice, AttitudeAlgorithm or str
         A step that takes increments and is linear in its state.
     step : number
         Length of a step in s.

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 
 #: The damping of a gyro of second order, beside its natural frequency.
-GYRO_DAMPING = option("--gyro-damping", metavar="RATIO", help="Damping of that gyro, as 0.7071.")
+_DAMPING = "Damping of that gyro, as 0.7071."
+GYRO_DAMPING = option("--gyro-damping", metavar="RATIO", help=_DAMPING)
 #: Either option of that gyro needs the other
 GYRO_RULES = (Needs("--gyro-bandwidth-hz", "--gyro-damping"), Needs("--gyro-damping", "--gyro-bandwidth-hz"))
 
@@ -166,12 +167,14 @@ class VibrationSource:
         tuple[Positive, ...] | None,
         option(
             "--gyro-bandwidth-hz",
-            metavar="HZ",
+            metavar="HZ,...",
             help="Natural frequency of a gyro of second order, through which the algorithm sees the angles; X,Y for "
             "one about each axis.",
         ),
     ] = None
-    gyro_damping: Annotated[tuple[Positive, ...] | None, GYRO_DAMPING] = None
+    gyro_damping: Annotated[
+        tuple[Positive, ...] | None, option("--gyro-damping", metavar="RATIO,...", help=_DAMPING)
+    ] = None
 
     def through_gyro(self, assessment: Assessment) -> Assessment:
         """Return the assessment of an algorithm that sees the vibration through the gyro, if there is one."""
@@ -320,14 +323,14 @@ def vibration(
     source: VibrationSource,
     output: VibrationOutput,
 ) -> None:
-    """Show the drift that an algorithm computes under vibration.
+    """Show the drift of an algorithm under vibration.
 
-    You see the mean drift rate about z that it computes, the true one, and the error. The angles are X sin(2 pi f t)
+    You see the computed mean drift rate about z, the true one, and the error. The angles are X sin(2 pi f t)
     about x and Y sin(2 pi f t + P) about y; an acceleration along y has the phase P too. The rates are closed forms to
     second order in the amplitudes, derived from the algorithm itself. Several methods, or numbers of increments, are
     shown side by side.
 
-    Of a kernel of your own that holds unknowns you see the closed forms, without numbers of a vibration.
+    For your own kernel with unknowns you see the closed forms alone.
 
     For a fast loop alone, the continuous and the computed rate leave out a term in the slow cycle T_m: the slow loop
     adds that to both, so that the error is that of both loops.

@@ -1,4 +1,4 @@
-"""Judges algorithms by a brief: what each loses by every cause, what it costs, what binds it, and what that says."""
+"""Judges algorithms by a brief: drift by cause, cost, the limit that excludes them, and a verdict in sentences."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SOFTWARE = CAUSES[:3]
 
 @dataclass(frozen=True)
 class Judgement:
-    """What an algorithm loses and costs, and whether it meets a brief."""
+    """Drift by cause and cost of an algorithm, and whether it meets a brief."""
 
     #: State, method and samples, as "euler coning-compressed:2"
     name: str
@@ -42,18 +42,18 @@ class Judgement:
     previous: int
     ahead: int
     meets: bool
-    #: The cause or the limit that is exceeded most, of those that were looked at; None if none is
+    #: The cause or the limit that is exceeded most, of those that were computed; None if none is
     binding: str | None
     #: The same in words; empty if none is
     reason: str
-    #: Drift by cause; None where it is not known, or not looked at because a cheaper look had refused the
+    #: Drift by cause; None where it is not known, or not looked at because a cheaper findings had refused the
     #: algorithm
     drift_deg_h: dict[str, float | None]
     #: Additions, multiplications, divisions, roots, functions and choices
     operations_per_s: float
     #: Error feedback of the fixed-point code
     carry: str = "none"
-    #: What sculling leaves after the time of the budget; None without accelerations
+    #: Errors due to sculling at the end of the budget's time; None without accelerations
     velocity_m_s: float | None = None
     position_m: float | None = None
     #: Counted on the processor of the brief, where it has a limit
@@ -63,7 +63,7 @@ class Judgement:
     fragile: str = ""
     #: Drift by cause in a run in time; None where it was not run
     run_deg_h: dict[str, float] | None = None
-    #: The largest drift under lines of each order in their angles, "2" to "4"; None where it was not looked at
+    #: The largest drift under lines of each order in their angles, "2" to "4"; None where it was not computed
     coning_parts_deg_h: dict[str, float] | None = None
 
     @property
@@ -74,21 +74,21 @@ class Judgement:
 
 
 @dataclass(frozen=True)
-class Question:
-    """What a process needs to judge an algorithm with every state."""
+class JudgementSpec:
+    """A candidate and the path of its brief, as a worker process takes them."""
 
     #: The file of the brief
     path: str
     candidate: Candidate
 
-    def moved(self, begin: Path, end: Path) -> Question:
-        """Return the question with its brief in another folder, see `parallel_cases.Bundle`."""
+    def moved(self, begin: Path, end: Path) -> JudgementSpec:
+        """Return the specification with its brief in another folder, see `parallel_cases.Bundle`."""
         return replace(self, path=moved(self.path, begin, end))
 
 
 @dataclass
-class _Look:
-    """What is known of an algorithm so far."""
+class _Findings:
+    """Drifts, costs and failed predictions of an algorithm, as far as they are computed."""
 
     brief: DesignBrief
     drift: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(CAUSES))
@@ -102,7 +102,7 @@ class _Look:
         return self.brief.budget.drift_deg_h * self.brief.budget.software_share
 
     def excesses(self) -> dict[str, tuple[float, str]]:
-        """Return by how much what is known exceeds its limit, as a ratio and in words, of what exceeds it."""
+        """Return the quantities that exceed their limits: each with its ratio to the limit, and the excess in words."""
         limits = {}
         for cause in SOFTWARE:
             value = self.drift[cause]
@@ -142,17 +142,17 @@ class _Look:
         ]
 
 
-def judged(trial: Question) -> list[dict[str, Any]]:
+def judge_states(spec: JudgementSpec) -> list[dict[str, Any]]:
     """Return the judgements of an algorithm with every state it can have, as plain JSON data."""
-    brief = _brief(trial.path)
+    brief = _brief(spec.path)
     known: dict[str, Any] = {}
     judgements = []
     for state in STATES:
         try:
-            algorithm = algorithm_of(trial.candidate, state, brief, trial.path)
+            algorithm = algorithm_of(spec.candidate, state, brief, spec.path)
         except InputError:  # the state has no such step
             continue
-        judgements.append(vars(judge(brief, trial.candidate, state, algorithm, known)))
+        judgements.append(vars(judge(brief, spec.candidate, state, algorithm, known)))
     return judgements
 
 
@@ -162,10 +162,10 @@ def _brief(path: str) -> DesignBrief:
 
 
 def once(known: dict[str, Any], cause: Callable[[], Any]) -> Any:
-    """Return what a method of an `Algorithm` returns, or raise what it raises, for the first state and all others.
+    """Return the result of a method of an `Algorithm`, or raise its error; only the first call computes it.
 
-    `known` holds it by the name of the method: what follows from a step to the second power of its increments is the
-    same with every state.
+    `known` holds results and errors by the names of methods. Quantities that follow from a step to the second power of
+    its increments are the same for all states.
     """
     name = cause.__name__
     if name not in known:
@@ -183,34 +183,34 @@ def judge(
 ) -> Judgement:
     """Return the judgement of an algorithm.
 
-    What takes long is looked at last, and not at all where a limit is exceeded before.
+    Long computations come last, and are left out once a limit is exceeded.
     """
-    look = _Look(brief)
-    operations = look.figures["operations_per_s"] = algorithm.operations_per_s()
-    look.drift["noise"] = causes.noise(brief)
-    look.drift["truncation"] = algorithm.truncation()
+    findings = _Findings(brief)
+    operations = findings.figures["operations_per_s"] = algorithm.operations_per_s()
+    findings.drift["noise"] = causes.noise(brief)
+    findings.drift["truncation"] = algorithm.truncation()
     try:
-        if not look.excesses():
-            look.drift["coning"] = once(known, algorithm.coning)
-        if not look.excesses() and brief.budget.limits_velocity:
-            _look_at_velocity(look, once(known, algorithm.sculling))
-        if not look.excesses() and causes.tones(brief):
-            _look_at_higher_orders(look, algorithm.rectification())
+        if not findings.excesses():
+            findings.drift["coning"] = once(known, algorithm.coning)
+        if not findings.excesses() and brief.budget.limits_velocity:
+            _add_velocity_error(findings, once(known, algorithm.sculling))
+        if not findings.excesses() and causes.tones(brief):
+            _add_higher_orders(findings, algorithm.rectification())
     except InputError as error:
-        look.unknown["coning"] = str(error)
-    if not look.excesses():
-        look.drift["quantization"] = once(known, algorithm.quantization)
-    if not look.excesses():
-        left = look.software_limit - math.fsum(look.drift[cause] or 0.0 for cause in SOFTWARE[:2])
-        look.rounding = algorithm.rounding(left)
-        look.drift["rounding"] = look.rounding.deg_h
-        if look.rounding.deg_h is None:
-            look.unknown["rounding"] = look.rounding.reason
-    if not look.excesses() and brief.processor.is_measured:
-        _measure(look, algorithm)
-    excesses = look.excesses()
+        findings.unknown["coning"] = str(error)
+    if not findings.excesses():
+        findings.drift["quantization"] = once(known, algorithm.quantization)
+    if not findings.excesses():
+        left = findings.software_limit - math.fsum(findings.drift[cause] or 0.0 for cause in SOFTWARE[:2])
+        findings.rounding = algorithm.rounding(left)
+        findings.drift["rounding"] = findings.rounding.deg_h
+        if findings.rounding.deg_h is None:
+            findings.unknown["rounding"] = findings.rounding.reason
+    if not findings.excesses() and brief.processor.is_measured:
+        _add_measured_cost(findings, algorithm)
+    excesses = findings.excesses()
     binding = max(excesses, key=lambda name: excesses[name][0]) if excesses else None
-    figures: Mapping[str, float | None] = look.figures
+    figures: Mapping[str, float | None] = findings.figures
     return Judgement(
         f"{state} {candidate.name}",
         state,
@@ -221,22 +221,22 @@ def judge(
         binding is None,
         binding,
         "" if binding is None else excesses[binding][1],
-        look.drift,
+        findings.drift,
         operations,
-        look.rounding.carry,
+        findings.rounding.carry,
         figures.get("velocity"),
         figures.get("position"),
         figures.get("instructions_per_s"),
         figures.get("bytes"),
-        _cancellation(look, once(known, algorithm.line_errors)) if binding is None else "",
-        coning_parts_deg_h=look.coning_parts,
+        _cancellation(findings, once(known, algorithm.line_errors)) if binding is None else "",
+        coning_parts_deg_h=findings.coning_parts,
     )
 
 
 def after_run(brief: DesignBrief, one: Judgement, run_deg_h: dict[str, float]) -> Judgement:
-    """Return a judgement with the drifts of a run in time in place of the predicted ones: its verdict is the run's."""
-    look = _Look(brief, {**one.drift_deg_h, **run_deg_h})
-    excesses = look.excesses()
+    """Return a judgement by the drifts of a time simulation in place of the predicted ones."""
+    findings = _Findings(brief, {**one.drift_deg_h, **run_deg_h})
+    excesses = findings.excesses()
     if not excesses:
         return replace(one, run_deg_h=run_deg_h)
     binding = max(excesses, key=lambda name: excesses[name][0])
@@ -244,41 +244,42 @@ def after_run(brief: DesignBrief, one: Judgement, run_deg_h: dict[str, float]) -
     return replace(one, meets=False, binding=binding, reason=reason, run_deg_h=run_deg_h)
 
 
-def _cancellation(look: _Look, errors: list[float]) -> str:
-    """Return how errors of lines cancel in words; empty where they need not."""
+def _cancellation(findings: _Findings, errors: list[float]) -> str:
+    """Return in words how errors of lines cancel; empty where the limit is met without cancellation."""
     largest = math.fsum(map(abs, errors))
-    if largest <= look.software_limit:
+    if largest <= findings.software_limit:
         return ""
     return (
         f"errors of up to {max(map(abs, errors)):.2g} deg/h, of the algorithm and of the gyro at "
-        f"{len(errors) // 2} line{'s' if len(errors) > 2 else ''}, cancel to {look.drift['coning'] or 0.0:.2g} deg/h"
+        f"{len(errors) // 2} line{'s' if len(errors) > 2 else ''}, cancel to "
+        f"{findings.drift['coning'] or 0.0:.2g} deg/h"
     )
 
 
-def _look_at_higher_orders(look: _Look, found: Rectification) -> None:
-    """Put the largest drift under lines, at whatever phases they begin, in the place of that of second order."""
-    look.drift["coning"] = found.worst() * causes.DEG_H
-    look.coning_parts = {str(order): found.worst(order) * causes.DEG_H for order in range(2, DEGREE + 1)}
+def _add_higher_orders(findings: _Findings, found: Rectification) -> None:
+    """Replace the coning drift of second order by the largest one over all phases of the lines, to fourth order."""
+    findings.drift["coning"] = found.worst() * causes.DEG_H
+    findings.coning_parts = {str(order): found.worst(order) * causes.DEG_H for order in range(2, DEGREE + 1)}
 
 
-def _look_at_velocity(look: _Look, error: float | None) -> None:
-    """Add what sculling leaves after the time of the budget: a steady error of the acceleration in m/s^2."""
+def _add_velocity_error(findings: _Findings, error: float | None) -> None:
+    """Add velocity and position errors at the end of the budget's time due to a sculling error in m/s^2."""
     if error is not None:
-        over = float(look.brief.budget.over_s)
-        look.figures |= {"velocity": error * over, "position": error * over**2 / 2}
+        over = float(findings.brief.budget.over_s)
+        findings.figures |= {"velocity": error * over, "position": error * over**2 / 2}
 
 
-def _measure(look: _Look, algorithm: Algorithm) -> None:
-    """Add what the fixed-point code costs on the processor of the brief."""
-    cpu = look.brief.processor.cpu
+def _add_measured_cost(findings: _Findings, algorithm: Algorithm) -> None:
+    """Add bytes and instructions of the fixed-point code on the processor of the brief."""
+    cpu = findings.brief.processor.cpu
     if shutil.which(PROCESSORS[cpu].compiler) is None:
         raise InputError(
             f"instructions and bytes on {cpu} are counted with {PROCESSORS[cpu].compiler}; it is not installed"
         )
-    one = algorithm.cost(look.rounding.carry)
-    look.figures["bytes"] = one.bytes
+    one = algorithm.cost(findings.rounding.carry)
+    findings.figures["bytes"] = one.bytes
     if one.instructions_per_s is not None:
-        look.figures["instructions_per_s"] = one.instructions_per_s
+        findings.figures["instructions_per_s"] = one.instructions_per_s
 
 
 def judgements(
@@ -288,13 +289,13 @@ def judgements(
     jobs: int | None = None,
     cluster: Cluster | None = None,
 ) -> Iterator[list[Judgement]]:
-    """Judge algorithms by a brief, and yield the judgements of each with all states when they are there."""
-    cases = {one.name: Question(str(path), one) for one in several}
+    """Judge algorithms by a brief, and yield the judgements of each with all states as they are finished."""
+    cases = {one.name: JudgementSpec(str(path), one) for one in several}
     files = None if cluster is None else Bundle.of(files_of(path))
     if results is None:
-        finished = side_by_side(judged, cases, jobs, cluster, files)
+        finished = side_by_side(judge_states, cases, jobs, cluster, files)
     else:
-        finished = resume(judged, cases, results, _identity(path), jobs, cluster, files)
+        finished = resume(judge_states, cases, results, _identity(path), jobs, cluster, files)
     for _, rows in finished:
         yield [Judgement(**row) for row in rows]
 
@@ -315,7 +316,7 @@ def in_order(several: Iterable[Judgement]) -> list[Judgement]:
 
 
 def verdicts(brief: DesignBrief, ordered: list[Judgement]) -> list[str]:
-    """Return what a brief leads to, in sentences."""
+    """Return the verdict on a brief in sentences."""
     sentences = []
     accepted = [one for one in ordered if one.meets]
     share = brief.budget.software_share * brief.budget.drift_deg_h

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
+from strapgen.cli import terminal
 from strapgen.cli.option_groups import Shown, grouped, stated
 from strapgen.cli.options import STEP_OPTIONS, CheckedAlgorithm, MethodOptions, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
@@ -46,6 +47,7 @@ class ForeignOptions:
             "--scalar",
             metavar="NAME",
             help="Where the scalar part of four elements stands: first or last.  [default: last]",
+            words=("first", "last"),
         ),
     ] = None
     sense: Annotated[
@@ -54,6 +56,7 @@ class ForeignOptions:
             "--sense",
             metavar="NAME",
             help="body-to-reference or reference-to-body.  [default: body-to-reference]",
+            words=("body-to-reference", "reference-to-body"),
         ),
     ] = None
     input: Annotated[
@@ -63,6 +66,7 @@ class ForeignOptions:
             metavar="NAME",
             help="What the samples are: increments in rad; rates in rad/s, means over the sampling interval; or "
             "rates-at-ends in rad/s, those at the end of each interval.  [default: the name of the argument]",
+            words=("increments", "rates", "rates-at-ends"),
         ),
     ] = None
     sample_hz: Annotated[
@@ -79,7 +83,13 @@ class ForeignOptions:
         option("--init", metavar="NAME", help="Name of the function that begins a run, if there is one."),
     ] = None
     precision: Annotated[
-        _Text, option("--precision", metavar="NAME", help="Its numbers: float or double.  [default: double]")
+        _Text,
+        option(
+            "--precision",
+            metavar="NAME",
+            help="Its numbers: float or double.  [default: double]",
+            words=("float", "double"),
+        ),
     ] = None
 
     def step(self, file: str) -> ForeignStep:
@@ -116,13 +126,13 @@ def check(
     foreign: ForeignOptions,
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Test what every attitude step must do; exit with 1 if it fails.
+    """Run the conformance tests; exit 1 on failure.
 
     Identities are checked in arithmetic of 40 digits, the order is measured on a ladder of step lengths, and every back
-    end is compared with exact arithmetic. A line that begins with a dash is a measurement that has no limit to pass.
+    end is compared with exact arithmetic. A line that begins with a dash is a measurement without a limit.
 
-    A function in a file of C or C++ is compiled, run along motions with known attitude, and held to the same behaviour.
-    If it fails, the likely cause is named.
+    A function in a file of C or C++ is compiled, run along motions with known attitude, and put to the same tests. If
+    it fails one, the likely cause is named.
 
     Example: strapgen check examples/modified_rodrigues.py
 
@@ -161,10 +171,10 @@ def _check_step(algorithm: str, method: MethodOptions, output: Output) -> None:
     if live:
         typer.echo(f"{kernel.name}: {kernel.title}\n")
     findings = []
-    for finding in conformance.check(choice):
+    for finding in conformance.findings(choice):
         findings.append(finding)
         if live:
-            typer.echo(conformance.finding_text(finding))
+            terminal.write(conformance.finding_text(finding))
     if not live:
         output.show(conformance.FindingsResult(kernel.name, kernel.title, findings))
     _fail(kernel.name, findings)

@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapgen import fixedpoint, pipeline
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice, choose_step, named
 from strapgen.ir.exceptions import CompilerError, InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.kernel_info import AttitudeStep
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.lab.comparison import certified_angle
 from strapgen.lab.convergence import converge
-from strapgen.lab.motions.motions import GENERAL, motion
+from strapgen.lab.motions.motions import motion
 from strapgen.lab.runs import attitude, drift_between, simulate, step_of_increments
 from strapgen.results.records import INTERNAL, Record, entry, properties
 from strapgen.results.result import Result
@@ -84,7 +85,15 @@ def finding_text(finding: Finding) -> str:
 
 @dataclass(frozen=True)
 class FindingsResult(Result):
-    """What was found of an attitude step."""
+    """What was found of an attitude step; as a sequence, the findings.
+
+    Parameters
+    ----------
+    kernel, title : str
+        Name of the kernel, and what it is in words.
+    findings : tuple of Finding
+        In the order in which they were made.
+    """
 
     rows_in = "findings"
     computed = properties(holds=entry())
@@ -92,6 +101,21 @@ class FindingsResult(Result):
     kernel: str
     title: str = field(metadata=INTERNAL)
     findings: Sequence[Finding]
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        held = [finding.holds for finding in self.findings]
+        return f"of {self.kernel}: {held.count(True)} hold, {held.count(False)} fail, {held.count(None)} are open"
+
+    def __iter__(self) -> Iterator[Finding]:
+        return iter(self.findings)
+
+    def __len__(self) -> int:
+        return len(self.findings)
+
+    def __getitem__(self, place: int) -> Finding:
+        return self.findings[place]
 
     @property
     def holds(self) -> bool:
@@ -103,17 +127,19 @@ class FindingsResult(Result):
         return "\n".join([f"{self.kernel}: {self.title}", "", *map(finding_text, self.findings)])
 
 
-def check(choice: Choice) -> Iterator[Finding]:
+@renamed_parameters(choice="algorithm")
+def check(algorithm: AnyAlgorithm) -> FindingsResult:
     """Check the behaviour of an attitude step as its user sees it.
 
     Parameters
     ----------
-    choice : Choice
+    algorithm : str, path, Choice or AttitudeAlgorithm
         An attitude step that takes increments.
 
-    Yields
-    ------
-    Finding
+    Returns
+    -------
+    FindingsResult
+        A sequence of `Finding`; `holds` says whether all that is required holds, and it prints as the command does.
 
     Raises
     ------
@@ -122,11 +148,17 @@ def check(choice: Choice) -> Iterator[Finding]:
 
     Examples
     --------
-    >>> from strapgen.catalogue import choose
-    >>> holds = {finding.name: finding.holds for finding in check(choose("euler"))}
-    >>> holds["order"], holds["at rest"]
-    (True, True)
+    >>> found = check("euler")
+    >>> found.holds, found[0].name
+    (True, 'no rotation')
     """
+    choice = choose_step(named("check", algorithm))
+    kernel = step_of_increments(choice)
+    return FindingsResult(kernel.name, kernel.title, tuple(findings(choice)))
+
+
+def findings(choice: Choice) -> Iterator[Finding]:
+    """Yield what is found of an attitude step that takes increments, each finding as soon as it is there."""
     step_of_increments(choice)  # refuses what is no such step
     step = _Precise(pipeline.program(choice))
     checks: dict[str, Callable[[], Iterable[Finding]]] = {
@@ -270,7 +302,7 @@ def _turning_frame(step: _Precise) -> Finding:
 
 
 def _order(choice: Choice) -> Finding:
-    ladder = converge(choice, motion("coning", **GENERAL), ["1/8", "1/16", "1/32", "1/64", "1/128"], 1)
+    ladder = converge(choice)
     if ladder.observed is None:
         return Finding("order", False, f"no order is seen: {ladder.hidden}")
     if ladder.predicted is None:

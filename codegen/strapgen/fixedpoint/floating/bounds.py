@@ -109,7 +109,7 @@ def rounding_bounds(
     True
     """
     checks.choice("number", number, NUMBERS)
-    settings = settings or Settings()
+    settings = (settings or Settings()).for_program(program.increments_per_step, program.kernel)
     names = [signal.name for signal in program.inputs]
     for name in settings.ranges:
         checks.choice(f"input of {program.kernel}", name, names)

@@ -48,7 +48,7 @@ class TriadData:
 
 @dataclass(frozen=True)
 class GeometryResult(Result):
-    """What redundant sensors tell of their failures; numbers of the field of the axes are text, exact."""
+    """Parity equations, triads and detectable failures of redundant sensors; exact numbers are text."""
 
     sensor_set: SensorSet = field(metadata=INTERNAL)
     name: str

@@ -8,12 +8,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from strapgen.cli.fixed_options import FixedOptions
 from strapgen.cli.generate_command import SourceOptions
 from strapgen.cli.option_groups import Excludes, Needs, Shown, grouped, rules
-from strapgen.cli.options import option
+from strapgen.cli.options import argument, option
 from strapgen.cli.output import Format, NewFolder, WithRuns, check_format, show
 from strapgen.cli.values import Positive
 from strapgen.ir import checks
@@ -47,10 +45,10 @@ def _a_drawing(option: str, path: Path) -> Path:
 def system(
     file: Annotated[
         Path,
-        typer.Argument(
-            metavar="FILE",
+        argument(
+            "FILE",
             help="TOML file with the stages and their wires, or the name of a built-in system.",
-            show_default=False,
+            words="strapgen.navigation.systems.built_in:names",
         ),
     ],
     *,

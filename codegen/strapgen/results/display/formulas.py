@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import sympy as sp
 
+from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import Kernel, Stage
@@ -159,6 +161,65 @@ class KernelResult(Result):
     def latex(self) -> str | None:
         """Return the formulas, or the table."""
         return as_latex(self.of_kernel) if self.rows() is None else self.table().as_latex()
+
+
+class _Text(str):
+    """A text that the prompt of IPython shows as `print` does."""
+
+    __slots__ = ()
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        printer.text(str(self))
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """The formulas of a kernel: they print as text, and a notebook shows them as LaTeX.
+
+    Parameters
+    ----------
+    kernel : Kernel
+    straight_line : Program or None
+        Its program; None for a kernel with unknowns, which has none.
+    """
+
+    kernel: Kernel
+    straight_line: Program | None
+
+    __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return f"of {self.kernel.name}: {self.kernel.title}"
+
+    def __str__(self) -> str:
+        return as_text(self.kernel, None if self.straight_line is None else self.straight_line.notes)
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        printer.text(str(self))
+
+    def _repr_latex_(self) -> str | None:
+        return short_latex(self.kernel)
+
+    @property
+    def latex(self) -> _Text:
+        """The formulas as an align environment."""
+        return _Text(as_latex(self.kernel))
+
+    @property
+    def program(self) -> _Text:
+        """The straight-line code with exact constants, and above it the operations."""
+        return _Text(program_as_text(self._known()))
+
+    @property
+    def operations(self) -> dict[str, int]:
+        """Number of operations by kind, and of temporaries."""
+        return dict(_counts(self._known()))
+
+    def _known(self) -> Program:
+        """Return the program, which a kernel with unknowns does not have."""
+        self.kernel.require_known()
+        assert self.straight_line is not None
+        return self.straight_line
 
 
 def program_as_data(program: Program) -> dict[str, str]:
