@@ -41,7 +41,6 @@ default_role = "autolink"
 autosummary_generate = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 toc_object_entries_show_parents = "hide"
 add_module_names = False
