@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from strapgen import EULER, AttitudeStep, KernelBuilder, Signal, algebra, turns_signal
+from strapgen import EULER, AttitudeStep, KernelBuilder, Signal, algebra, node_rotations_signal
 
 NODES = (Fraction(0), Fraction(1, 2), Fraction(1))
 
@@ -12,8 +12,8 @@ def algorithm():
     build = KernelBuilder()
     p, q, r, a, b = build.parameter("p", "q", "r", "a", "b")
     state = build.input(EULER.state)
-    turns = build.input(turns_signal(NODES))
-    w1, w2, w3 = (turns[k, :].T for k in range(3))
+    rotations = build.input(node_rotations_signal(NODES))
+    w1, w2, w3 = (rotations[k, :].T for k in range(3))
     phi = build.stage(
         Signal.vector("phi", "phi", unit="rad", meaning="rotation vector of the step"),
         p * w1 + q * w2 + r * w3 + a * algebra.cross(w1, w2) + b * algebra.cross(w1, w3),

@@ -17,7 +17,7 @@ from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel, evaluate_stages
-from strapgen.run.backends import BACKENDS, fitted
+from strapgen.run.backends import BACKENDS, fit_settings
 from strapgen.run.kernel_sources import sources_of_program
 
 #: Kernels of the standard catalogue that fixed point can be made of without ranges from a user: all but the models of
@@ -100,4 +100,4 @@ def turns(choice: Choice, samples: np.ndarray) -> Rotation:
 
 def generated(program: Program, backend_name: str) -> Sources:
     """Return the sources that a back end by this name runs."""
-    return sources_of_program(program, BACKENDS[backend_name].target, fitted(backend_name, None))
+    return sources_of_program(program, BACKENDS[backend_name].target, fit_settings(backend_name, None))

@@ -81,7 +81,7 @@ def graph():
     return grimp.build_graph("strapgen", cache_dir=None, exclude_type_checking_imports=True)
 
 
-def test_applications_require_what_they_import(graph):
+def test_applications_require_their_imports(graph):
     registered = registration.built_in()
     built_in = [name for name in registered if name in APPLICATIONS]
     assert {*built_in} == {*APPLICATIONS}

@@ -54,7 +54,7 @@ def test_generated_code_is_that_of_the_stages(alg):
     assert list(alg.generate("rust", prefix="nav_").step_files) == ["nav_euler_rk4_2.rs"]
 
 
-def test_generation_refuses_what_does_not_go_together(alg):
+def test_generation_refuses_conflicting_arguments(alg):
     with pytest.raises(strapgen.InputError, match=r"^settings and word are both given; one is needed$"):
         alg.generate("c-fixed", strapgen.Settings(), word=16)
     with pytest.raises(

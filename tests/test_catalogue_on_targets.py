@@ -233,7 +233,7 @@ IN_C = [(32, "full"), (16, "state"), (32, "state"), (16, "none")]
         for quick in [row == IN_C[0] and choice.kernel in COMPILED]
     ],
 )
-def test_c_returns_and_refuses_what_the_model_does(choice, word, carry, rng):
+def test_c_returns_and_refuses_as_the_model(choice, word, carry, rng):
     fixed = quantized(choice, settings(choice, word, carry=carry))
     in_c = CEvaluator(strapgen.generate(fixed, "c-fixed"))
     model = ModelEvaluator(strapgen.generate(fixed, "fixed-model"))

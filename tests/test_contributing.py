@@ -38,7 +38,7 @@ def test_every_kind_has_a_section():
 
 
 @pytest.mark.parametrize("kind", SECTIONS)
-def test_what_is_added_touches_one_folder(kind):
+def test_additions_touch_one_folder(kind):
     paths = [Path(path) for _, path, _ in _PART.findall(SECTIONS[kind])]
     assert len({path.parent for path in paths}) == 1
     assert all((ROOT / path).exists() == bool(table) for table, path, _ in _PART.findall(SECTIONS[kind]))

@@ -161,7 +161,7 @@ def missing(excerpt: str, text: str) -> list[str]:
 
 
 @pytest.mark.long
-def test_the_formulas_and_the_c_of_the_readme_are_what_its_python_prints(new_clone):
+def test_readme_formulas_and_c_are_printed_by_its_python(new_clone):
     _, done = new_clone
     (formulas,), (code,) = blocks(README, "text"), blocks(README, "c")
     assert 10 <= sum(line != "..." for line in code.splitlines()) <= 15
@@ -176,7 +176,7 @@ def test_an_excerpt_that_differs_is_seen():
     assert missing("a, ...\nc\n", "a, b\nc\n") == [] and missing("a, ...\nc\n", "a b\nc\n") == ["a, "]
 
 
-def test_the_readme_is_short_and_begins_with_what_matters():
+def test_readme_is_short_and_begins_with_the_essentials():
     lines = README.splitlines()
     assert len(lines) <= 120
     assert len(shown_commands(README)) <= 15
@@ -234,7 +234,7 @@ DRAWN = {"cone-drift": "README", "orders": "paths/paper", "bounds": "paths/firmw
 
 @pytest.mark.long
 @pytest.mark.parametrize("picture", DRAWN)
-def test_a_picture_is_what_the_command_beside_it_draws(picture, workplace):
+def test_picture_is_the_output_of_its_command(picture, workplace):
     """In a process of its own, since `shared_results` leaves the layout of figures out."""
     text = README if DRAWN[picture] == "README" else DOCS[DRAWN[picture]]
     (command,) = (c for c in shown_commands(text) if f"--plot out/{picture}.svg" in c)
@@ -468,7 +468,7 @@ def with_less(command: str) -> str:
     return command
 
 
-def test_what_the_pages_ask_much_of_stands_on_them():
+def test_demanding_statements_are_on_their_pages():
     commands = "\n".join([*page_commands(), *shown_commands(DOCS["own-algorithms"])])
     assert [part for part in LESS if part not in commands] == []
     named = {
@@ -489,7 +489,7 @@ def test_the_page_on_the_command_line_shows_every_command():
     assert shown == {name for name, command in commands if not command.hidden}
 
 
-def test_no_command_writes_into_the_checkout_what_git_does_not_ignore():
+def test_commands_write_only_ignored_files_into_the_checkout():
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
     pages += [*(ROOT / "examples").glob("*.py"), *(ROOT / "codegen" / "strapgen" / "cli").rglob("*.py")]
     written, writers = {}, ("generate", "two-speed", "vectors")
@@ -668,7 +668,7 @@ ELSEWHERE = {
 }
 
 
-def test_the_page_for_reviewers_shows_what_generated_files_hold():
+def test_page_for_reviewers_quotes_generated_files():
     page, folder = DOCS["generated-code"], ROOT / "generated"
     names = ["c_fixed/euler_rk4_2_w32.h", "c_fixed/euler_rk4_2_w32.c", "c_float/euler_rk4_2_float.h"]
     texts = [(folder / name).read_text() for name in [*names, "c_float/euler_rk4_2_float.c"]]
@@ -735,7 +735,7 @@ def test_example(path, capsys, monkeypatch):
 
 
 @pytest.mark.long
-def test_an_example_prints_what_a_page_shows(capsys):
+def test_example_prints_the_text_of_its_page(capsys):
     pattern = r"^    python examples/(\w+\.py)\n\n```text\n(.*?)^```"
     shown = [pair for text in DOCS.values() for pair in re.findall(pattern, text, re.MULTILINE | re.DOTALL)]
     assert len(shown) >= 3

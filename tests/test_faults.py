@@ -50,7 +50,7 @@ def test_an_entry_that_is_not_whole_is_noticed(place, files, listed, is_whole):
 @pytest.mark.parametrize(
     "name", ["out/.strapgen-draft-01234567", "cache/kind/.filling-01234567", "tmp/anything"]
 )
-def test_what_is_left_behind_is_noticed(place, name):
+def test_leftover_files_are_noticed(place, name):
     (place.root / name).mkdir(parents=True)
     assert name in place.left()
 
@@ -78,7 +78,7 @@ def test_a_run_does_its_work_or_says_why_not(trials, place, result, text, is_wro
     assert bool(faults.refused_or_right(trials, "x", place, result, {"a.c": "old"})) is is_wrong
 
 
-def test_a_process_that_goes_on_is_noticed_and_ended(monkeypatch):
+def test_running_process_is_noticed_and_ended(monkeypatch):
     monkeypatch.setattr(faults, "ORPHANS_S", 0.1)
     code = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])"
     process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)

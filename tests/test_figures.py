@@ -25,7 +25,7 @@ import scenes  # noqa: E402
 TEXT = 4.5
 
 
-def test_the_pictures_are_what_their_script_draws():
+def test_pictures_are_the_output_of_their_script():
     """If this fails, run python docs/figures/draw.py."""
     pictures = draw.pictures()
     assert len(pictures) == 4

@@ -21,7 +21,7 @@ def test_the_corpus_of_a_target_is_used_or_refused_in_one_line(name):
         TARGETS[name](data)
 
 
-def test_what_a_target_starts_from_is_used(tmp_path, monkeypatch):
+def test_fuzz_targets_use_their_corpus(tmp_path, monkeypatch):
     """Otherwise the fuzzers would see no more than refusals."""
     refused = []
 
@@ -143,7 +143,7 @@ def test_the_time_is_for_all_targets_together():
     assert {name for name, _ in shared} == {*TARGETS}
 
 
-def test_the_script_refuses_what_it_does_not_know(capsys):
+def test_script_refuses_unknown_arguments(capsys):
     with pytest.raises(SystemExit) as end:
         fuzz.main(["--only", "c,docs"])
     assert end.value.code == 2

@@ -110,7 +110,7 @@ def test_the_page_of_the_catalogue_has_all_kernels_and_processors():
     ("cpu", "part"),
     [(REFERENCE, part) for part in PARTS] + [(cpu, "steps") for cpu in PROCESSORS if cpu != REFERENCE],
 )
-def test_the_page_of_the_catalogue_is_what_is_measured(cpu, part):
+def test_cost_page_has_the_measured_numbers(cpu, part):
     needed(cpu, COST.read_text())
     pages = {one.kernel: one for one in rows() if one.cpu == cpu}
     for choice in FIXED_POINT:

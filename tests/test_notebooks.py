@@ -36,7 +36,7 @@ def test_a_notebook_is_small_and_whole(path: Path):
 
 
 @pytest.mark.parametrize("path", notebooks.NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs_and_says_what_stands_in_it(path: Path):
+def test_notebook_runs_with_its_stored_output(path: Path):
     notebook = json.loads(path.read_text())
     stored = [cell["outputs"] for cell in notebook["cells"] if cell["cell_type"] == "code"]
     assert notebooks.executed(notebook) == stored

@@ -62,7 +62,7 @@ def test_readme_of_the_package_links_to_files_of_the_repository(with_addresses):
             assert (ROOT / here[2]).is_dir() if here[1] == "tree" else (ROOT / here[2]).is_file(), target
 
 
-def test_links_inside_links_and_addresses_are_told_apart(with_addresses):
+def test_links_inside_links_and_addresses_are_distinguished(with_addresses):
     text = "[![a](b.svg)](docs) [c](https://d.org) [e](#f) [g](LICENSE#h)"
     assert with_addresses(text, ROOT, "https://r", "1") == (
         "[![a](https://r/raw/v1/b.svg)](https://r/tree/v1/docs) [c](https://d.org) [e](#f) [g](https://r/blob/v1/LICENSE#h)"

@@ -174,7 +174,7 @@ def test_a_stage_that_fails_has_no_time(stage_log):
     assert not stage_log.records
 
 
-def test_verbose_shows_stages_on_stderr_and_what_the_cache_holds(empty_cache, capsys):
+def test_verbose_shows_stages_and_cache_hits_on_stderr(empty_cache, capsys):
     words = ("generate", "euler", "--target", "c", "--out", str(empty_cache))
     run("--verbose", *words)
     first = capsys.readouterr()

@@ -52,7 +52,7 @@ def test_neither_numpy_nor_sympy_is_loaded_with_the_package():
     assert {"numpy", "sympy", "mpmath", "jinja2", "cffi"} & {*loaded} == set()
 
 
-def test_every_name_is_there_whatever_was_imported_before(after_imports):
+def test_names_are_independent_of_earlier_imports(after_imports):
     for name in strapgen.__all__:
         assert getattr(strapgen, name) is not None
     assert after_imports[1].split() == [
@@ -74,7 +74,7 @@ def test_a_name_that_is_not_there():
         strapgen.derve  # noqa: B018
 
 
-def test_what_type_checkers_see_is_what_python_loads():
+def test_type_checkers_see_the_names_that_python_loads():
     tree = ast.parse((PACKAGE / "__init__.py").read_text())
     (block,) = (
         node

@@ -227,7 +227,7 @@ def test_a_repr_that_is_too_long_is_seen():
     assert too_long("\n".join("abcdef")) and too_long("a" * (WIDTH + 1)) and not too_long("a\nb")
 
 
-def test_what_a_repr_says():
+def test_repr_has_few_lines():
     assert repr(kernel()) == (
         "<Kernel euler-rk4-2: Euler parameters: step by classical fourth-order Runge-Kutta method from 2\n"
         "  angle increments\n"
@@ -249,7 +249,7 @@ class Held:
     __repr__ = short_repr
 
 
-def test_the_whole_text_of_a_value_tells_what_its_repr_leaves_out():
+def test_full_text_has_all_fields():
     """Keys of the cache consist of it, so two values that differ must never share it."""
     one, other = Held((*range(100),)), Held((*range(99), 0))
     assert repr(one) == repr(other) == "Held(numbers=<100 entries>)"
@@ -286,7 +286,7 @@ def test_the_noun_and_the_functions_agree():
     assert series.step.order == 4 and not too_long(repr(series))
 
 
-def test_the_noun_refuses_what_does_not_go_together():
+def test_value_refuses_conflicting_fields():
     algorithm = strapgen.algorithm("euler", "rk4", increments=2)
     motion = strapgen.motion("constant", z_deg_s=1)
     with pytest.raises(

@@ -44,7 +44,7 @@ def documentation() -> set[str]:
     return {page for page in pages if not page.startswith(("docs/site/", "docs/_build/"))}
 
 
-def test_every_page_of_the_documentation_stands_in_one_section():
+def test_every_page_is_in_one_section():
     places = Counter(page for s in navigation.SECTIONS for page in (s.landing, *s.pages))
     assert {page: count for page, count in places.items() if count > 1} == {}
     assert documentation() - {*places} == set()
@@ -68,7 +68,7 @@ def test_the_table_of_a_section_repeats_the_questions_of_the_index():
 # Staging
 
 
-def test_a_link_leads_to_what_stands_for_its_file_on_the_site():
+def test_links_lead_to_pages_of_the_site():
     page = "See [one](coning.md#three-forms), [two\nwords](../examples/own.py), [far](https://a.b/c.md), [here](#x).\n"
     page += '<img alt="a" src="drift.png">\n\n```python\nf[0](coning.md)\n```\n'
     seen = []
@@ -104,7 +104,7 @@ def test_staged_pages_link_to_staged_files_alone(staged):
     assert broken == [] and count > 500
 
 
-def test_a_second_staging_leaves_pages_alone_and_drops_what_has_gone(staged):
+def test_second_staging_keeps_pages_and_drops_removed_ones(staged):
     (staged / "gone.md").write_text("# Gone\n")
     before = {path: path.stat().st_mtime_ns for path in staged.rglob("*") if path.is_file()}
     build.stage_pages(staged)
@@ -122,7 +122,7 @@ def test_the_home_page_is_the_readme_with_a_card_for_each_section(staged):
     assert [paragraph for paragraph in paragraphs if paragraph not in text] == []
 
 
-def test_a_folder_lists_what_is_in_it_and_a_file_is_shown():
+def test_folder_page_lists_files_and_file_page_shows_text():
     files = ["a/b.c", "a/inner/c.c", "a/inner/d.c", "other"]
     text = repository_pages.folder_page("a", files, orphan=True)
     assert re.findall(r"^- \[(.*)\]\((.*)\)$", text, re.MULTILINE) == [("inner/", "inner"), ("b.c", "b.c")]
@@ -176,7 +176,7 @@ def test_every_public_name_is_in_the_reference():
         assert f"<strapgen.{name}>" in pages["index"]
 
 
-def test_what_is_neither_a_function_nor_a_class_has_its_comment_in_the_reference():
+def test_constants_have_their_comments_in_the_reference():
     text = "\n".join(reference_python.pages().values())
     values = [
         name
@@ -242,7 +242,7 @@ def test_without_the_right_mathjax_there_is_one_line_and_no_file(tmp_path, monke
     assert "\n" not in str(error.value) and not (tmp_path / "mathjax").exists()
 
 
-def test_without_npm_the_build_says_what_to_install(tmp_path, monkeypatch, capsys):
+def test_missing_npm_names_the_package_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(build, "BUILD", tmp_path / "build")
     assert build.main([str(tmp_path / "out")]) == 2

@@ -88,7 +88,7 @@ def test_its_study_has_the_angle_of_the_closed_form(strapgen_with):
     assert angles["c-float"] == pytest.approx(angles["numpy"], abs=2e-7)
 
 
-def test_its_command_stands_in_the_help(strapgen_with):
+def test_command_is_in_the_help(strapgen_with):
     assert "twist " in strapgen_with("study", "--help").stdout
 
 
@@ -145,7 +145,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("value", BROKEN)
-def test_a_registration_that_cannot_be_used_is_told_in_one_line(value, site, strapgen_here):
+def test_broken_registration_is_reported_in_one_line(value, site, strapgen_here):
     installed_packages.install(site, registration.GROUP, {"toy": value})
     installed_packages.as_in_a_new_process()
     code, said, told = strapgen_here("derive", "twist-z")
@@ -158,7 +158,7 @@ def test_a_registration_that_cannot_be_used_is_told_in_one_line(value, site, str
     assert told.startswith(f"strapgen: application toy ({value})") and told.count("\n") == 1
 
 
-def test_a_command_of_a_registration_that_cannot_be_used_is_told(site, strapgen_with):
+def test_broken_command_of_a_package_is_reported(site, strapgen_with):
     installed_packages.install(site, registration.GROUP, {"toy": "toy_application:REGISTRATION"})
     done = strapgen_with("study", "twist")
     assert done.returncode == 2 and done.stderr.count("\n") == 1
@@ -198,7 +198,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_part_that_cannot_be_used_is_told_in_one_line_and_the_rest_goes_on(fault, site, strapgen_here):
+def test_broken_part_is_reported_and_the_rest_works(fault, site, strapgen_here):
     file, text, words, line = FAULTS[fault]
     (site / "toy_application" / file).write_text(f"{text}\n")
     code, said, told = strapgen_here(*words.split())
@@ -218,7 +218,7 @@ def test_names_of_strapgen_are_not_hidden(site, strapgen_here):
     assert "cannot be used: strapgen has a kernel euler-product; another name is needed" in said
 
 
-def test_a_kernel_whose_code_changes_is_derived_anew_and_one_that_fails_is_told(strapgen_with, site):
+def test_changed_kernel_is_derived_anew_and_failure_reported(strapgen_with, site):
     path = site / "toy_application" / "kernel.py"
     program = ("derive", "twist-z", "--show", "program")
     assert "operations: none" in strapgen_with(*program).stdout

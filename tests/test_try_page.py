@@ -77,7 +77,7 @@ def test_a_tableau_of_the_reader_is_a_method(tmp_path, monkeypatch):
     assert line.startswith("own.toml: ") and "\n" not in line
 
 
-def test_what_strapgen_refuses_is_one_line():
+def test_refusals_on_the_page_are_one_line():
     for part in answers.PARTS:
         line = answered(part, "euler", "rk9", 2)
         assert [*line] == ["error"]
@@ -87,7 +87,7 @@ def test_what_strapgen_refuses_is_one_line():
 # What the build brings
 
 
-def test_every_method_stands_under_one_heading():
+def test_every_method_has_one_heading():
     names = [name for group in vendor.GROUPS.values() for name in group]
     assert sorted(names) == sorted(METHODS)
     assert {*vendor.PROVED} <= {*METHODS}
@@ -152,7 +152,7 @@ def runnable(site) -> Path:
 
 
 @pytest.mark.long
-def test_the_page_derives_what_the_command_line_does(runnable, browser, tmp_path):
+def test_page_derives_as_the_command_line(runnable, browser, tmp_path):
     command = "generate euler --method rk4 --increments 2 --target c,cpp,numpy --out"
     subprocess.run(
         [sys.executable, "-m", "strapgen", *command.split(), str(tmp_path)], check=True, capture_output=True

@@ -114,7 +114,7 @@ def places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 @settings(deadline=None)
 @given(data=st.data())
-def test_what_a_schema_refuses_the_reader_refuses_in_one_line(data):
+def test_reader_refuses_as_the_schema_in_one_line(data):
     path = data.draw(st.sampled_from([path for path in EXAMPLES if path.stat().st_size < 10_000]))
     kind, file = EXAMPLES[path], copy.deepcopy(tomllib.loads(path.read_text("utf-8")))
     *way, last = data.draw(st.sampled_from(places(file)))

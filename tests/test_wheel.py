@@ -51,7 +51,7 @@ def test_templates_and_generated_sources_are_in_the_wheel(wheel):
     assert not any("__pycache__" in name or name.startswith(("tests/", "codegen/")) for name in names)
 
 
-def test_the_source_archive_has_what_a_wheel_is_built_from(tmp_path):
+def test_source_archive_has_the_sources_of_the_wheel(tmp_path):
     run(sys.executable, "-m", "build", "--sdist", "--outdir", tmp_path, resources.checkout(), cwd=tmp_path)
     (built,) = tmp_path.glob("strapgen-*.tar.gz")
     with tarfile.open(built) as archive:

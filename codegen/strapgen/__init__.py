@@ -27,7 +27,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods import windows as windows
     from strapgen.catalogue.methods.method import Samples as Samples
     from strapgen.catalogue.methods.method import increments_signal as increments_signal
-    from strapgen.catalogue.methods.method import turns_signal as turns_signal
+    from strapgen.catalogue.methods.method import node_rotations_signal as node_rotations_signal
     from strapgen.catalogue.methods.method import velocities_signal as velocities_signal
     from strapgen.catalogue.methods.tableaux import TABLEAUX as TABLEAUX
     from strapgen.catalogue.methods.tableaux import Tableau as Tableau
@@ -146,7 +146,7 @@ _NAMES = {
     "catalogue.methods.method": (
         "Samples",
         "increments_signal",
-        "turns_signal",
+        "node_rotations_signal",
         "velocities_signal",
     ),
     "catalogue.methods.tableaux": (
@@ -254,7 +254,11 @@ _NAMESPACES = {
     "windows": "catalogue.methods.windows",
 }
 #: Present names by those of the version before, which give a warning.
-_RENAMED = {"Companions": "AttitudeStep", "resolution": "EPSILON"}
+_RENAMED = {
+    "Companions": "AttitudeStep",
+    "resolution": "EPSILON",
+    "turns_signal": "node_rotations_signal",
+}
 _EXPORTS = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = ["__version__", *_EXPORTS, *_NAMESPACES]

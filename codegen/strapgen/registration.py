@@ -1,4 +1,4 @@
-"""Registrations: what each folder and each installed package brings, declared there and imported when it is used.
+"""Registrations of commands, names and results by folders and installed packages, imported when used.
 
 A folder has a module ``registration``, whose `REGISTRATION` says what the folder brings; an installed package names its
 own by an entry point of the group `GROUP`. Nothing else knows which there are.
@@ -122,14 +122,14 @@ class Registration:
 
 
 def load(place: str) -> Any:
-    """Return what a text "module:name" names; it may be a module of a package."""
+    """Import the object that a text "module:name" refers to; without a name, the module."""
     module, _, name = place.partition(":")
     holder = import_module(module)
     return getattr(holder, name) if hasattr(holder, name) else import_module(f"{module}.{name}")
 
 
 def table(kind: str, place: str) -> Mapping[str, Any]:
-    """Return the table of a place: a mapping, or the files of a folder by their names."""
+    """Return the table at a place: a mapping, or the files of a folder by name."""
     if kind not in _FOLDERS:
         names = load(place)
         if not isinstance(names, Mapping):
@@ -145,7 +145,7 @@ def table(kind: str, place: str) -> Mapping[str, Any]:
 
 @cache
 def built_in() -> dict[str, Registration]:
-    """Return what strapgen's folders register, by their names as "lab", each after what it requires."""
+    """Return the registrations of strapgen's folders by name, as "lab", each after those it requires."""
     top = Path(__file__).parent
     found: dict[str, Registration] = {}
     for path in [*sorted(top.glob("*/registration.py")), *sorted(top.glob("*/*/registration.py"))]:
@@ -166,7 +166,7 @@ def built_in() -> dict[str, Registration]:
 
 @cache
 def loaded(point: EntryPoint, place: str, kind: str = "") -> Any:
-    """Return what an installed package has at a place, or the `InputError` that says why it cannot be used.
+    """Import an object of an installed package; return an `InputError` with the reason if that fails.
 
     The place is that of the entry point itself, of a table of its registration (with the kind), or of a command.
     """
@@ -188,7 +188,7 @@ def loaded(point: EntryPoint, place: str, kind: str = "") -> Any:
 
 
 def read() -> Iterator[tuple[EntryPoint, Registration | InputError]]:
-    """Yield the registrations of installed packages, or why one cannot be used."""
+    """Yield the registrations of installed packages, or the error of one that cannot be used."""
     for point in packages.entry_points(GROUP):
         one = loaded(point, point.value)
         if not isinstance(one, Registration | InputError):
@@ -220,7 +220,7 @@ def _function(point: EntryPoint, one: Registration, name: str) -> Any:
 
 
 def broken() -> list[str]:
-    """Return a line on every installed package of which something cannot be imported: the first thing that cannot."""
+    """Return a line for every installed package with an object that cannot be imported, naming the first."""
     lines = []
     for point, one in read():
         parts: list[Any] = [one]
@@ -234,7 +234,7 @@ def broken() -> list[str]:
 
 
 def extension(point: str, needed: str) -> Any:
-    """Return what an application adds at an extension point; `needed` is the option or argument that asks for it."""
+    """Return the extension of an application by name; `needed` is the option or argument that requires it."""
     added = next(extensions(point), None)
     if added is None:
         raise InputError(f"{needed} needs an application of strapgen that is not installed ({point})")
@@ -242,7 +242,7 @@ def extension(point: str, needed: str) -> Any:
 
 
 def extensions(point: str) -> Iterator[Any]:
-    """Yield what applications add at an extension point, as far as it can be used."""
+    """Yield the usable extensions of applications at an extension point."""
     for one in built_in().values():
         if point in one.extensions:
             yield load(one.extensions[point])

@@ -1,4 +1,4 @@
-"""A `Registry` has what strapgen's folders and installed packages bring of one kind, by name."""
+"""A `Registry` maps names to the objects of one kind that strapgen and installed packages register."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FEW = 30
 
 
 class Item(NamedTuple):
-    """What an installed package brings under a name: the entry point, the place, and the record once it is loaded."""
+    """The object that an installed package registers under a name: entry point, place, and value once loaded."""
 
     point: EntryPoint
     place: str
@@ -31,7 +31,7 @@ class Item(NamedTuple):
 
 
 class _Own(Mapping[str, T], Generic[T]):
-    """What strapgen's folders bring of a kind, by name, without what installed packages bring."""
+    """The objects of a kind that strapgen itself registers, by name."""
 
     __repr__ = short_repr
 
@@ -59,7 +59,7 @@ class _Own(Mapping[str, T], Generic[T]):
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """What strapgen's folders bring of a kind, by name, then what installed packages bring.
+    """The objects of a kind by name: those of strapgen, then those of installed packages.
 
     Looking up a name of a package that cannot be used raises an `InputError`; another name is not disturbed by it.
 
@@ -99,7 +99,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return self.own._in_words()
 
     def _items(self) -> Iterator[tuple[str, Item]]:
-        """Yield what installed packages bring, by name; of the group an entry point is imported when it is used."""
+        """Yield the objects of installed packages by name; entry points of the group are imported when used."""
         for point, one in read():
             for place in getattr(one, self._kind, ()):
                 table = loaded(point, place, self._kind)
@@ -110,7 +110,7 @@ class Registry(Mapping[str, T], Generic[T]):
             yield point.name, Item(point, point.value, lambda point=point: loaded(point, point.value))  # type: ignore[misc]
 
     def item(self, name: str) -> Item | None:
-        """Return what an installed package brings under a name; None for a name of strapgen, or of nobody."""
+        """Return the object of an installed package by name; None for a name of strapgen or an unknown one."""
         if name in self.own:
             return None
         items = {item.place: item for other, item in self._items() if other == name}
@@ -146,17 +146,17 @@ class Registry(Mapping[str, T], Generic[T]):
         return len(list(iter(self)))
 
     def taken(self) -> dict[str, str]:
-        """Return a line on each name of an installed package that strapgen has itself."""
+        """Return a line for each name of an installed package that strapgen uses already."""
         why = f"cannot be used: strapgen has a {KINDS[self._kind]} {{}}; another name is needed"
         return {f"{n} ({item.place})": why.format(n) for n, item in self._items() if n in self.own}
 
     def code(self, name: str) -> str:
-        """Return a hash of the code of an installed package's record; "" for one of strapgen, or of nobody."""
+        """Return a hash of the code of an installed package's object; "" for one of strapgen or an unknown one."""
         item = self.item(name)
         return "" if item is None else _code(item.point)
 
     def guarded(self, name: str, duty: str) -> Any:
-        """Run code of an installed package's record, whose failure becomes one line; nothing for one of strapgen."""
+        """Run code of an installed package; its failure becomes an error message of one line."""
         item = self.item(name)
         if item is None:
             return contextlib.nullcontext()
@@ -165,7 +165,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
 
 class Titles(Mapping[str, str]):
-    """A line on every name of a mapping, by default its title; of one that cannot be used the line says why."""
+    """A line for every name of a mapping: its title, or the reason why it cannot be used."""
 
     def __init__(self, records: Mapping[str, Any], line: Callable[[str, Any], str] | None = None) -> None:
         self._records, self._line = records, line

@@ -152,7 +152,7 @@ def test_growth_of_scale_is_that_of_the_closed_form():
     assert sp.expand(run.growth[5] + square**3 / 144) == 0
 
 
-def test_what_has_no_closed_form_says_so(own_algorithm):
+def test_missing_closed_form_is_reported(own_algorithm):
     with pytest.raises(InputError, match="not linear in its state"):
         error_rate(choose_step(str(own_algorithm("mrp"))), "coning")
     with pytest.raises(InputError, match="motion 'spin' is not known"):
@@ -196,7 +196,7 @@ def test_a_runge_kutta_step_is_the_taylor_step_there(order):
         assert (ours.cosine, ours.sine) == (taylor.cosine, taylor.sine)
 
 
-def test_what_the_first_order_loses():
+def test_first_order_error_has_the_expected_size():
     x = ANGLE
     assert constant_rate(choose("dcm", "rk1")).angle_lost == x - sp.atan(x)
     assert constant_rate(choose("euler", "rk1")).angle_lost == x - 2 * sp.atan(x / 2)

@@ -428,13 +428,13 @@ def test_a_loop_of_a_user_is_the_recursion_26_again():
         (derive("dcm-update"), "takes no samples of a vibration; allowed: dcm, euler"),
     ],
 )
-def test_what_cannot_be_assessed_is_refused(kernel, said):
+def test_kernels_without_assessment_are_refused(kernel, said):
     with pytest.raises(InputError, match=said):
         vibration.drift(kernel)
 
 
 @pytest.mark.parametrize("thing", [None, 3, ("euler", "rk4", 2, 0)])
-def test_what_is_no_choice_and_no_kernel(thing):
+def test_other_objects_than_choices_and_kernels_are_refused(thing):
     with pytest.raises(InputTypeError, match="choose takes a name or a path or a Choice, not "):
         vibration.of(thing)
     for assess in (vibration.drift, vibration.sculling):

@@ -47,7 +47,7 @@ def test_points_of_curves_are_found_with_their_roots():
     assert all(family.values[X] == family.values[Y] and not family.free for family in families)
 
 
-def test_a_groebner_basis_solves_what_elimination_does_not():
+def test_groebner_basis_solves_systems_that_elimination_cannot():
     # No unknown is linear, and nothing is a product; the curves meet in one real point twice.
     families = solve(system(X**2 + Y**2 - 5, X**2 * Y**2 + X**2 - 8), [X, Y]).families
     points = {(f.values.get(X), f.values.get(Y)) for f in families}

@@ -234,7 +234,7 @@ def test_even_functions_of_a_root_are_series():
     ],
     ids=str,
 )
-def test_what_has_no_series_says_so(expression, says):
+def test_missing_series_is_reported(expression, says):
     with pytest.raises(ArithmeticError, match=says):
         evaluated(expression)
 

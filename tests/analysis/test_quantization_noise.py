@@ -104,7 +104,7 @@ def test_figures_at_ten_degrees_per_second():
     assert arcsec(walk.along()) == pytest.approx(1561.587, rel=1e-4)
 
 
-def test_what_is_no_such_polynomial_is_refused():
+def test_unsuitable_polynomials_are_refused():
     first, second = vectors(2)
     with pytest.raises(InputError, match="is left"):
         polynomial_noise(first + second + sp.Matrix([first[0] * second[0], 0, 0]), [first, second])

@@ -35,7 +35,7 @@ def test_the_claims_of_section_8():
 
 @pytest.mark.long
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_parameters_lose_twice_what_the_matrix_loses_at_half_the_angle(order):
+def test_parameter_error_is_twice_matrix_error_at_half_angle(order):
     """Claim 2 in closed form: the ratio is 2 delta(x/2)/delta(x), exactly."""
     euler, dcm = (constant_rate(choose(name, f"rk{order}", 2)) for name in ("euler", "dcm"))
     assert sp.simplify(euler.angle_lost - 2 * dcm.angle_lost.subs(ANGLE, ANGLE / 2)) == 0

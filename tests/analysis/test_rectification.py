@@ -127,7 +127,7 @@ def mean_of_cone(choice, size):
         ("euler", "window-3-3", (1, 3, 3)),
     ],
 )
-def test_what_is_left_of_a_cone_is_of_sixth_order(state, method, samples):
+def test_residual_error_on_a_cone_is_of_sixth_order(state, method, samples):
     names = ("increments", "previous", "ahead")
     choice = choose_step(state, method, **dict(zip(names, samples, strict=False)))
     left = []
@@ -290,7 +290,7 @@ def test_the_worst_of_a_sum_adds_terms_of_equal_phase_and_the_lengths_of_others(
         (choose("euler-normalize"), [Tone(1, (1, 0, 0))], "no attitude step"),
     ],
 )
-def test_what_has_no_mean_rate_is_refused(choice, tones, said):
+def test_motions_without_mean_rate_are_refused(choice, tones, said):
     with pytest.raises(InputError, match=said):
         rectified(choice, "0.01", tones)
 

@@ -40,7 +40,7 @@ def test_the_order_is_that_of_theory_or_better(algorithm, motion, method):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("motion", "terms"), [("constant", 2), ("general", 1)])
-def test_json_is_what_was_agreed(motion, terms):
+def test_json_keeps_its_keys(motion, terms):
     data = json.loads(json.dumps(analyse(choose("euler", "rk4", 2), motion, terms).as_dict()))
     assert data["order"] == 4
     letters = W if motion == "constant" else [sp.Symbol(f"w{j}_{axis}") for j in range(9) for axis in "xyz"]
@@ -141,7 +141,7 @@ def test_reports_say_every_part(motion):
         (("euler-normalize",), ("general", 2), "no attitude step"),
     ],
 )
-def test_what_has_no_series(chosen, arguments, says):
+def test_kernels_without_series_are_refused(chosen, arguments, says):
     with pytest.raises(InputError, match=says):
         series(choose(*chosen), *arguments)
 
@@ -179,7 +179,7 @@ def test_to_second_order():
 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", SERIES)
-def test_what_each_scheme_leaves_to_second_order(scheme):
+def test_second_order_error_after_each_scheme(scheme):
     """Drift changes by half of KY + YK, whatever the scheme; they differ in what is left of scale and skew.
 
     Of the symmetric error the second order leaves nothing beside the K^2/2 of a rotation; the first one the root of
@@ -230,7 +230,7 @@ def test_any_true_matrix(scheme):
         assert float(mpmath.log(left[0] / left[1], 2)) == pytest.approx(3, abs=0.05)
 
 
-def test_what_has_no_effect():
+def test_orthonormalization_without_effect_changes_no_series():
     with pytest.raises(InputError, match="has no series in the error"):
         effect("dcm-orthonormalize-optimal")
     with pytest.raises(InputError, match="scheme 'dcm' is not known"):

@@ -449,7 +449,7 @@ def test_integrals(function, edges, value):
     assert np.all(np.abs(found.values - [value, 3 * value]) <= found.errors + 1e-13 * abs(value))
 
 
-def test_what_cannot_be_integrated_is_refused():
+def test_divergent_integrals_are_refused():
     with pytest.raises(InputError, match=r"not finite at 0\.5 Hz"):
         integrate(lambda x: np.where(np.abs(x - 0.5) < 1e-3, np.nan, 1.0)[None], [0, 1], 1.0)
     with pytest.raises(InputError, match="panels to integrate"):

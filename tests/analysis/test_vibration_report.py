@@ -80,7 +80,7 @@ def test_data_has_both_quantities_of_an_algorithm_in_one_object():
     assert not any(name.endswith("closed_form") for name in random)
 
 
-def test_what_a_person_reads_is_in_range():
+def test_report_for_readers_is_in_range():
     outcome = CaseRates(case("dcm", "rk1", 1), Rates(1e306, 2e306, 1e306))
     with pytest.raises(InputError, match=r"^dcm-rk1-1: the error in deg/h is beyond the range of double"):
         vibration_text([outcome], "a title")

@@ -47,7 +47,7 @@ def test_waves_are_complex_numbers(left, right, factor):
 
 @pytest.mark.long
 @given(waves)
-def test_what_is_a_difference_is_summed_without_poles(wave):
+def test_sums_of_differences_have_no_poles(wave):
     difference = wave.shifted(CYCLE) + wave.scaled(-1)
     assert difference.summed() == wave
     assert difference.summed().poles == 0
@@ -171,7 +171,7 @@ def test_roots_and_branches(expression, wanted):
     ],
     ids=str,
 )
-def test_what_has_no_expansion_is_refused(expression, said):
+def test_functions_without_expansion_are_refused(expression, said):
     with pytest.raises(InputError, match="kernel made has no expansion to second order") as caught:
         expanded(expression)
     assert said in str(caught.value)

@@ -245,7 +245,7 @@ def test_the_default_is_fourth_order_on_two_increments():
         (("error-matrix", None, 2), ["error-matrix", "increments", "2", *ALGORITHMS]),
     ],
 )
-def test_a_wrong_choice_is_told_with_what_is_allowed(arguments, named):
+def test_wrong_choice_names_allowed_values(arguments, named):
     with pytest.raises(InputError) as caught:
         choose(*arguments)
     message = str(caught.value)
@@ -278,7 +278,7 @@ def test_the_standard_catalogue_holds_everything_once():
 
 @pytest.mark.long
 @EVERY
-def test_a_kernel_is_what_was_chosen(choice):
+def test_derived_kernel_matches_the_choice(choice):
     kernel = derived(choice)
     assert kernel.name == choice.kernel
     assert kernel.identifier.isidentifier()
@@ -364,7 +364,7 @@ def test_rows_follow_each_other_and_names_are_sorted():
         ([("cycle", 1)], InputTypeError, "a mapping from names of inputs is needed"),
     ],
 )
-def test_what_is_no_number_is_refused(constants, error, words):
+def test_non_numbers_are_refused(constants, error, words):
     with pytest.raises(error) as caught:
         read_constants(constants)
     assert words in str(caught.value) and "\n" not in str(caught.value)

@@ -154,7 +154,7 @@ def test_any_text_is_a_number_or_an_error_of_one_line(written):
         ("sqrt(sqrt(sqrt(sqrt(2))))", "at most three different square roots"),
     ],
 )
-def test_what_is_refused(written, said):
+def test_invalid_input_is_refused(written, said):
     with pytest.raises(InputError) as caught:
         number("weights, entry 2", written)
     message = str(caught.value)
@@ -202,7 +202,7 @@ def test_a_file_keeps_the_digits_of_its_numbers(tmp_path):
         (None, "cannot be read ("),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said_in_one_line(data, message, tmp_path):
+def test_errors_in_a_file_are_reported_in_one_line(data, message, tmp_path):
     place = tmp_path / "file.toml"
     if data is not None:
         place.write_bytes(data)

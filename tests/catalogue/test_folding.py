@@ -92,7 +92,7 @@ def drawn(choice, rng, unit=1024):
         ("temperature-coefficient", {"slope_above": 0, "slope_below": 0, "nominal": 2}),
     ],
 )
-def test_the_program_computes_exactly_what_the_whole_kernel_does(name, constants, rng):
+def test_folded_program_equals_the_whole_kernel(name, constants, rng):
     choice = choose(name, constants=constants)
     folded = program(choice)
     assert {signal.name for signal in folded.inputs}.isdisjoint(constants)
@@ -172,7 +172,7 @@ def test_fixed_point_needs_no_range_of_a_constant():
         ),
     ],
 )
-def test_what_cannot_be_a_constant_is_refused_in_one_line(name, constants, words):
+def test_invalid_constants_are_refused_in_one_line(name, constants, words):
     with pytest.raises(InputError) as caught:
         strapgen.derive(name, constants=constants)
     assert str(caught.value).startswith(words) and "\n" not in str(caught.value)

@@ -284,7 +284,7 @@ def test_fixed_point_takes_formats_that_hold_the_errors(in_folder):
         ),
     ],
 )
-def test_what_cannot_be_used_is_refused_in_one_line(command, words, in_folder):
+def test_invalid_input_is_refused_in_one_line(command, words, in_folder):
     status, text, said = in_folder(command)
     assert (status, text) == (2, "")
     assert words in said and said.count("\n") == 1

@@ -280,7 +280,7 @@ def test_vibration_with_an_acceleration(strapgen_says):
         assert again["computed_m_s2"] == pytest.approx(data["computed_m_s2"], rel=1e-14)
 
 
-def test_vibration_of_a_fast_loop_says_what_its_rates_are(strapgen_says):
+def test_vibration_of_a_fast_loop_explains_its_rates(strapgen_says):
     given = (
         "--increments 10 --frequency-hz 7 --step 0.1 --theta-x-rad 0.01 --phase-rad 0.9 --theta-y-rad 0.013"
     )
@@ -392,7 +392,7 @@ def test_fixed_point_of_a_vector_of_a_step(strapgen_says, tmp_path):
         ("operations", lambda kernel: formulas.operations_as_text(kernel, pipeline.lower(kernel))),
     ],
 )
-def test_derive_prints_what_python_returns(show, text, strapgen_says):
+def test_derive_prints_the_python_result(show, text, strapgen_says):
     kernel = pipeline.derive("dcm", "rk2", 2)
     assert strapgen_says(f"derive dcm --method rk2 --show {show}") == f"{text(kernel)}\n"
 
@@ -665,7 +665,7 @@ def test_unit_of_rates_matters(strapgen_says, tmp_path):
 
 
 @pytest.mark.long
-def test_increments_left_over_are_told(capsys):
+def test_unused_increments_are_reported(capsys):
     line = f"simulate euler --increments 3 --increments-csv {DATA}/increments.csv --format"
     said = {}
     for form in ("json", "text", "csv"):
@@ -814,7 +814,7 @@ def test_an_interrupt_stops_a_study_at_once(tmp_path):
 
 
 @pytest.mark.long
-def test_tables_in_fixed_point_mark_what_round_off_dominates(strapgen_says):
+def test_fixed_point_tables_mark_figures_dominated_by_round_off(strapgen_says):
     said = strapgen_says("tables --backend c-fixed32")
     assert "r round-off dominates" in said
     rows = re.findall(r"^    c-fixed32 .*$", said, flags=re.MULTILINE)
@@ -937,7 +937,7 @@ def test_interruption(capsys, monkeypatch):
     assert "Traceback" not in said.err
 
 
-def test_converge_prints_what_python_finds(strapgen_says):
+def test_converge_prints_the_python_result(strapgen_says):
     said = strapgen_says(
         "converge dcm --method rk1,rk2 --increments 1 --steps 1/8,1/16,1/32 --duration 1 --format json"
     )
@@ -965,7 +965,7 @@ def test_converge_is_a_gate(limit, status, capsys):
 
 
 @pytest.mark.long
-def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
+def test_failing_check_names_the_failures(capsys, tmp_path):
     text = (DATA / "algorithms" / "picard.py").read_text()
     claimed = text.replace(
         '        transition="transition",', '        transition="transition", order=Order(7, 7, 2, 7),'
@@ -984,7 +984,7 @@ def test_check_fails_with_the_names_of_what_fails(capsys, tmp_path):
 
 
 @pytest.mark.long
-def test_series_prints_what_was_agreed(strapgen_says):
+def test_series_prints_the_fixed_text(strapgen_says):
     said = strapgen_says("series euler --method rk4 --increments 2 --motion constant --terms 2 --format json")
     data = json.loads(said)
     assert data["order"] == 4

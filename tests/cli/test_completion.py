@@ -106,7 +106,7 @@ def test_a_shell_that_says_too_little_gets_no_error(shell, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(("line", "files"), [("strapgen generate euler --out ", 1), ("strapgen derive ", 0)])
-def test_fish_is_told_where_files_may_stand(line, files, monkeypatch, capsys):
+def test_fish_completes_files_where_allowed(line, files, monkeypatch, capsys):
     monkeypatch.setenv("_STRAPGEN_COMPLETE", "complete_fish")
     monkeypatch.setenv("_TYPER_COMPLETE_FISH_ACTION", "is-args")
     monkeypatch.setenv("_TYPER_COMPLETE_ARGS", line)

@@ -184,7 +184,7 @@ def test_rotations_that_do_not_fit_are_refused(history):
     assert len(strapgen.to_rotation(history, backend)) == len(history.time)
 
 
-def test_ipython_takes_what_objects_show(run):
+def test_ipython_uses_the_display_of_objects(run):
     formatters = pytest.importorskip("IPython.core.formatters")
     pytest.importorskip("matplotlib")
     shown, _ = formatters.DisplayFormatter().format(ALGORITHM.derive())

@@ -122,7 +122,7 @@ def test_the_title_of_a_run_has_the_parameters_of_its_motion(answer):
     assert "motion constant (y_deg_s=10), step_s 0.5" in answer(f"simulate euler {RUN}").splitlines()[0]
 
 
-def test_aliases_and_lists_give_what_the_singular_options_give(answer):
+def test_aliases_and_lists_equal_singular_options(answer):
     run = f"--method rk1 --format csv {RUN}"
     one, other = (
         [
@@ -199,7 +199,7 @@ def test_a_plot_that_cannot_be_written_is_refused_before_the_run(tmp_path, monke
         assert not list(tmp_path.iterdir())
 
 
-def test_a_command_says_what_it_wrote_and_prints_its_result_alone(tmp_path, monkeypatch, capsys):
+def test_command_names_written_files_and_prints_only_its_result(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
         main(shlex.split(f"simulate euler {SHORT} --format csv --out out/attitude.csv"))
@@ -319,7 +319,7 @@ def test_latex_has_another_table_for_rows_that_a_page_does_not_hold():
     assert all(f"x & {n} " in text for n in range(100))
 
 
-def test_html_says_what_the_cells_say():
+def test_html_has_the_text_of_the_cells():
     text = TextTable(COLUMNS, [("<b>", 0.5, 1e-12, "")]).as_html("a caption & more")
     assert "&lt;b&gt;" in text and "<b>" not in text and "a caption &amp; more" in text
     assert '<td style="text-align:right">1.000e-12</td>' in text

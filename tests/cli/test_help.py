@@ -205,7 +205,7 @@ def wait_for(stream: io.StringIO, text: str) -> None:
     raise AssertionError(f"{text!r} was never written")
 
 
-def test_what_takes_time_is_shown_and_wiped_away(impatient, monkeypatch):
+def test_progress_is_shown_and_erased(impatient, monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream := Terminal())
     with progress.waiting("deriving own.py"):
         wait_for(stream, "deriving own.py 0 s")
@@ -213,7 +213,7 @@ def test_what_takes_time_is_shown_and_wiped_away(impatient, monkeypatch):
 
 
 @pytest.mark.parametrize("stream", [Terminal(), io.StringIO()])
-def test_it_is_quiet_when_fast_or_when_nobody_watches(stream, monkeypatch):
+def test_progress_is_silent_when_fast_or_without_terminal(stream, monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream)
     # However busy the machine is, an hour is not over.
     monkeypatch.setattr(progress, "_PATIENCE", 3600.0 if stream.isatty() else 0.0)

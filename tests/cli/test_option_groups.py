@@ -116,7 +116,7 @@ def test_number_is_exact_and_keeps_its_text():
             kind.read("--x", text)
 
 
-def test_rules_refuse_what_does_not_go_together():
+def test_rules_refuse_conflicting_options():
     @grouped
     @rules(
         OneOf("--speed --pace", needed="--speed is needed, or --pace"),
@@ -169,7 +169,7 @@ def test_rules_name_options_of_their_commands():
     assert checked > 100
 
 
-def test_a_mistake_in_a_command_is_told_when_it_is_declared():
+def test_mistakes_in_a_command_are_found_at_declaration():
     with pytest.raises(TypeError, match="two options of a command are named speed"):
 
         @grouped
@@ -190,7 +190,7 @@ def commands(group, path=()):
             yield " ".join((*path, name)), command
 
 
-def test_every_option_of_every_command_says_what_it_is():
+def test_every_option_of_every_command_has_help():
     checked = 0
     for name, command in commands(get_command(app)):
         for parameter in command.params:

@@ -85,7 +85,7 @@ def test_names_of_built_in_systems_are_listed(capsys):
     assert status == 0 and "two-speed-euler" in json.loads(out)["systems"]
 
 
-def test_what_does_not_go_with_a_system_is_refused_in_one_line(file, log, tmp_path, capsys):
+def test_options_not_for_systems_are_refused_in_one_line(file, log, tmp_path, capsys):
     gyro = tmp_path / "gyro.toml"
     gyro.write_text(
         COUNTING.partition('[[stage]]\nname = "attitude"')[0].replace("attitude.state", "gyro.increment")

@@ -39,7 +39,7 @@ def rounding(monkeypatch):
                 raise InputError("no bound")
             return Rounding(bounds[carry], carry)
 
-        monkeypatch.setattr(causes, "_certified", certified)
+        monkeypatch.setattr(causes, "_certified_drift", certified)
         monkeypatch.setattr(causes, "_least_without_feedback", lambda *_: 1.0)
         return causes.rounding(choose("euler"), BRIEF, allowed).carry, tried
 

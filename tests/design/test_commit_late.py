@@ -103,7 +103,7 @@ def test_now_is_an_answer_and_changes_nothing():
 
 
 @pytest.mark.long
-def test_now_is_what_is_committed_l_samples_later_but_for_its_filters():
+def test_present_attitude_is_committed_l_samples_later():
     unit, now, committed = CommitLate("window-5-5"), [], []
     for sample in samples(60, "cone"):
         unit.push(sample)
@@ -357,7 +357,7 @@ def test_c_in_float_is_that_in_double_but_for_rounding():
     assert single.attitude.dtype == np.float32
 
 
-def test_c_refuses_what_its_header_says_and_writes_nothing():
+def test_c_refuses_inputs_as_its_header_states_and_writes_nothing():
     built = sources(WINDOW)
     module = compiler.load(built)
     ffi, lib = module.ffi, module.lib
@@ -464,7 +464,7 @@ def test_samples_and_states_outside_their_ranges_are_refused(backend):
     assert not np.array_equal(unit.now(), before)
 
 
-def test_c_on_integers_refuses_what_its_header_says():
+def test_integer_c_refuses_inputs_as_its_header_states():
     module = compiler.load(sources(WINDOW, "euler", "c-fixed"))
     ffi, lib = module.ffi, module.lib
     memory, sample = ffi.new("euler_late_3_3_w32_memory *"), ffi.new("int32_t[3]")

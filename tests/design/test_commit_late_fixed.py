@@ -320,7 +320,9 @@ def test_every_interval_that_waits_is_counted(rotation, monkeypatch):
     """With 1 for filters on all samples, 1000 for those of the start and the step's own error."""
     filters = LateFilters(WINDOWS["window-3-3"], calm_start=True)
     late = parts("window-3-3")
-    monkeypatch.setattr(commit_late_fixed, "_moved", lambda exact, integers, *_: {"groups": len(exact)})
+    monkeypatch.setattr(
+        commit_late_fixed, "_rounding_of_filters", lambda exact, integers, *_: {"groups": len(exact)}
+    )
     monkeypatch.setattr(
         commit_late_fixed, "_rounding", lambda _p, _i, moved: Fraction({7: 1, 10: 1000}[moved["groups"]])
     )
@@ -337,12 +339,14 @@ def test_rounding_of_taps_and_of_a_sum_move_a_coefficient():
     interface = toy()[1]
     fixed = FixedFilters(100, 4, range(1), (), (), (4,), ((), ()), 0)
     # An integer tap is one of 2^(4 - 4 - 2) = 1/4.
-    moved = commit_late_fixed._moved([((Fraction(3, 8), Fraction(-5, 8)),)], [((1, -3),)], fixed, interface)
+    moved = commit_late_fixed._rounding_of_filters(
+        [((Fraction(3, 8), Fraction(-5, 8)),)], [((1, -3),)], fixed, interface
+    )
     off = (Fraction(1, 8) + Fraction(1, 8)) * Fraction(100, 16)
     assert moved == dict.fromkeys(("c_x", "c_y", "c_z"), off + Fraction(1, 8))
     # The worst group counts.
     groups = [((Fraction(1, 4), Fraction(-3, 4)),), ((Fraction(3, 8), Fraction(-5, 8)),)]
-    assert commit_late_fixed._moved(groups, [((1, -3),)] * 2, fixed, interface) == moved
+    assert commit_late_fixed._rounding_of_filters(groups, [((1, -3),)] * 2, fixed, interface) == moved
 
 
 def toy():
@@ -381,7 +385,7 @@ def test_length_of_a_row_is_rounded_up():
     assert 5 <= commit_late_fixed._row_length(rows) < Fraction(5) + Fraction(1, 2**60)
 
 
-def test_transition_stretches_by_what_its_series_leaves_out():
+def test_transition_stretches_by_the_truncation_of_its_series():
     """At 1/4 rad the rotation vector is at least sqrt(3)/4 long, and a series to second order leaves out its third."""
     late = parts("window-3-3")
     program = commit_late_sources.pipeline.program(commit_late_sources.kernels(late.filters, "euler")[1])

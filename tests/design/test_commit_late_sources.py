@@ -117,7 +117,7 @@ def test_a_family_for_a_gyro_filters_all_coefficients_and_says_its_rate():
         (("rk4",), "window is 'rk4'"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(arguments, reason):
+def test_incompatible_arguments_are_refused_in_one_line(arguments, reason):
     with pytest.raises(InputError, match=reason) as refusal:
         sources(*arguments)
     assert "\n" not in str(refusal.value)

@@ -11,7 +11,7 @@ from strapgen.design.selection import causes
 from strapgen.design.selection.candidates import contenders
 from strapgen.design.selection.judgement import after_run, in_order, judgements, verdicts
 from strapgen.design.selection.selection_report import SelectionResult
-from strapgen.design.selection.simulated import algorithm_named, confirmed, software_drifts, start_phases
+from strapgen.design.selection.simulated import algorithm_named, confirm, software_drifts, start_phases
 
 #: Three lines of at most 0.17 deg, of which each is twice the one below: what is of third order has a mean.
 OCTAVES = """
@@ -60,7 +60,7 @@ def judged(tmp_path, text, methods=METHODS):
         (STRONG, 5.7e-7, 0.041, ("4", "2", "3")),
     ],
 )
-def test_what_is_of_higher_order_is_predicted(text, first, ran, parts, tmp_path):
+def test_higher_order_drift_is_predicted(text, first, ran, parts, tmp_path):
     path, brief, ordered = judged(tmp_path, text)
     by_name = {one.name: one for one in ordered}
     one = by_name["euler coning-compressed:8"]
@@ -73,7 +73,7 @@ def test_what_is_of_higher_order_is_predicted(text, first, ran, parts, tmp_path)
     at_its_phases = algorithm.rectification().at(start_phases(len(brief.environment.lines())))
     assert math.hypot(*at_its_phases) * causes.DEG_H == pytest.approx(run, rel=0.01)
     assert one.drift_deg_h["coning"] > 0.99 * run
-    answer = confirmed(brief, path, ordered)
+    answer = confirm(brief, path, ordered)
     # The cheapest that meets it is the answer; its run confirms it, and no other one was run.
     assert answer[0].name == "euler coning-combined:3+3" and answer[0].meets
     assert answer[0].run_deg_h["coning"] == pytest.approx(answer[0].drift_deg_h["coning"], rel=0.01)
@@ -90,7 +90,7 @@ def test_the_cheapest_that_holds_in_its_run_is_the_answer(tmp_path):
     path, brief, ordered = judged(tmp_path, OCTAVES.format(second=10.80001, third=21.6))
     assert ordered[0].name == "euler coning-compressed:8" and ordered[0].meets
     assert ordered[0].coning_parts_deg_h["3"] == 0
-    answer = confirmed(brief, path, ordered)
+    answer = confirm(brief, path, ordered)
     assert answer[0].name == "euler coning-combined:3+3" and answer[0].meets
     refused = {one.name: one for one in answer if not one.meets}
     assert refused.keys() == {f"{state} coning-compressed:{n}" for state in ("euler", "dcm") for n in (5, 8)}

@@ -81,7 +81,7 @@ def shaped() -> ShapedConing:
 
 
 @pytest.mark.long
-def test_the_built_in_file_is_what_its_command_writes(shaped):
+def test_built_in_file_is_the_output_of_its_command(shaped):
     built_in = SHAPES["coning-shaped-8"]
     assert replace(built_in, name=shaped.name) == shaped
     path = shaped_coning._BUILT_IN.files["coning-shaped-8"]

@@ -42,7 +42,7 @@ BRIEFS = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("brief", BRIEFS.values(), ids=BRIEFS)
-def test_what_is_written_is_read_again(brief, tmp_path):
+def test_written_files_are_read_back(brief, tmp_path):
     window = design(brief)
     (tmp_path / "w.toml").write_text(family.written(window, "a command"))
     again = windows.read(tmp_path / "w.toml")
@@ -113,7 +113,7 @@ def test_several_samples_take_the_exact_rotation():
 
 
 @pytest.mark.long
-def test_a_step_of_two_samples_integrates_what_is_in_its_band():
+def test_step_of_two_samples_integrates_its_band():
     # 1+7+7 has 6.5e-6 deg/h there, and a polynomial through 3+3 samples 0.4.
     brief = FamilyBrief(7, 7, Fraction(13, 10), increments=2, rotation="exact", terms=12)
     window = replace(design(brief), file="designed here")
@@ -138,7 +138,7 @@ def test_a_symmetric_window_of_two_samples_is_its_filters():
     np.testing.assert_allclose(*ends, rtol=0, atol=1e-15)
 
 
-def test_titles_say_what_the_filters_are_for():
+def test_titles_name_the_purpose_of_filters():
     assert replace(SMALL, gyro=GYRO, noise=Fraction(1, 100), spectrum=()).full_title == (
         "Window 1+2+2 to 1 rad, gyro 40 Hz, noise 0.01, for a spectrum"
     )

@@ -134,7 +134,7 @@ def test_results_come_in_the_order_of_the_candidates(study):
     assert all(list(drift_and_cost.drifts) == list(MOTIONS) for drift_and_cost in drifts_and_costs)
 
 
-def test_a_study_goes_on_where_it_was(study, monkeypatch):
+def test_interrupted_study_resumes(study, monkeypatch):
     several, path, drifts_and_costs = study
 
     def never(trial):
@@ -189,7 +189,7 @@ def test_all_stands_for_every_method_with_its_samples():
     assert every[: len(CANDIDATES)] == list(CANDIDATES) and len({one.name for one in every}) == len(every)
 
 
-def test_the_frontier_is_what_nothing_undercuts():
+def test_frontier_has_the_points_that_none_undercuts():
     points = {
         "a": (1.0, 5.0),
         "b": (2.0, 6.0),

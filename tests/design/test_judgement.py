@@ -48,7 +48,7 @@ def assert_as_simulated(name, drift, simulated, intervals):
             assert drift[cause] == pytest.approx(random["mean"], rel=0, abs=most), (name, cause)
 
 
-def test_what_meets_a_brief_does_so_in_time_as_well():
+def test_accepted_algorithms_meet_the_brief_in_simulation():
     path = BRIEFS / "ahrs.toml"
     brief, ordered = answer(path, ["rk3:2", "coning-compressed:3", "rk1"])
     accepted = [one for one in ordered if one.meets]

@@ -55,7 +55,7 @@ def test_lost_samples_are_restored_as_one_by_one(kinds):
     np.testing.assert_allclose(result, one_by_one(row, kinds, "dcm"), rtol=0, atol=ROUNDING)
 
 
-def test_it_begins_where_it_is_told():
+def test_run_begins_at_the_initial_state():
     start = np.array([0.5, 0.5, -0.5, 0.5])
     result = recording_attitudes("window-3-3", samples(20), initial=start)
     turned = strapgen.evaluator("euler-product")(start, recording_attitudes("window-3-3", samples(20)))
@@ -92,7 +92,7 @@ def test_gaps_that_no_filter_restores_are_refused(kinds, reason):
         ({"increments": np.zeros(3)}, "increments has shape"),
     ],
 )
-def test_what_does_not_fit_is_refused(options, reason):
+def test_incompatible_arguments_are_refused(options, reason):
     arguments = {"window": "window-3-3", "increments": samples(10)} | options
     with pytest.raises((InputError, InputTypeError), match=reason):
         recording_attitudes(**arguments)

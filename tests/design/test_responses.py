@@ -65,7 +65,7 @@ def test_errors_and_levels_are_those_of_the_definitions(window, gyro):
 
 
 @pytest.mark.parametrize("increments", [1, 2, 5, 20])
-def test_what_is_to_be_reached_is_the_spherical_bessel_function(increments):
+def test_ideal_response_is_the_spherical_bessel_function(increments):
     b = [1e-6, 0.01, 1.0, 2.0, 3.0]
     grid = BandGrid([REAL.mpf(each) for each in b], 1, increments=increments)
     for m in range(9):

@@ -92,7 +92,7 @@ def test_options_reach_the_file(run):
 
 
 @pytest.mark.long
-def test_a_window_that_amplifies_is_told(run):
+def test_amplifying_window_is_reported(run):
     command = "window design --previous 6 --ahead 0 --band 1.9 --powers 2 --coefficients 1 --noise 1e-9"
     gyro = "--gyro-bandwidth-hz 40 --gyro-damping 0.7071 --sample-hz 100 --now-noise 1e-9"
     status, _, warned = run(f"{command} {gyro} --out w.toml")
@@ -253,7 +253,7 @@ def test_a_file_is_shown_and_plotted(run, tmp_path):
         ("window show window-7-7 --format html", "format 'html' is not known"),
     ],
 )
-def test_what_cannot_be_shown_is_refused_in_one_line(words, message, run, tmp_path):
+def test_invalid_windows_are_refused_in_one_line(words, message, run, tmp_path):
     text = (FOLDER / "window-3-3.toml").read_text()
     (tmp_path / "wrong.toml").write_text(text.replace(str(WINDOWS["window-3-3"].filters[1][0]), "1/7"))
     status, said, warned = run(words)

@@ -112,7 +112,7 @@ def test_a_tool_that_is_missing_is_named_and_fails_where_all_must_be_there(capsy
         ("euler --tool gapa", "did you mean gappa"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(command, line, capsys):
+def test_invalid_options_are_refused_in_one_line(command, line, capsys):
     assert status(command) == 2
     said = capsys.readouterr()
     assert (said.out, said.err.count("\n")) == ("", 1)

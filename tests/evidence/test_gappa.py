@@ -182,7 +182,7 @@ def test_a_wrong_literal_is_noticed(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["euler-normalize", "euler-from-dcm", "dcm-from-euler-angles"])
-def test_conditions_comparisons_and_functions_are_told(name):
+def test_conditions_comparisons_and_functions_are_reported(name):
     with pytest.raises(CannotFollowError, match=r"condition|comparison|cos"):
         script_of(program(choose(name)), "double")
 
@@ -226,7 +226,7 @@ def test_coq_refuses_a_smaller_bound(product_script, tmp_path):
     assert gappa.checked(product_script, tmp_path / "product.v") == ("fails", "Gappa finds no proof")
 
 
-def test_axioms_beyond_those_of_real_numbers_are_told():
+def test_axioms_beyond_real_numbers_are_reported():
     text, count = gappa.without_hypotheses("Hypothesis a1 : r1 = r2.\nVariable x : R.\n")
     assert (count, "Hypothesis" in text) == (1, False)
     real = "ClassicalDedekindReals.sig_not_dec : forall P : Prop, {~ ~ P} + {~ P}"

@@ -218,7 +218,7 @@ CHECKED = (
         ),
     ],
 )
-def test_what_can_overflow_is_open(body):
+def test_possible_overflow_stays_unproved(body):
     """Each of these fails for some input."""
     assert opened(body)
 
@@ -240,7 +240,7 @@ def test_what_can_overflow_is_open(body):
         ),
     ],
 )
-def test_what_cannot_overflow_is_proved(body):
+def test_safe_code_is_proved(body):
     """Each of these holds for every input."""
     assert not opened(body)
 
@@ -252,7 +252,7 @@ def test_a_relation_between_values_is_used():
     assert opened(body.replace("y * 2", "y * 3"))
 
 
-def test_what_holds_in_a_branch_is_not_used_outside():
+def test_facts_of_a_branch_are_not_used_outside():
     """In the branch x is positive; behind it, it need not be."""
     body = f"{CHECKED} int32_t m = 0; if (x > 0) {{ m = f_fit(x, 1); }} b[0] = f_rt(%s);"
     assert not opened(body % "m")

@@ -102,7 +102,7 @@ def test_a_header_without_a_number_is_not_examined(tmp_path):
 PLANE = flint.fmpq_mpoly_ctx.get(["x", "y", "z"], flint.Ordering.lex)
 
 
-def test_what_turns_with_rotations_of_all_vectors_is_told():
+def test_covariance_under_rotations_is_detected():
     d = flint.fmpq_mpoly_ctx.get([f"d{k}" for k in range(6)], flint.Ordering.lex).gens()
     dot = sum(d[k] * d[k + 3] for k in range(3))
     assert state_lengths.is_covariant([[dot**2 + 3 * dot]])
@@ -150,7 +150,7 @@ def test_numbers_above_eigenvalues_are_above_them():
         assert state_lengths._exceeds(eigenvalue + tiny, one) and not state_lengths._exceeds(eigenvalue, one)
 
 
-def test_what_is_curved_in_a_box_counts():
+def test_curvature_in_a_box_counts():
     """About the middle of the box, x^2 is 1/4 + (2 u + u^2)/4 for u from -1 to 1: the last term is a quarter."""
     x = PLANE.gens()[0]
     zero, box = PLANE.constant(0), ((Fraction(0), Fraction(1)),) * 3

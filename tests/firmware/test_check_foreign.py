@@ -334,7 +334,7 @@ void step(double q[4], const double d[3])
     assert "rotation one sample late" in checked.cause and "delay" in failed(checked)
 
 
-def test_what_does_not_go_together_is_refused(tmp_path):
+def test_conflicting_options_are_refused(tmp_path):
     (tmp_path / "a.c").write_text("")
     source = ForeignSource(tmp_path / "a.c", "f", read_arguments("state[4], rates[3] -> next[4]"))
     with pytest.raises(

@@ -224,7 +224,7 @@ def test_coefficients_of_three_kept_samples_are_wanted_where_they_are_seen():
             assert causes.standard_design(right).previous == 3
 
 
-def test_the_ratio_is_what_coning_needs():
+def test_ratio_is_that_of_the_coning_condition():
     for chosen in DESIGNS:
         assert causes.ratio(tables(*chosen)) == pytest.approx(1, abs=1e-12)
         assert causes.ratio(tables(*chosen, 0.96)) == pytest.approx(0.96, abs=1e-12)
@@ -232,7 +232,7 @@ def test_the_ratio_is_what_coning_needs():
         assert not causes.corrects_coning(tables(*chosen, 0.994))
 
 
-def test_a_correction_about_one_axis_that_is_wrong_is_told_in_numbers():
+def test_wrong_correction_about_one_axis_is_quantified():
     right, wrong = (tables(1, 1, "compressed", factor).finally_ for factor in (1, -1))
     mean = {pair: c / 3 for pair, c in right.items()}
     products = Products(1, mean, mean, by_axis=(right, wrong, right))
@@ -291,7 +291,7 @@ def test_earlier_samples_in_reverse_order_are_known(samples, used, kept, form):
     assert causes.cause(seen) == (None if at_once == right.at_once else causes.EARLIER_REVERSED)
 
 
-def test_another_size_is_told_in_numbers():
+def test_wrong_size_is_quantified():
     table = {(0, 1): 0.6} | {pair: 0.0 for pair in pairs(2) if pair != (0, 1)}
     assert causes.cause(Products(2, table, table)) == "correction 0.9 times as large as needed"
 

@@ -59,7 +59,7 @@ def test_a_function_gets_every_argument_and_a_run_begins_where_it_says(file):
     assert compile_foreign(ForeignSource(file, "look", arguments, "begin")) == module  # from the cache
 
 
-def test_what_a_function_does_wrong_is_told(file, monkeypatch):
+def test_faults_of_a_function_are_named(file, monkeypatch):
     module = compile_foreign(
         ForeignSource(file, "beyond", read_arguments("state[4], increments[3] -> state[4]"))
     )
@@ -150,7 +150,7 @@ def test_a_function_that_is_defined_nowhere_is_named(tmp_path):
 
 
 @pytest.mark.long
-def test_the_function_of_init_gets_what_it_takes(tmp_path):
+def test_init_function_gets_its_arguments(tmp_path):
     (tmp_path / "a.c").write_text(
         "typedef struct { double q[4]; } memory_t;\n"
         "void of_state(double q[4]) { q[1] = 5; }\n"
@@ -253,7 +253,7 @@ def test_arguments_are_read_in_the_order_of_c(text, names, count, elements):
         ("increments[3] -> next[4], dt", "cannot be read"),
     ],
 )
-def test_what_cannot_be_called_gets_one_line(text, says):
+def test_uncallable_functions_get_one_line(text, says):
     with pytest.raises(InputError, match=says) as caught:
         read_arguments(text)
     assert "\n" not in str(caught.value) and "--arguments" in str(caught.value)
@@ -312,7 +312,7 @@ def test_a_fault_exits_with_1_and_names_its_cause(check):
     assert said == f"strapgen: {PLACE}/wrong_sign.c fails: {fails}\n"
 
 
-def test_json_has_what_was_agreed(check, tmp_path):
+def test_json_keeps_its_keys(check, tmp_path):
     out = tmp_path / "check.json"
     status, printed, said = check(f"{PLACE}/state_kept.c {COMMAND} --format json --out {out}")
     assert (status, printed) == (1, "")
@@ -403,7 +403,7 @@ def test_the_page_of_the_examples_names_every_fault_as_the_command_does(check):
         ),
     ],
 )
-def test_what_it_cannot_use_gets_one_line_and_status_2(check, words, says):
+def test_unusable_input_gets_one_line_and_status_2(check, words, says):
     status, printed, said = check(words)
     assert (status, printed) == (2, "")
     assert said.startswith("strapgen: ") and said.count("\n") == 1

@@ -272,7 +272,7 @@ def test_an_update_of_a_matrix_in_place_is_named(outcome, orthogonal):
         long(quaternion(in_place("0", -1))),
     ],
 )
-def test_an_update_that_keeps_what_it_still_needs_holds(outcome, text):
+def test_update_that_saves_needed_elements_passes(outcome, text):
     checked = outcome(text, TAKES_4, FIRST_SCALAR, init="begin")
     assert (checked.cause, failed(checked)) == (None, [])
 
@@ -413,7 +413,7 @@ void step(NUMBER q[4], const NUMBER d[2][3])
 
 
 @pytest.mark.long
-def test_a_frame_is_told_from_a_rate_that_is_added_to_the_gyros(outcome):
+def test_rotating_frame_is_distinguished_from_added_rate(outcome):
     turning = "FOR(i, 3) FOR(j, 3) n[i][j] = m[i][j]; FOR(i, 3) { const double c = cos(1e-6), s2 = sin(1e-6);"
     turning += "m[i][0] = c * n[i][0] + s2 * n[i][1]; m[i][1] = c * n[i][1] - s2 * n[i][0]; }"
     checked = outcome(matrix(update=COLUMNS + turning), TAKES_9, TO_BODY, init="begin")
@@ -472,7 +472,7 @@ def test_rates_at_instants_are_told_from_means(outcome, samples):
 
 
 @pytest.mark.long
-def test_what_is_late_otherwise_is_no_rate_at_an_instant(outcome):
+def test_other_delays_are_no_rate_at_an_instant(outcome):
     late = instants(outcome, "dt * e[i] + dt * dt * c[i] / 12", "rates")
     assert late.cause == "rotation one sample late"
     assert "delay" in failed(late) and late.coefficients == ()

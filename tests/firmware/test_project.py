@@ -79,7 +79,7 @@ def test_the_main_program_runs_and_is_near_the_truth(kernel, target, settings, l
 
 @pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "target", "settings", "largest"), LOOPS)
-def test_all_loops_run_and_return_what_their_vectors_say(algorithm, target, settings, largest, tmp_path):
+def test_all_loops_return_the_values_of_their_vectors(algorithm, target, settings, largest, tmp_path):
     files = loop_files(algorithm, target, settings)
     folder = written(tmp_path, files)
     run_of(folder, files, largest)
@@ -139,7 +139,7 @@ def test_the_vectors_of_a_project_are_those_of_their_command():
     assert table_files(table).items() <= files_of(*PROJECTS[0][:3]).items()
 
 
-def test_what_a_user_has_changed_is_not_written_over(tmp_path):
+def test_user_changes_are_not_overwritten(tmp_path):
     files = files_of(*PROJECTS[0][:3])
     written(tmp_path, files)
     project.refuse_changed(tmp_path, files)  # the same files once more

@@ -58,7 +58,7 @@ def files_of(table: VectorTable) -> dict[str, str]:
 
 @pytest.mark.long
 @pytest.mark.parametrize(("kernel", "target", "settings"), TABLES)
-def test_the_c_returns_what_the_vectors_say(kernel, target, settings, tmp_path):
+def test_c_returns_the_values_of_the_vectors(kernel, target, settings, tmp_path):
     table = table_of(kernel, target, settings)
     folder = written(tmp_path, files_of(table))
     assert len(table.rows) >= 195
@@ -217,7 +217,7 @@ def test_a_double_of_other_length_is_refused_by_the_header(tmp_path):
         ("c", 10, -1, "seed is -1"),
     ],
 )
-def test_what_cannot_be_written_is_refused(target, count, seed, said_):
+def test_impossible_vectors_are_refused(target, count, seed, said_):
     with pytest.raises(InputError, match=said_):
         vectors_of_choice(choose("euler-product"), target, None, count, seed)
 
@@ -280,7 +280,7 @@ def test_the_command_of_a_loop_writes_the_vectors_of_its_project(tmp_path, capsy
         ("generate --all --project", "--project does not go with it"),
     ],
 )
-def test_what_does_not_go_together_is_refused_in_one_line(command, message, tmp_path, monkeypatch, capsys):
+def test_conflicting_options_are_refused_in_one_line(command, message, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     error = command_says(command, capsys, 2)
     assert message in error and error.count("\n") == 1

@@ -180,7 +180,7 @@ def test_two_variants_with_names_of_their_own_link_together(tmp_path, capsys):
     assert verified(tmp_path / "attitude_step.c", capsys)[0] == 0
 
 
-def test_what_is_no_generated_file_is_one_line(tmp_path, capsys):
+def test_other_files_are_refused_in_one_line(tmp_path, capsys):
     (tmp_path / "a.c").write_text("int a;\n")
     (tmp_path / "a.h").write_text("int a;\n")
     for path, said in (
@@ -415,7 +415,7 @@ def test_whole_states_the_gyro_and_is_generated_again(command, tmp_path, capsys)
     assert status == 1 and "-typedef " in out and "out of step" in error
 
 
-def test_two_speeds_say_what_generate_says_of_each_loop(tmp_path, capsys):
+def test_two_speed_reports_each_loop_as_generate_does(tmp_path, capsys):
     """Cost, gyro, range and certified bound: the same lines, from the same code, and the bounds in the header."""
     gyro = "--target c-fixed --sample-hz 400 --lsb 0.0175dps"
     status, out, _ = says(f"two-speed dcm {gyro} --out {tmp_path}".split(), capsys)

@@ -37,7 +37,7 @@ from strapgen.fixedpoint.quantities import (
     Quantity,
     Sum,
 )
-from strapgen.fixedpoint.quantization import _planned, _walked
+from strapgen.fixedpoint.quantization import _plan, _walk
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.integer_program import IntegerSum
 from strapgen.ir.kernel_info import KernelInfo
@@ -46,7 +46,7 @@ from strapgen.ir.signals import Signal
 from strapgen.run.compiled_code import ModelEvaluator
 
 
-def test_a_sum_of_products_moves_by_no_more_than_is_told():
+def test_sum_of_products_moves_by_at_most_its_bound():
     # 3 a b + a, a up to 1 and moved by 1/8, b up to 1/4 and moved by 1/2
     a, b = (
         Signal(name, (1,), (name,), bound=bound)
@@ -111,7 +111,7 @@ def quantity(name, definition, low=-1, high=1, **more) -> Quantity:
     return Quantity(name, definition, Fraction(0), Interval.of(low, high), **more)
 
 
-def test_roots_functions_and_what_stands_beside_move_too():
+def test_roots_and_functions_move_too():
     one = Fraction(1)
     slopes = ErrorPropagation((("a", Fraction(3)), ("b", None)), Fraction(5))
     items = {
@@ -130,7 +130,7 @@ def test_roots_functions_and_what_stands_beside_move_too():
     assert _moves(Quantities(items), {"z": one / 999})["function"] == 5
 
 
-def test_a_transition_is_as_far_from_the_identity_as_its_offset_and_what_is_stored():
+def test_distance_from_identity_is_offset_plus_stored_value():
     items = {
         "t_x": quantity("t_x", Sum(()), Fraction(-1, 8), Fraction(1, 4)),
         "t_s": replace(quantity("t_s", Sum(()), Fraction(-1, 16), 0), offset=Fraction(3, 4)),
@@ -208,7 +208,7 @@ def sized(
     ],
     ids=lambda sizes: " ".join(sizes),
 )
-def test_the_bound_of_a_run_is_what_an_adversary_reaches(sizes, sign):
+def test_adversary_reaches_the_bound_of_a_run(sizes, sign):
     told = accumulation(planar(), None, sized(**sizes, away=AWAY))
     bound = float(told.once + STEPS * told.per_step)
     worst = reached(sign, **sizes)
@@ -219,7 +219,7 @@ def test_the_bound_of_a_run_is_what_an_adversary_reaches(sizes, sign):
         assert bound <= worst * (1.02 if len(sizes) == 1 else 1.2)
 
 
-def test_what_is_fed_back_of_the_state_moves_what_is_fed_back_of_the_transition(monkeypatch):
+def test_state_feedback_moves_transition_feedback(monkeypatch):
     monkeypatch.setitem(globals(), "ANGLE", 0.0)  # then nothing else does, behind the first and the last step
     sizes = {"state_feedback": 0.01, "transition_feedback": 0.02}
     told = accumulation(planar(), None, sized(**sizes))
@@ -279,11 +279,11 @@ def behind_transition(code: Program, values: dict[str, Fraction]) -> list[Fracti
 
 @pytest.mark.parametrize("rounding", ["nearest", "truncation"])
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
-def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng):
+def test_error_beside_the_feedback_is_reported(algorithm, rounding, rng):
     """The transition, and the state of the computed transition, less what is fed back of them, are off by so little."""
     code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12, rounding=rounding, carry="full")
-    exact, plan = _planned(code, settings)
-    context = _walked(code, settings, exact, plan, {})
+    exact, plan = _plan(code, settings)
+    context = _walk(code, settings, exact, plan, {})
     result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
     errors = step_errors(context, code.transition, result)
     after = exact.results[code.outputs[0].signal.name]
@@ -322,10 +322,10 @@ def test_what_a_step_loses_beside_its_feedback_is_told(algorithm, rounding, rng)
 
 
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
-def test_increments_rounded_to_their_format_move_the_transition_by_what_is_told(algorithm):
+def test_rounded_increments_move_the_transition_by_the_stated_amount(algorithm):
     code, settings = program(Choice(algorithm, "rk2", 2)), Settings(12)
-    exact, plan = _planned(code, settings)
-    context = _walked(code, settings, exact, plan, {})
+    exact, plan = _plan(code, settings)
+    context = _walk(code, settings, exact, plan, {})
     result = quantized(Choice(algorithm, "rk2", 2), settings).interface.outputs[0]
     errors = step_errors(context, code.transition, result)
     part, argument = code.transition_program(), plan.inputs[1]

@@ -199,7 +199,7 @@ def test_a_state_stays_proper_for_as_many_steps_as_are_proved(algorithm):
         assert angles.shortest <= sizes.min() <= sizes.max() <= longest
 
 
-def test_a_normalization_turns_by_no_more_than_is_told(rng):
+def test_normalization_rotates_by_at_most_its_bound(rng):
     for carry in ("none", "full"):
         fixed = quantized(Choice("euler", "rk4", 2), Settings.of(**RATES, carry=carry))
         angles = fixed.interface.angle_accumulation
@@ -256,7 +256,7 @@ def test_a_run_with_dual_rows_keeps_the_bound(rng):
     assert np.all(angles_apart(*runs)[1:] <= bounds)
 
 
-def test_dual_rows_stretch_a_difference_by_no_more_than_is_told(rng):
+def test_dual_rows_stretch_a_difference_by_at_most_their_bound(rng):
     angles = quantized(Choice("dcm", "rk4", 2), Settings.of(**RATES)).interface.angle_accumulation
     e, orthonormalize = (1 - float(angles.shortest)) / 16, strapgen.evaluator("dcm-orthonormalize")
     square = 9 / 8 * e**2
@@ -289,7 +289,7 @@ def _with_output(made: Program, change) -> Program:
 
 
 @pytest.mark.parametrize("algorithm", ["euler", "dcm"])
-def test_what_is_no_product_of_attitudes_has_no_bound(algorithm):
+def test_other_steps_than_products_have_no_bound(algorithm):
     made, settings = program(Choice(algorithm, "rk4", 2)), Settings.of(**RATES)
     assert quantize(made, settings).interface.angle_accumulation is not None
 
@@ -433,7 +433,7 @@ def test_rounded_increments_are_an_error_of_the_transition():
     ],
     ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
 )
-def test_steps_are_proved_as_long_as_there_is_room_for_what_each_takes(errors, room, lost):
+def test_steps_are_proved_while_there_is_room(errors, room, lost):
     angles = _parameter_angles(sizes(**errors), NOTHING, Fraction(0))
     assert angles.start == Fraction(15, 16)
     assert angles.proved_steps == int(room / lost)
@@ -534,7 +534,7 @@ def test_matrices_stay_proper_at_both_ends(errors, shorter, longer):
     assert angles.start == START
 
 
-def test_an_orthonormalization_leaves_a_part_of_what_is_symmetric():
+def test_orthonormalization_leaves_part_of_a_symmetric_error():
     """f(s) = s (3 - s^2)/2 has the slope 3/2 (1 - s^2), the same size at both ends, over what is restored."""
     shortest = float(SHORTEST)
     restored = min(s * (3 - s * s) / 2 for s in (shortest, LONGEST))
@@ -556,7 +556,7 @@ def test_an_orthonormalization_leaves_a_part_of_what_is_symmetric():
     assert _unsteadiness(SHORTEST, highest + Fraction(1, 10**12)) is None
 
 
-def test_dual_rows_have_room_for_what_steps_take_between_them():
+def test_dual_rows_have_room_for_the_steps_between():
     """An eighth of e is left of it; seven eighths are for the stretch, the rounding and what is fed back."""
     e = 1 / 256
     for errors, lost, fed_back in (
@@ -610,7 +610,7 @@ def test_sizes_are_lengths_of_all_elements_and_feedback_is_told_from_its_middle(
         (Interval.of(-1, Fraction(9, 16)), 0.75, 1.25),  # nothing is known of the least singular value
     ],
 )
-def test_a_transition_stretches_by_what_is_known_of_it(stretched, contraction, expansion, monkeypatch):
+def test_transition_stretches_by_its_known_bound(stretched, contraction, expansion, monkeypatch):
     monkeypatch.setattr("strapgen.fixedpoint.angle_accumulation.stretch", lambda *_: stretched)
     state = Signal("state", (4,), tuple("abcd"), bound=1)
     context = SimpleNamespace(

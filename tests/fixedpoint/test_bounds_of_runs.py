@@ -242,7 +242,7 @@ def test_a_transition_kept_beside_the_increments_needs_no_residual():
     assert isinstance(rest.definition, IntegerSum) and rest.definition.residual is None
 
 
-def test_guards_refuse_what_is_too_far_from_a_proper_input():
+def test_guards_refuse_inputs_far_from_proper_ones():
     normalize = make_evaluator("euler-normalize", "fixed-model")
     unit = 2.0**-30
     half = np.array([0.3, 0.4, 0.5, 0.6])
@@ -402,7 +402,7 @@ def sent(backend, carry, counts):
 
 
 @pytest.mark.parametrize("backend", ["fixed-model", "c-fixed16"])
-def test_what_an_increment_loses_comes_with_the_next(backend, rng):
+def test_remainder_of_an_increment_goes_into_the_next(backend, rng):
     counts = rng.integers(-60, 61, (300, 3)) + np.array([0, 20, -20])
     counts = counts.clip(-60, 60)
     exact = counts.cumsum(axis=0) * 5 / 1024

@@ -92,7 +92,7 @@ def test_nothing_is_checked_where_proper_inputs_come_near_zero():
         derived(code)
 
 
-def test_a_root_of_what_may_be_negative_is_refused():
+def test_root_of_possibly_negative_number_is_refused():
     code = program({"s": node("add", "a", "b"), "y": node("sqrt", "s")}, {"a": 1, "b": 1})
     with pytest.raises(InputError, match=r"s may be below 0, its range is .*; it has no square root"):
         derived(code)

@@ -176,7 +176,7 @@ def test_the_c_has_the_integers_of_the_model(word, digits, rng):
 
 
 @pytest.mark.parametrize(("algorithm", "digits"), [("euler", 2), ("dcm", 3)])
-def test_the_bound_has_what_is_cut_off(algorithm, digits, rng):
+def test_bound_includes_the_truncation(algorithm, digits, rng):
     fixed = quantized(Choice(algorithm, "rk4", 2), shift_add(digits=digits))
     (result,) = fixed.interface.outputs
     bound = np.array([float(error) for error in result.errors])

@@ -97,7 +97,7 @@ def test_without_the_error_of_a_literal_the_bound_would_be_exceeded(monkeypatch)
         program({"y": node("add", Fraction(3, 4), Fraction(1, 8))}, {"a": 1}),
     ],
 )
-def test_what_rounds_nothing_has_the_bound_zero(code):
+def test_exact_operations_have_the_bound_zero(code):
     assert bound(code) == 0 == measured(code, inputs(code, 50))
 
 
@@ -109,7 +109,7 @@ def test_a_difference_of_near_numbers_is_exact():
     assert measured(code, inputs(code, 300)) <= bound(code)
 
 
-def test_what_may_overflow_has_no_bound():
+def test_possible_overflow_has_no_bound():
     code = program({"y": node("multiply", "a", "a")}, {"a": Fraction(2) ** 64})
     assert rounding_bounds(code, "float").reason == "y may overflow"
     assert rounding_bounds(code, "double").errors
@@ -129,7 +129,7 @@ def test_what_may_overflow_has_no_bound():
         ),
     ],
 )
-def test_where_nothing_can_be_proved_the_reason_is_told(body, reason):
+def test_missing_proof_has_its_reason(body, reason):
     told = rounding_bounds(program(body, {"a": 1, "b": 1}))
     assert (told.reason, dict(told.errors)) == (reason, {})
 
@@ -149,8 +149,8 @@ def test_without_the_terms_of_second_order_the_bound_would_be_exceeded(monkeypat
     code = program({"x": rounding, "y": node("multiply", "x", "x")}, {"a": 1})
     error = measured(code, inputs(code, 1000))
     assert bound(code) / 10 < error <= bound(code)
-    propagated = _ComputedNumbers._propagated
-    monkeypatch.setattr(_ComputedNumbers, "_propagated", lambda *a: (propagated(*a)[0], Fraction(0)))
+    propagated = _ComputedNumbers._propagate
+    monkeypatch.setattr(_ComputedNumbers, "_propagate", lambda *a: (propagated(*a)[0], Fraction(0)))
     assert bound(code) < error / 1000
 
 
@@ -342,7 +342,7 @@ def test_the_resolution_is_that_of_either_type():
     assert (known.lowest, known.highest) == (DOUBLE_RESOLUTION, Fraction(1, 1 << 23))
 
 
-def test_what_is_squared_is_limited_by_the_root_of_the_limit():
+def test_squared_numbers_are_limited_by_the_root_of_the_limit():
     code = programs()["euler-normalize"]
     expressions = Expressions.of(code)
     (state,) = code.inputs

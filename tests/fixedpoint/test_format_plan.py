@@ -93,7 +93,7 @@ def test_a_sum_of_inputs_is_exact_in_the_format_of_the_finest_of_them(bound, exa
     assert sums_of_inputs_are_exact(plan, known, WORD) is exact
 
 
-def test_what_goes_into_the_next_call_keeps_its_format():
+def test_fed_back_values_keep_their_format():
     seen = 0
     for choice in FIXED_POINT:
         recursion = lowered(choice).recursion
@@ -126,7 +126,7 @@ def test_limits_are_rounded_up_and_those_of_an_attitude_down():
     assert (argument.low, argument.high) == (-17477, 17477)
 
 
-def test_what_a_type_cannot_hold_needs_no_check():
+def test_ranges_of_a_full_type_need_no_check():
     """A gyro of 8 bits counts to -128 and to 127; a limit of 128 counts is that of its type."""
     (limit, _) = limits(CODE, Settings(16, ranges={"a": Fraction(1)}))
     narrow = replace(limit, largest=Fraction(128), fraction=0, bits=8)

@@ -209,7 +209,7 @@ def test_error_stays_below_its_bound(case, word, rounding):
         for word, rounding in product(C_WORDS, ("nearest", "truncation"))
     ],
 )
-def test_c_computes_what_the_model_does(word, rounding):
+def test_c_agrees_with_the_model(word, rounding):
     sources = {case: emit(fixed(case, word, rounding), "c-fixed") for case in CASES}
     compile_together(sources.values())
     for case, compiled in sources.items():

@@ -134,7 +134,7 @@ def lowered(known: dict[str, Known], item, **options):
 
 @pytest.mark.parametrize("rounding", ["nearest", "truncation"])
 @pytest.mark.parametrize(("places", "fraction"), [(8, 5), (15, 2), (12, 4)])
-def test_what_error_feedback_loses_is_attained(places, fraction, rounding):
+def test_error_bound_of_feedback_is_attained(places, fraction, rounding):
     """Of an exact product, the word and what it feeds back lack no more than the error less two roundings of a unit.
 
     Feedback of 8 bits begins 8 places below the word: a finer sum is cut off there, a coarser one cuts off feedback.
@@ -192,7 +192,7 @@ FORMS = {"wide": {}, "rounded": {"forced": {"y": 2}}, "word": {"forced": {"y": 4
 
 
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
-def test_what_functions_add_is_the_slope_times_the_error_or_all_there_is(form):
+def test_functions_add_slope_times_error_or_their_whole_range(form):
     known = {"a": OFF, "b": LESS, "c": EXACT}
     plain = quantity("y", terms((("a",), 1)), -2, 2)
     base = lowered(known, plain, **form)[0]
@@ -213,7 +213,7 @@ def test_what_functions_add_is_the_slope_times_the_error_or_all_there_is(form):
     assert added((("b", None),), most) == most
 
 
-def test_what_a_series_leaves_out_is_added_to_the_error_and_to_the_range():
+def test_truncation_is_added_to_error_and_range():
     left_out = Fraction(1, 9)
     item = quantity("y", terms((("a",), 1)), -2, 2)
     base, more = (
@@ -265,7 +265,7 @@ def in_accepted_calls(walk, name: str, known: dict[str, Known], exact) -> tuple[
 
 
 @pytest.mark.long
-def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_factors():
+def test_checked_sum_of_squares_bounds_the_factors():
     """An element of 15/4 is possible, but with squares of 4 together none above 2 is accepted."""
     known = {name: Known(2, -15, 15, Fraction(1, 50)) for name in "ab"} | {
         "c": Known(3, -7, 7, Fraction(1, 90))
@@ -297,7 +297,7 @@ def test_what_passes_the_check_of_a_sum_of_squares_has_the_error_of_smaller_fact
         (((("a",), ONE), (("b", "b"), ONE)), 3.745),
     ],
 )
-def test_only_sums_of_squares_bound_what_is_squared(terms, size):
+def test_only_sums_of_squares_bound_their_terms(terms, size):
     known = {name: Known(2, -15, 15, Fraction(1, 200)) for name in "ab"}
     check = quantity("y", Sum(terms), 1, 4, range_checked=True)
     walk = context(known, check)
@@ -329,13 +329,13 @@ def test_the_nearest_integer_is_at_most_half_a_unit_away_and_halves_go_up(value)
 
 @SETTINGS
 @given(numbers)
-def test_a_bound_is_rounded_up_by_less_than_what_a_word_can_tell(value):
+def test_bound_is_rounded_up_by_less_than_a_unit(value):
     assert value <= up(value) < value + Fraction(1, 2**100)
 
 
 @SETTINGS
 @given(st.integers(-(10**4), 10**4), st.integers(0, 20), st.integers(0, 20))
-def test_a_constant_at_a_coarser_place_is_rounded_and_its_error_is_told(factor, place, dropped):
+def test_constant_at_a_coarser_place_has_its_rounding_error(factor, place, dropped):
     exact = Fraction(factor, 2 ** (place + dropped))
     total = aligned([Placed(Term((), factor), place + dropped, Fraction(1, 8))], place, 32, {})
     written = sum(term.factor * Fraction(2) ** (term.shift - place) for term in total.terms)
@@ -388,7 +388,7 @@ def test_values_of_which_every_bit_counts_stay_as_they_are():
     assert names_and_bits(a, c, y, value("z", larger, 24, 1 << 25)) == {}
 
 
-def test_a_factor_of_what_is_always_zero_has_any_format():
+def test_factor_of_zero_has_any_format():
     a = value("a", IntegerSum((Term(("s",), 1),), 4), 24, 1 << 24)
     c, nothing = value("c", None, 16, 1 << 10), value("n", None, 4, 0)
     total = IntegerSum((Term(("a", "n"), 1), Term(("c",), 1, 12)), 20)

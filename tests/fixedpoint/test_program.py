@@ -90,7 +90,7 @@ def test_any_polynomial_keeps_its_bound(made, word, rounding, data):
 
 
 @pytest.mark.parametrize("word", [8, 32])
-def test_a_product_with_what_is_always_zero_is_zero(word):
+def test_product_with_zero_is_zero(word):
     body = {
         "zero": op("subtract", "x_1", "x_1"),
         "again": op("add", "x_2", "zero"),
@@ -120,7 +120,7 @@ def test_only_exact_sums_of_inputs_are_split_off(near, apart):
     assert not quantities(hand_made(body, "y"), box).items["sum"].exact_addends
 
 
-def test_what_stays_near_a_constant_is_kept_as_its_distance():
+def test_values_near_a_constant_are_stored_as_distances():
     box = {name: Interval.symmetric(Fraction(1, 8)) for name in ("x_1", "x_2", "x_3")}
     body = {
         "near": op("subtract", number(1), op("multiply", "x_1", "x_2")),
@@ -178,7 +178,7 @@ def test_products_by_a_value_and_by_a_number_are_counted_and_shifts_are_not():
     assert counts == [1, 2, 2]
 
 
-def test_what_a_root_goes_into_is_no_polynomial_of_the_inputs():
+def test_values_with_a_root_are_no_polynomials():
     box = {name: Interval.symmetric(1) for name in ("x_1", "x_2", "x_3")}
     body = {
         "sum": op("add", op("multiply", "x_1", "x_1"), number(1)),
@@ -232,7 +232,7 @@ def test_formats_that_do_not_hold_their_values(formats, said):
         quantize(program(EULER), Settings(32, formats=formats))
 
 
-def test_what_the_next_call_takes_is_checked_in_the_format_of_the_output():
+def test_next_input_is_checked_in_the_output_format():
     # The sum of angles is accepted up to 0.4, and its successor is not proved to be below.
     formats = {"angle_sum": "Q3.28", "next_angle_sum": "Q-1.32"}
     ranges = {"angle_sum": Fraction(2, 5), "coning": Fraction(1, 10)}

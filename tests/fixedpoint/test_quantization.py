@@ -39,7 +39,7 @@ def value(name, low, high, *uses, error=Fraction(1, 100), **more) -> Value:
     return Value(name, definition, 4, False, low, high, ZERO, error, 99, **more)
 
 
-def test_of_what_depends_on_a_reset_nothing_is_known_but_its_range_and_that_of_the_exact_value():
+def test_values_after_a_reset_have_only_their_ranges():
     reset, between, after = value("r", -9, 9), value("m", -7, 7, "r"), value("y", -20, 12, "m")
     other, saturated = value("z", -5, 5), replace(value("s", -5, 5), saturated=True)
     context = SimpleNamespace(resets={"r"}, body=[reset, between, after, other, saturated])
@@ -87,7 +87,7 @@ def test_an_error_that_is_a_hundredth_larger_is_no_worse(percent, worse):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_what_passes_a_check_stands_for_an_exact_value_inside_the_range(sign):
+def test_checked_value_has_an_exact_value_in_range(sign):
     low, high = sorted((sign * Fraction(1, 3), sign * Fraction(9, 5)))
     error, followed, approximation_error, places = Fraction(1, 40), Fraction(1, 70), Fraction(1, 90), 5
     item = quantity(
@@ -356,7 +356,7 @@ def test_the_root_of_an_error_is_the_bound_at_zero():
     assert Fraction(1, 3) <= measured.error <= value.error == pytest.approx(Fraction(1, 3) + half_unit)
 
 
-def test_a_root_of_a_long_number_loses_what_is_shifted_out():
+def test_root_of_a_long_number_loses_the_shifted_bits():
     """Of 15 bits, two are cut off: of r^2 + r + 3/4 the root is more than half a unit above r."""
     value, measured = root(Known(10, 1 << 14, (1 << 14) + 700, wide=True))
     half_unit = Fraction(1, 2 << value.fraction)
@@ -370,6 +370,6 @@ def test_a_truncated_root_lacks_up_to_a_unit():
     assert measured.error > Fraction(98, 100) * value.error
 
 
-def test_a_root_of_what_may_be_below_zero_by_its_error_is_refused_nowhere():
+def test_root_of_number_negative_by_error_is_accepted():
     value, _ = root(Known(4, 0, 1))
     assert (value.low, value.magnitude) == (0, value.high)

@@ -203,9 +203,7 @@ LARGEST = {"state": Fraction(17, 16), "increments": Fraction(1, 8)}
         ("dcm-rk4-2", (0, 0, 1, 1, 2, 2, 0, 0, 0), 3 * (1, 2, 2), 3, 17 / 16 * 3 * 3),
     ],
 )
-def test_the_error_of_a_step_is_that_of_its_product_and_what_its_transition_makes_of_a_state(
-    name, local, transition, length, stretched
-):
+def test_step_error_is_product_error_plus_transition_error(name, local, transition, length, stretched):
     code, scale = programs()[name], Fraction(1, 10**9)
     parts = ([scale * part for part in numbers] for numbers in (local, transition))
     step = StepRounding(*map(tuple, parts), away=(Fraction(0),) * len(local))
@@ -265,7 +263,7 @@ def test_no_run_is_farther_off_than_the_bound_of_its_steps(name, number, rng):
 
 
 @pytest.mark.parametrize("number", TYPES)
-def test_the_compiled_function_computes_what_the_bounds_are_of(number, rng):
+def test_compiled_function_meets_its_bounds(number, rng):
     code = programs()["euler-rk4-2"]
     values = inputs(code, rounding_bounds(code, number), 200, rng)
     (expected,) = computed(code, values, number).values()
@@ -291,7 +289,7 @@ def test_a_range_that_is_stated_gives_a_model_of_motion_a_bound():
     assert not bounds.reason
 
 
-def test_what_is_no_type_and_no_input_is_refused():
+def test_unknown_types_and_inputs_are_refused():
     code = programs()["euler-rk4-2"]
     with pytest.raises(InputError, match="half"):
         rounding_bounds(code, "half")
@@ -403,7 +401,7 @@ FARTHER |= {
         ]
     ],
 )
-def test_what_a_large_error_does_is_the_bound(body, share):
+def test_large_error_is_bounded(body, share):
     code = program(body, {"a": Fraction(1, 2)})
     error = measured(code, {"a": Fraction(-1, 2)})
     assert share * bound(code) * (1 - Fraction(1, 10**5)) < error <= bound(code)

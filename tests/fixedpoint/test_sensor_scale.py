@@ -153,7 +153,7 @@ def test_kernels_of_a_saturating_step_take_its_state():
     assert np.abs(np.linalg.norm(states, axis=-1) - 1).max() < 4 * 2.0**-31
 
 
-def test_what_does_not_go_with_counts_is_refused():
+def test_options_not_for_counts_are_refused():
     settings = Settings.of(lsb="3e-6rad")
     with pytest.raises(InputError, match="takes no increments; an lsb does not go with it"):
         quantized(Choice("euler-normalize"), settings)
@@ -163,7 +163,7 @@ def test_what_does_not_go_with_counts_is_refused():
         quantized(EULER, Settings.of(lsb="3e-6rad", formats={"increments": "Q0.31"}))
 
 
-def test_a_reader_is_told_which_values_are_divided_by_powers_of_the_scale():
+def test_scaled_values_are_named_for_readers():
     sensor = SimpleNamespace(scale=Fraction(1, 8), is_rounded=False)
     body = tuple(Assignment(name, Reference("x")) for name in ("a_x", "a_y", "b", "c"))
     code = SimpleNamespace(body=body)

@@ -66,7 +66,7 @@ def test_any_chain_of_operations_is_enclosed(data, constants, parts, most):
         assert all(degree <= arithmetic.degree for degree in made.terms)
 
 
-def test_what_fits_is_exact_and_cancels():
+def test_terms_in_range_are_exact_and_cancel():
     arithmetic = Truncated([Fraction(1, 10)] * 2, 15)
     x, y = arithmetic.variable(0), arithmetic.variable(1)
     one = arithmetic.sum(arithmetic.product(x, x), arithmetic.product(x, y))
@@ -82,7 +82,7 @@ def test_the_degree_is_the_largest_whose_terms_are_few(count, most, degree):
     assert Truncated([Fraction(1)] * count, most).degree == degree
 
 
-def test_what_is_cut_off_is_in_the_rest():
+def test_truncated_terms_are_in_the_remainder():
     arithmetic = Truncated([Fraction(1, 2)], 3)  # to the second power
     x = arithmetic.variable(0)
     square = arithmetic.product(x, x)

@@ -147,7 +147,7 @@ def test_number_of_a_float_is_its_shortest_decimal(value):
     assert exact == checks.number("step", repr(value)) == Fraction(repr(value))
 
 
-def test_double_reads_what_number_reads():
+def test_double_and_number_read_the_same_texts():
     assert [checks.double(text) for text in ("1", " -2.5e3 ", "\t.5", "1e999")] == [1, -2500, 0.5, math.inf]
     unread = ("", "x", "1_0", "1e1_0", "٣", "1/8", "0x10", "nan")
     assert [text for text in unread if not math.isnan(checks.double(text))] == []
@@ -176,7 +176,7 @@ def test_multiple():
     assert checks.multiple("duration", Fraction("0.3"), "step", Fraction("0.1")) == 3
 
 
-def test_real_array_keeps_what_it_can():
+def test_real_array_avoids_copies():
     given_ = np.ones((4, 3))
     assert checks.real_array("increments", given_, (3,)) is given_
     assert checks.real_array("increments", [[0.5, 0.0, 1.0]], (3,)).dtype == np.float64
@@ -239,11 +239,11 @@ def test_a_short_list_is_whole_and_a_long_one_is_cut():
         ("xyz", []),
     ],
 )
-def test_what_was_meant(value, meant):
+def test_similar_names_are_suggested(value, meant):
     assert suggestions("algorithm", value, ["dcm", "euler", "cayley-klein"]) == meant
 
 
-def test_a_synonym_leads_only_to_what_is_allowed():
+def test_synonym_leads_only_to_allowed_names():
     assert suggestions("backend", "fixed", ["c-fixed16", "numpy"]) == ["c-fixed16"]
 
 
@@ -422,7 +422,7 @@ def refusal(stage: str, argument: str) -> str:
     return str(refused.value)
 
 
-def test_every_wrong_pairing_of_stages_is_told_in_one_line():
+def test_wrong_wires_are_reported_in_one_line():
     said = {
         (stage, argument): refusal(stage, argument)
         for stage in STAGES
@@ -450,7 +450,7 @@ def test_messages_name_calls_that_exist():
     assert not {name for name in classes if name != "str"} - set(dir(strapgen))
 
 
-def test_what_is_taken_is_not_refused():
+def test_accepted_arguments_are_not_refused():
     for stage in (
         "derive",
         "lower",

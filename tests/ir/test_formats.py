@@ -91,7 +91,7 @@ def test_settings_survive_json():
 
 
 @given(st.floats(1e-9, 3.5))
-def test_fitted_settings_hold_what_they_are_fitted_to(largest):
+def test_fitted_settings_hold_the_largest_increment(largest):
     fitted = float(Settings().fitted(largest).largest_angle)
     assert largest <= fitted <= largest * 9 / 8
 
@@ -107,7 +107,7 @@ def test_digits_stand_for_their_number_and_no_two_are_neighbours(value):
 
 
 @given(st.integers(-(1 << 31), 1 << 31), st.integers(1, 8))
-def test_what_is_cut_off_is_at_most_two_thirds_of_the_next_digit(value, most):
+def test_truncation_is_at_most_two_thirds_of_the_next_digit(value, most):
     digits = signed_digits(value)
     cut = signed_digits(value, most)
     assert cut == digits[:most]
@@ -247,7 +247,7 @@ def test_settings_are_read_as_they_are_written(stated):
         ({"lsb": "1rad"}, "from 1e-11 to 4 is needed"),
     ],
 )
-def test_what_makes_no_scale_is_refused(stated, said):
+def test_invalid_scales_are_refused(stated, said):
     with pytest.raises(InputError, match=said):
         Settings.of(**stated)
 

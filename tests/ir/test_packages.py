@@ -64,7 +64,7 @@ def test_another_finder_of_packages_is_asked(monkeypatch: pytest.MonkeyPatch, tm
     assert names() == ["found"]
 
 
-def test_what_has_not_changed_is_read_once(monkeypatch: pytest.MonkeyPatch):
+def test_unchanged_files_are_read_once(monkeypatch: pytest.MonkeyPatch):
     before = packages.entry_points("console_scripts")
     assert {point.name for point in before} >= {"strapgen"}
 

@@ -175,7 +175,7 @@ class Counted:
         return self.times
 
 
-def test_a_value_is_worked_out_once_for_each_object():
+def test_value_is_computed_once_for_each_object():
     first, second = Counted(), Counted()
     assert [first.value, first.value, second.value] == [1, 1, 1]
     assert first.times == second.times == 1

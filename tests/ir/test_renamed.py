@@ -7,7 +7,7 @@ import pytest
 import strapgen
 from strapgen.ir.kernel_info import Recursion
 
-OLD = {"Companions": "AttitudeStep", "resolution": "EPSILON"}
+OLD = {"Companions": "AttitudeStep", "resolution": "EPSILON", "turns_signal": "node_rotations_signal"}
 
 
 @pytest.mark.parametrize("old", OLD)

@@ -78,7 +78,7 @@ def test_the_largest_of_several_matrices_counts():
     assert near((low, high), -1, 1 / 8)
 
 
-def test_what_is_known_is_returned_where_nothing_closer_is_proved(monkeypatch):
+def test_known_bound_is_returned_without_a_closer_proof(monkeypatch):
     x = [[{(1,): ONE}]]
     assert eigenvalue_bounds([x], np.array([[1.0]]), ONE) == (pytest.approx(0, abs=1e-9), 1)
     monkeypatch.setattr(bernstein, "_MOST_CUBES", 0)
@@ -108,7 +108,7 @@ def test_of_several_variables_the_longest_is_cut_and_parts_stay_apart():
     assert halves.coefficients[2:, 0, :, 2].tolist() == numbers[:, 0, :, 2].tolist()
 
 
-def test_a_limit_exceeds_coefficients_by_their_slack_and_by_what_rounding_needs():
+def test_limit_exceeds_coefficients_by_slack_and_rounding():
     """Rounding in double needs 2^-45 of what a coefficient of 2^50 lacks: 32 units, and one."""
     whole = [((Fraction(0), ONE),)]
     forms = bernstein._BernsteinForms(np.array([[[1000, -1000]], [[999, 999]]]), 2 * whole, 100)

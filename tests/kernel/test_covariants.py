@@ -177,7 +177,7 @@ def test_a_triple_product_is_a_scalar():
     assert frame.quaternion([frame.ring.zero] * 3, triple).scalar == {((0, 1, 2),): q(1)}
 
 
-def test_what_does_not_turn_with_its_vectors_is_refused():
+def test_functions_that_are_not_covariant_are_refused():
     one, two = Frame(1), Frame(2)
     zero = one.ring.zero
     (x, _, _), (u, v) = one.vectors[0], two.vectors

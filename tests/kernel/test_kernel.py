@@ -90,7 +90,7 @@ def test_polynomials():
         lambda x: sp.sqrt(3),
     ],
 )
-def test_what_is_no_polynomial_is_refused(expression):
+def test_other_functions_than_polynomials_are_refused(expression):
     with pytest.raises(TypeError, match="of-one"):
         of_one(expression).polynomials()
 
@@ -154,7 +154,7 @@ NAMES = {"a": A, "b": B}
         sp.sin(2 * A) * sp.cos(B) - sp.pi / 7,
     ],
 )
-def test_what_sympy_writes_is_read(value):
+def test_expressions_printed_by_sympy_are_read(value):
     assert expression("value", sp.sstr(value), NAMES) == value
 
 

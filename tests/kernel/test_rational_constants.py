@@ -14,7 +14,7 @@ from strapgen import derive
 from strapgen.catalogue import Choice, choose
 from strapgen.ir.program import Constant, walk
 from strapgen.ir.signals import Signal
-from strapgen.kernel.kernel import DIGITS, Kernel, KernelBuilder, rationalized
+from strapgen.kernel.kernel import DIGITS, Kernel, KernelBuilder, rationalize
 
 #: Exact series of many methods: with the long tests.
 pytestmark = pytest.mark.long
@@ -42,13 +42,13 @@ def one(expression: sp.Expr) -> sp.Expr:
     build = KernelBuilder()
     build.input(Signal.vector("v", "v"))
     build.output(Signal.scalar("y"), [expression])
-    return rationalized(build.kernel("one", "One", "this test")).outputs[0].expressions[0]
+    return rationalize(build.kernel("one", "One", "this test")).outputs[0].expressions[0]
 
 
 @pytest.mark.parametrize("name", IRRATIONAL)
 def test_a_rationalized_kernel_is_the_kernel_to_70_digits(name):
     exact, random = kernel(name), Random(1969)
-    rounded = rationalized(exact)
+    rounded = rationalize(exact)
     names = [element for signal in exact.inputs for element in signal.elements]
     with mpmath.workdps(100):
         values = {n: mpmath.mpf(random.randint(-999, 999)) / 1000 for n in names}
@@ -60,7 +60,7 @@ def test_a_rationalized_kernel_is_the_kernel_to_70_digits(name):
 
 @pytest.mark.parametrize("name", IRRATIONAL)
 def test_no_irrational_number_is_left_and_a_note_says_so(name):
-    rounded = rationalized(kernel(name))
+    rounded = rationalize(kernel(name))
     for stage in (*rounded.stages, *rounded.outputs):
         for expression in stage.expressions:
             assert not any(p.is_number and not p.is_Rational for p in expression.atoms(sp.Pow))
@@ -80,12 +80,12 @@ def test_programs_hold_fractions_near_the_constants(name):
 @pytest.mark.parametrize("words", [("euler", "rk4", 2), ("dcm", "magnus6", 4), ("dcm", "butcher6", 3)])
 def test_a_rational_kernel_is_left_as_it_is(words):
     made = derive(*words)
-    assert rationalized(made) is made
+    assert rationalize(made) is made
 
 
 def test_roots_of_variables_stay():
     made = derive("euler-normalize")
-    assert rationalized(made) is made
+    assert rationalize(made) is made
     x, y, _ = sp.symbols("v_x v_y v_z", real=True)
     assert one(sp.sqrt(x) * sp.Rational(1, 3)) == sp.sqrt(x) / 3
     mixed = one(sp.sqrt(2) * sp.sqrt(x**2 + y**2) + sp.sqrt(3))

@@ -143,7 +143,7 @@ def test_evaluate_needs_every_symbol():
         evaluate(sp.Symbol("x") + sp.Symbol("y"), {"x": 1})
 
 
-def test_evaluation_asks_what_stands_for_a_number():
+def test_evaluation_takes_numbers_from_a_function():
     # Values of other systems need not know SymPy's numbers.
     x = sp.Symbol("x")
     asked = []

@@ -146,7 +146,7 @@ def test_the_cache_keeps_the_size_of_each_code(monkeypatch):
     def never(*_: object) -> None:
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(cost, "_measured_size", never)
+    monkeypatch.setattr(cost, "_measure_size", never)
     assert [cost.code_size(sources) for sources in (small, large)] == sizes
 
 

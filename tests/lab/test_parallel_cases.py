@@ -223,8 +223,8 @@ def test_files_move_with_their_folders(tmp_path):
     files = [tmp_path / "here" / name for name in ("a/brief.toml", "a/../log.csv")]
     bundle = Bundle.of(files)
     assert bundle == Bundle(tmp_path / "here", {"a/brief.toml": b"a/brief.toml", "log.csv": b"log.csv"})
-    placed = parallel_cases._placed(bundle.contents)
-    assert parallel_cases._placed(bundle.contents) == placed
+    placed = parallel_cases._place(bundle.contents)
+    assert parallel_cases._place(bundle.contents) == placed
     again = Path(parallel_cases.moved(str(files[1]), bundle.folder, placed))
     assert again.read_text() == "log.csv" and again.parent == placed
     assert Bundle.of([]) is None

@@ -289,7 +289,7 @@ def test_thesis_tables_have_a_panel_each_with_printed_and_computed_figures(figur
     )  # 1.0 is "1"
 
 
-def test_rate_table_has_a_panel_a_motion_and_tells_what_is_out_of_range(figures):
+def test_rate_table_plot_has_panels_and_marks_values_out_of_range(figures):
     names = ("dcm-rk4-2", "euler-rk4-2", "euler two-speed")
     drifts = {"numpy": (1e-6, 1e-8, 1e-13), "c-fixed16": (0.3, None, 0.1)}
     rows = [

@@ -74,6 +74,6 @@ def test_two_speeds():
         ({"algorithms": ["bortz"]}, "algorithm 'bortz' is not known"),
     ],
 )
-def test_what_is_refused(arguments, says):
+def test_invalid_input_is_refused(arguments, says):
     with pytest.raises(InputError, match=says):
         next(stress(**({"duration": 12} | arguments)))

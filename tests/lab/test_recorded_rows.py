@@ -61,7 +61,7 @@ def outcome(path: Path) -> object:
 
 
 @given(st.lists(ROWS, max_size=30), st.sampled_from(["\n", "\r\n", "\r"]))
-def test_blocks_give_what_single_rows_give(lines, end):
+def test_blocks_equal_single_rows(lines, end):
     path = Path(tempfile.gettempdir()) / f"rows-{np.random.default_rng().integers(1 << 60)}.csv"
     good = [f"{k},{k},{k},{k}" for k in range(4)]
     path.write_bytes(end.join([*good, *lines, *good, ""]).encode())

@@ -61,7 +61,7 @@ def read(request: pytest.FixtureRequest):
 # The files of this test
 
 
-def test_files_are_what_their_script_writes():
+def test_files_are_the_output_of_their_script():
     texts = MAKER["recordings"]()
     assert {path.name for path in DATA.glob("*.csv")} == texts.keys()
     for name, text in texts.items():

@@ -122,7 +122,7 @@ def test_roots_and_functions():
     assert tree(sp.atan2(Y, X)) == operation("atan2", y, x)
 
 
-def test_what_needs_no_computation_is_referred_to():
+def test_symbols_need_no_temporaries():
     program = lowered(X, 7, sp.Rational(-1, 3), -X)
     assert program.outputs[0].nodes[:3] == (x, constant(7), constant(-1, 3))
     assert [assignment.name for assignment in program.body] == ["r_3"]
@@ -150,12 +150,12 @@ def test_a_common_subexpression_is_computed_once():
     ],
     ids=str,
 )
-def test_what_programs_do_not_know_is_named(expression, named):
+def test_unknown_functions_are_named(expression, named):
     with pytest.raises(NotImplementedError, match=named):
         lowered(expression)
 
 
-def test_what_programs_do_not_know_is_found_in_a_stage():
+def test_unknown_functions_are_found_in_a_stage():
     build = KernelBuilder()
     v = build.scalar(Signal.scalar("x"))
     part = build.value("part", sp.log(v))

@@ -13,7 +13,7 @@ from derived import FUNCTIONS, kernel, precisely, program, tells_more
 from strapgen import catalogue, derive
 from strapgen.catalogue import STANDARD_METHODS, Choice
 from strapgen.ir.program import RESOLUTION, Constant, Node, Operation, Program, Reference, walk
-from strapgen.kernel.kernel import Kernel, rationalized
+from strapgen.kernel.kernel import Kernel, rationalize
 from strapgen.lowering import candidates, canonical
 from strapgen.lowering.passes import PASSES, cost, optimize
 
@@ -155,7 +155,7 @@ def near_a_rotation(values: dict[str, Fraction], random: Random) -> dict[str, Fr
 
 @cache
 def every_candidate(choice: Choice) -> list[Program]:
-    rational = rationalized(kernel(choice))
+    rational = rationalize(kernel(choice))
     return list(candidates(rational, canonical.extract_core(rational)))
 
 

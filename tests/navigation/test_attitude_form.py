@@ -118,7 +118,7 @@ def test_instructions_are_counted_on_a_processor(capsys):
     assert all(total["instructions_per_s"] for total in answer["totals"])
 
 
-def test_what_it_refuses(capsys):
+def test_invalid_input_is_refused(capsys):
     for words, reason in (
         ("--without third-row", "without"),
         ("--velocity-error 2", "velocity-error is 2"),

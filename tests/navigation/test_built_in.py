@@ -48,7 +48,7 @@ def test_copies_and_sums_are_read_off_the_formulas(algorithm, sculling):
         *(pytest.param("c", form, marks=pytest.mark.long) for form in FORMS),
     ],
 )
-def test_a_file_computes_what_the_algorithm_in_two_speeds_does(backend, form, rng):
+def test_file_agrees_with_the_two_speed_algorithm(backend, form, rng):
     name = f"two-speed-{form[0]}" + ("" if form[1] == 2 else "-1")
     described_system = system_runner(described(name), backend)
     cycles = 640

@@ -72,7 +72,7 @@ def test_initial_angles():
     np.testing.assert_allclose(made.velocity_changes, np.tile([0, 0, 4 * GRAVITY * 0.01], (5, 1)), atol=1e-15)
 
 
-def test_increments_that_make_no_whole_cycle_are_told(wobble):
+def test_incomplete_cycles_are_reported(wobble):
     made = course("dcm", wobble, fast_cycles=3, slow_cycles=7)
     assert (len(made.time), made.unused) == (47, 13)
     said = CourseResult({"backend": "numpy"}, made).text()
@@ -100,7 +100,7 @@ def test_ranges_that_are_stated_hold(wobble):
         ({"settings": Settings()}, "numpy"),
     ],
 )
-def test_what_is_refused(options, says, wobble):
+def test_invalid_input_is_refused(options, says, wobble):
     with pytest.raises(InputError, match=says):
         course(**({"algorithm": "dcm", "recording": wobble, "fast_cycles": 4} | options))
 

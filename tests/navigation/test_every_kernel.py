@@ -76,7 +76,7 @@ def described(choice: str, folder: Path) -> tuple[Path, dict[str, str]]:
         for target in (("numpy", "c", "c-float") if quick else ("numpy",))
     ],
 )
-def test_stage_computes_what_its_kernel_does(kernel, target, tmp_path):
+def test_stage_agrees_with_its_kernel(kernel, target, tmp_path):
     path, states = described(kernel, tmp_path)
     program = pipeline.program(Choice(kernel))
     if program.recursion is not None and program.recursion.reset:

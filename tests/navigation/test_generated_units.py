@@ -52,7 +52,7 @@ def twin(fit, folder: Path):
 @pytest.mark.long
 @pytest.mark.parametrize("name", TEXTS)
 @pytest.mark.parametrize("target", ["c", "c-fixed"])
-def test_a_twin_in_python_stores_what_the_c_stores(name, target, systems, tmp_path, rng):
+def test_python_unit_stores_the_values_of_the_c(name, target, systems, tmp_path, rng):
     """Bit for bit on integers; in double the functions of numpy and C differ by roundings of sines alone."""
     python = "fixed-model" if target == "c-fixed" else "numpy"
     compiled = CompiledSystem(fitted(systems[name], target, SETTINGS.get(target)), BACKEND[target])
@@ -80,7 +80,7 @@ def test_a_twin_in_python_stores_what_the_c_stores(name, target, systems, tmp_pa
 
 
 @pytest.mark.long
-def test_a_twin_refuses_what_the_c_refuses_and_keeps_what_is_stored(systems, tmp_path, rng):
+def test_python_unit_refuses_as_the_c_and_keeps_its_memory(systems, tmp_path, rng):
     fit = fitted(systems["two"], "fixed-model", SETTINGS["fixed-model"])
     module = twin(fit, tmp_path)
     memory = module.Memory()

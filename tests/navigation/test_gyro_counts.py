@@ -106,7 +106,7 @@ def test_largest_count_is_accepted_in_every_cycle(backend, stated):
     assert np.abs(run.attitudes - exact.attitudes).max() <= allowed
 
 
-def test_kind_of_an_input_says_what_is_counted(tmp_path):
+def test_kind_of_an_input_names_the_counted_quantity(tmp_path):
     settings = Settings.of(sample_hz=3200, lsb="0.0175dps")
     fit = fitted(description(tmp_path, TWO_SPEEDS), "fixed-model", settings)
     counted = {name for name, argument in fit.arguments.items() if argument.sensor}

@@ -124,7 +124,7 @@ def residuals(scale, passes):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("passes", "order"), [(1, 2), (2, 3)])
-def test_what_is_left_is_of_second_order_in_the_coefficients_and_of_third_after_two_passes(passes, order):
+def test_compensation_error_is_of_second_order_then_third(passes, order):
     full, half = residuals(Fraction(1), passes), residuals(Fraction(1, 2), passes)
     for one, other in zip(full, half, strict=True):
         assert 2**order * 0.99 < one / other < 2**order * 1.02
@@ -216,7 +216,7 @@ def test_the_errors_of_a_unit_integrated_in_numpy_are_compensated_to_second_orde
 
 
 @pytest.mark.long
-def test_a_ramp_within_the_cycle_leaves_what_products_of_means_miss():
+def test_ramp_within_a_cycle_leaves_the_error_of_mean_products():
     # The mean of a product of two ramps exceeds the product of means by a twelfth of the product of their changes:
     # for changes of the rate of 2 rad/s and of the acceleration of 30 m/s^2 at most, times J and D, E, thrice each.
     T, sizes = 0.02, SIZES
@@ -251,7 +251,7 @@ def test_constants_take_the_place_of_inputs():
         ({"constants": {"cycle": Fraction(0)}}, "cycle is 0 s"),
     ],
 )
-def test_what_is_no_error_model_is_refused(arguments, said):
+def test_other_kernels_than_error_models_are_refused(arguments, said):
     with pytest.raises(InputError, match=said):
         imu_compensate(**arguments)
 

@@ -64,7 +64,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("old", "new", "words"), REFUSED)
-def test_what_is_no_layout_is_refused_in_one_line(old, new, words, tmp_path):
+def test_invalid_layouts_are_refused_in_one_line(old, new, words, tmp_path):
     file = tmp_path / "layout.toml"
     assert old in GOOD
     file.write_text(GOOD.replace(old, new, 1))
@@ -84,7 +84,7 @@ def test_what_is_no_layout_is_refused_in_one_line(old, new, words, tmp_path):
         ("[0, 1, 0]\nspin = [0, 0, 1]", "[0, 0, 1]\nspin = [0, 1, 0]", "the acceleration (0, 1, 0)"),
     ],
 )
-def test_a_singular_layout_is_refused_with_what_it_does_not_see(old, new, motion, tmp_path):
+def test_singular_layout_is_refused_with_unobserved_axes(old, new, motion, tmp_path):
     file = tmp_path / "layout.toml"
     file.write_text(GOOD.replace(old, new))
     assert file.read_text() != GOOD

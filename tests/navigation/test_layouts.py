@@ -56,7 +56,7 @@ def rows(name: str) -> np.ndarray:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name == "turned" else pytest.mark.long) for name in NAMES]
 )
-def test_every_back_end_separates_what_a_numeric_solution_does(name, backend_name):
+def test_every_back_end_agrees_with_a_numeric_solution(name, backend_name):
     choice, entry = chosen(name), strapgen.BACKENDS[backend_name]
     settings = Settings(word=entry.word or 32) if entry.fixed else None
     separated = strapgen.evaluator(choice, backend_name, settings)

@@ -131,7 +131,7 @@ def test_the_study_as_text_table_and_picture(coarse, tmp_path, capsys):
     assert "slowest pole" in run(f"study loops {coarse} --last 0", capsys)
 
 
-def test_what_is_refused(tmp_path, capsys):
+def test_invalid_input_is_refused(tmp_path, capsys):
     text = BUILT_IN.read_text("utf-8")
     (tmp_path / "long.toml").write_text(text.replace("cycle_s = 0.01", "cycle_s = 5"), "utf-8")
     (tmp_path / "third.toml").write_text(

@@ -325,7 +325,7 @@ def hour_of(flight: TestProfile, seconds: int, cycle: float, azimuth: str) -> tu
 
 @pytest.mark.long
 @pytest.mark.parametrize(("azimuth", "seconds", "cycle"), [("wander", 900, 0.1), ("free", 900, 0.2)])
-def test_the_chain_is_off_by_what_the_series_predicts(azimuth, seconds, cycle):
+def test_error_of_the_chain_is_that_of_the_series(azimuth, seconds, cycle):
     # Turns of up to 70 deg/s, speeds of 200 to 460 m/s, climbs of 1 km; the vertical channel is not held, and
     # multiplies what it is off by 5 in a quarter of an hour. What the prediction leaves out is of third order in the
     # cycle: a hundredth of the largest error at 10 Hz, twice that at 5 Hz.
@@ -361,7 +361,7 @@ def sensed(flight: TestProfile, seconds: int, sample: float) -> tuple[np.ndarray
 
 
 @pytest.mark.long
-def test_the_whole_chain_loses_what_the_velocity_in_two_speeds_loses():
+def test_chain_has_the_error_of_two_speed_velocity():
     # Fast loops of s = 10 ms, slow ones of T = 20 and 40 ms, the frame at 5 Hz. S2 of the source leaves out
     # w x (w x f) T^2/6 for slow cycles, and (w x f' - w' x f) s^2/12 within fast ones, with derivatives in body axes.
     # At 70 deg/s that is far more than the frame's error. What remains is of third order.

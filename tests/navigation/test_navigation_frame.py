@@ -186,7 +186,7 @@ def test_the_position_turns_by_the_transport_rate_to_second_order():
     assert (linear - w0 * T - w1 * T**2 / 2).expand() == sp.zeros(3, 1)
 
 
-def test_velocity_and_height_take_what_they_say():
+def test_velocity_and_height_follow_their_equations():
     v, a, before, change, later = (vector(p) for p in ("v", "a", "previous_a", "change", "next_v"))
     T, h = sp.symbols("cycle height", real=True)
     stated = v + change + T * (3 * a - before) / 2

@@ -127,7 +127,7 @@ def test_mountings_are_the_four_turns_about_the_vertical():
     assert [tuple(matrices[name][:2, 0]) for name in MOUNTINGS] == [(1, 0), (0, 1), (-1, 0), (0, -1)]
 
 
-def test_two_rows_do_what_all_three_do():
+def test_two_rows_agree_with_three():
     values = kernel(Choice("dcm-update-5")).expand()
     C = sp.Matrix(3, 3, [sp.Symbol(f"C_{i}{j}", real=True) for i in "123" for j in "123"])
     rows = {f"row_{i}_{axis}": C[i - 1, k] for i in (1, 2) for k, axis in enumerate("xyz")}
@@ -224,7 +224,7 @@ def test_error_feedback_keeps_a_slow_filter_from_standing_still():
     assert fed.rest <= 3 * fed.unit
 
 
-def test_the_study_in_every_format_and_what_it_refuses(tmp_path, capsys):
+def test_study_has_every_format_and_refuses_invalid_input(tmp_path, capsys):
     image = tmp_path / "filter.png"
     run(["study", "output-filter", "--backend", "numpy", "--format", "json", "--plot", str(image)])
     answer = json.loads(capsys.readouterr().out)
@@ -246,7 +246,7 @@ def test_the_study_in_every_format_and_what_it_refuses(tmp_path, capsys):
         assert reason in said
 
 
-def test_radial_error_rate_is_what_95_of_100_flights_stay_below(rng):
+def test_radial_error_rate_bounds_95_of_100_flights(rng):
     # 200,000 flights of 1 to 10 hours, whose errors grow with time: the part below has a deviation of 5e-4.
     times = rng.uniform(1, 10, 200_000)
     errors = np.hypot(*rng.normal(size=(2, 200_000))) * times
@@ -290,7 +290,7 @@ def test_a_value_comes_back_within_half_a_quantum(name, value, bits):
         assert abs(back) <= one.range and abs(back) >= min(abs(value), one.range) - one.quantum(bits)
 
 
-def test_what_has_no_accuracy_or_no_bits_is_refused():
+def test_outputs_without_accuracy_or_bits_are_refused():
     with pytest.raises(InputError, match="no printed accuracy"):
         OUTPUT_WORDS["inertial_altitude"].bits()
     with pytest.raises(InputError, match="more than 32 bits"):

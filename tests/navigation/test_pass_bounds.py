@@ -208,7 +208,7 @@ def two_words(limit: str) -> Description:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_stage_refuses_what_lies_beyond_its_word(sign):
+def test_stage_refuses_values_beyond_its_word(sign):
     """A sum of 1.4 m/s is rescaled to the end of the word, 1, which lies beyond the range."""
     runner = system_runner(two_words("0.999"), "fixed-model", Settings())
     memory = runner.begin()
@@ -225,7 +225,7 @@ def test_range_that_ends_with_its_word_is_refused_on_a_wire_that_may_hold_more()
         fitted(two_words("0.99995"), "fixed-model", Settings())
 
 
-def test_what_a_word_holds_is_told_to_the_last_integer():
+def test_range_of_a_word_is_exact():
     argument = fitted(described(attitude(16), gyro=GYRO), "fixed-model", Settings()).arguments["step_state"]
     here = replace(argument, format=Format(16, 14))
     top = (1 << 15) - 1
@@ -344,7 +344,7 @@ LIMITS = dict.fromkeys("xyz", Fraction(1))
 ERROR = (Fraction(1, 1000),)
 
 
-def test_length_of_what_may_be_zero_moves_with_its_parts():
+def test_length_of_possibly_zero_vector_moves_with_its_parts():
     """Its root has no derivative at zero: from (0, 0) the length moves by as much as one of its parts."""
     length = program(lambda x, y, z: sympy.sqrt(x**2 + y**2) + z)
     assert moved(length, LIMITS, {"x": ERROR})["result"] == ERROR
@@ -352,7 +352,7 @@ def test_length_of_what_may_be_zero_moves_with_its_parts():
     assert length.run({"x_1": 1e-3, "y_1": 0.0, "z_1": 0.0}, float)["result"] == [1e-3]
 
 
-def test_root_of_what_may_be_zero_and_is_no_length_has_no_bound():
+def test_root_of_possibly_zero_number_has_no_bound():
     root = program(lambda x, y, z: sympy.sqrt(sympy.Max(x, 0)) + y * z)
     with pytest.raises(InputError, match=r"the radicand in .* may be zero"):
         moved(root, LIMITS, {"x": ERROR})
@@ -366,7 +366,7 @@ def test_comparison_that_an_error_may_turn_has_no_bound(name):
         moved(selected, LIMITS, {name: ERROR})
 
 
-def test_comparison_of_what_may_be_equal_has_no_bound():
+def test_comparison_of_possibly_equal_values_has_no_bound():
     """x >= y + 2 holds for an x of 1 and a y of -1 alone."""
     selected = program(lambda x, y, z: sympy.Piecewise((z, x >= y + 2), (-z, True)))
     with pytest.raises(InputError, match="may turn a comparison"):

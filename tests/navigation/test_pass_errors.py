@@ -264,7 +264,7 @@ def test_loops_of_two_speeds_stay_below_their_bounds_and_come_near(algorithm, wo
 
 
 @pytest.mark.parametrize(("words", "formats"), [((16, 32), {}), ((32,), {"angle_sum": "Q9.22"})], ids=str)
-def test_worst_pass_in_c_stores_what_the_model_stores(words, formats):
+def test_worst_pass_in_c_agrees_with_the_model(words, formats):
     """In a cycle where all rates fall together, with values that are rescaled between words, or inside one."""
     stages = [stage | ({"formats": formats} if stage["name"] == "slow" else {}) for stage in TABLES["stage"]]
     system = with_words(wired(parsed(TABLES | {"stage": stages}, "chain")), itertools.cycle(words))
@@ -289,7 +289,7 @@ def memory_of(passes: Passes, cycle: int) -> SystemMemory:
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_worst_cycles_of_two_speeds_in_c_store_what_the_model_stores(algorithm):
+def test_worst_two_speed_cycles_in_c_agree_with_the_model(algorithm):
     settings = Settings(word=16, rounding="truncation", carry="full")
     passes = PassErrors(SystemRunner(two_speeds(algorithm, 1, settings), "fixed-model"))
     _, worst, _ = search(passes, "nav_velocity_change", 12, 4, 1)

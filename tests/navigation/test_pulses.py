@@ -39,7 +39,7 @@ def test_the_numbers(acceleration, raw, dk1, out, miss):
 
 @pytest.mark.long
 @pytest.mark.parametrize("positive", [True, False])
-def test_what_the_compensation_leaves_is_the_stated_property(positive):
+def test_compensation_error_has_the_stated_size(positive):
     count, cycle, bias, offset, scale, plus, minus = SYMBOLS
     polar = plus if positive else minus
     increment = sp.Symbol("increment", real=True)

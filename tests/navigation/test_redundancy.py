@@ -359,7 +359,7 @@ def test_parity_at_rest_becomes_a_bias_that_no_equation_sees(rng):
 
 
 @pytest.mark.long
-def test_every_kernel_says_what_is_printed_derived_or_lost():
+def test_every_kernel_names_printed_derived_and_lost_parts():
     for name in REDUNDANCY:
         source = strapgen.derive(name).source
         assert "Sebring" in source and "derived" in source, name
@@ -511,7 +511,7 @@ def test_a_geometry_becomes_code_and_tables(tmp_path, monkeypatch, capsys):
         ("study redundancy --backend exact", "backend"),
     ],
 )
-def test_what_cannot_be_studied_is_refused_in_one_line(command, reason, tmp_path, monkeypatch, capsys):
+def test_invalid_studies_are_refused_in_one_line(command, reason, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("flat.toml").write_text("axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 2, 0]]")
     Path("acc.toml").write_text(

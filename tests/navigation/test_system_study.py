@@ -132,7 +132,7 @@ def test_the_command_prints_differences(capsys):
         (["--backend", "c-fixed8"], "backend 'c-fixed8' is not known"),
     ],
 )
-def test_what_does_not_go_is_said_in_one_line(options, message, capsys):
+def test_invalid_runs_get_one_line(options, message, capsys):
     run(["study", "system", EXAMPLE, *options], 2)
     error = capsys.readouterr().err
     assert message in error

@@ -144,7 +144,7 @@ def test_outputs_along_a_recording_stand_at_the_slowest_of_their_rates(rng):
     np.testing.assert_array_equal(rows["nav_velocity_change"], course.values["nav_velocity_change"])
 
 
-def test_what_cannot_run_is_refused_by_name(counting, tmp_path):
+def test_systems_that_cannot_run_are_refused_by_name(counting, tmp_path):
     runner = system_runner(counting)
     with pytest.raises(InputError, match=r"0.03 s are no whole number of cycles of the slowest rate, 0.02 s"):
         cycles_of(counting.system, Fraction(3, 100))

@@ -86,7 +86,7 @@ def test_the_steady_state_of_the_kernel_is_in_closed_form():
         ),
     ],
 )
-def test_other_sets_miss_what_is_printed(changes, missed, value):
+def test_other_constants_miss_the_printed_figures(changes, missed, value):
     loop = replace(TorqueLoop(), **changes)
     ratio = loop.lag_s * loop.cycle_hz
     feedback = loop.gain * loop.pulse_arcsec / loop.quantum_arcsec * ratio  # Kf of the derivation

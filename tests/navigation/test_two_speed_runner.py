@@ -246,7 +246,7 @@ def test_no_angle_is_lost_to_the_format_of_increments():
     assert abs(turned - angles[:, 2].sum()) <= 8 * unit
 
 
-def test_what_leaves_its_range_is_refused():
+def test_values_out_of_range_are_refused():
     for name in ("c-fixed32", "fixed-model"):
         runner = made("dcm", 2, name)
         with pytest.raises(InputError, match=r"refuses its input"):
@@ -266,7 +266,7 @@ def test_what_leaves_its_range_is_refused():
         ({"initial": np.eye(2)}, "initial"),
     ],
 )
-def test_what_does_not_fit_is_told(given, said):
+def test_mismatched_shapes_are_refused(given, said):
     wanted = {"increments": np.zeros((4, 3)), "velocity_increments": np.zeros((4, 3)), "fast_cycles": 2}
     wanted |= {"slow_cycles": 2} | given
     with pytest.raises((InputError, InputTypeError), match=said) as caught:
@@ -312,7 +312,7 @@ def test_the_whole_compiles_without_a_warning(target, tmp_path):
     subprocess.run(["gcc", *STRICT, "-c", *code], cwd=tmp_path, check=True)
 
 
-def test_a_run_in_c_goes_on_from_its_memory(rng):
+def test_run_in_c_continues_from_its_memory(rng):
     # Twice two navigation cycles are four; null pointers and no cycles are refused.
     angles, velocities, turns = noisy(48, rng)
     runner = made("dcm", 2, "c")
@@ -387,7 +387,7 @@ def test_null_pointers_are_refused():
 @pytest.mark.parametrize(
     ("name", "partner"), [("increment", "previous_increment"), ("turn", "previous_turn")]
 )
-def test_what_is_handed_on_has_the_range_of_what_it_was(name, partner):
+def test_passed_values_keep_their_ranges(name, partner):
     fixed = {
         argument.signal.name: argument
         for loop in loops("dcm", 2, "c-fixed", Settings(ranges={name: Fraction(1, 2)}))

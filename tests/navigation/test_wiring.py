@@ -81,7 +81,7 @@ def test_a_step_collects_increments_of_the_faster_rate(attitude):
     assert gyro.bound == Fraction(1, 50)
 
 
-def test_what_is_recorded_is_stated_or_what_no_stage_reads(two, attitude):
+def test_recorded_outputs_are_stated_or_unread(two, attitude):
     assert attitude.outputs == ("step_state", "turned_transformed")
     assert two.outputs == ("slow_state", "navigation_velocity_change")
 

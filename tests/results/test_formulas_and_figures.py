@@ -171,7 +171,7 @@ def test_a_program_reads_back_as_the_kernel():
     assert found == expected["next"]
 
 
-def test_what_no_line_holds_gets_a_letter_of_its_own():
+def test_long_expressions_get_letters():
     """A letter stands for the same expression in all formulas, and its own formula comes before them."""
     text = formulas.elements_latex(pipeline.derive("euler", "crouch-grossman3", 2))
     rows = [row for row in text.splitlines() if " &= " in row]
@@ -250,7 +250,7 @@ def test_colours_from_dark_to_light_show_on_white_and_on_black():
         assert contrast(on_dark(colour), DARK_PAPER) > TEXT
 
 
-def test_a_picture_says_what_each_of_its_colours_is_on_black():
+def test_picture_maps_each_colour_for_dark_pages():
     pytest.importorskip("matplotlib")
     figure, grid = figures.grid_of_axes(1, 1, (2, 2))
     grid[0, 0].plot([0, 1], [1, 2], color=figures.COLOURS[1])

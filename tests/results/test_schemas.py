@@ -119,7 +119,7 @@ def answer(line: str, capsys) -> str:
 
 
 @pytest.mark.parametrize("line", COMMANDS)
-def test_json_is_what_its_schema_says(line, capsys, monkeypatch, tmp_path):
+def test_json_meets_its_schema(line, capsys, monkeypatch, tmp_path):
     name = COMMANDS[line]
     monkeypatch.chdir(ROOT / "examples/variants" if name == "build" else ROOT)
     if name == "cost" and which("arm-none-eabi-gcc") is None:
@@ -143,7 +143,7 @@ def test_every_result_is_printed_by_a_command_above():
 
 
 @pytest.mark.parametrize("name", RESULTS)
-def test_every_schema_is_one_and_stands_in_docs(name):
+def test_every_schema_is_valid_and_in_docs(name):
     schema = SCHEMAS[name].read()
     Draft202012Validator.check_schema(schema)
     assert json.loads((ROOT / "docs" / "schemas" / f"{name}.json").read_text()) == schema
@@ -165,7 +165,7 @@ def test_numbers_have_the_units_that_their_names_end_with():
     assert not [one for k, one in enumerate(ends) for long in ends[k + 1 :] if long.endswith(f"_{one}")]
 
 
-def test_a_name_that_is_none_is_told(capsys):
+def test_invalid_name_is_reported(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["schema", "comparisons"])
     said = capsys.readouterr()

@@ -186,7 +186,7 @@ def test_flags_of_the_environment_do_not_reach_the_compiler(sources, root, monke
     assert compiler.load(sources).lib.euler_normalize
 
 
-def test_a_compiler_that_fails_is_told_in_one_line(sources, root, monkeypatch, capfd):
+def test_failing_compiler_is_reported_in_one_line(sources, root, monkeypatch, capfd):
     monkeypatch.setenv("CC", "cc -no-such-flag-at-all")
     with pytest.raises(CompilerError, match=r"cc failed on strapgen_\w+: .*error.*no-such-flag-at-all"):
         compiler.load(sources)
@@ -235,7 +235,7 @@ def test_many_sources_become_one_module_in_one_command(many, counting, root, mon
             assert function.module.__file__ != alone.module.__file__
 
 
-def test_what_is_there_is_not_compiled_again(many, counting):
+def test_existing_modules_are_not_compiled_again(many, counting):
     first = many[0]
     compiler.load(first)
     calls = counting()

@@ -61,7 +61,7 @@ def test_the_back_end_is_the_reference_on_every_record(algorithm, rng):
 
 
 @pytest.mark.parametrize("backend_name", ["numpy", "exact"])
-def test_what_floating_point_makes_no_number_is_none_in_many_digits(backend_name):
+def test_nan_in_floating_point_is_nan_in_many_digits(backend_name):
     """A zero quaternion has no direction: its length divides by zero, and nothing raises."""
     normalize = strapgen.evaluator("euler-normalize", backend_name)
     with np.errstate(all="ignore"):
@@ -70,7 +70,7 @@ def test_what_floating_point_makes_no_number_is_none_in_many_digits(backend_name
     np.testing.assert_array_equal(states[1], [0, 0, 0, 1])
 
 
-def test_a_run_that_divides_by_zero_goes_on_as_no_number():
+def test_run_with_division_by_zero_continues_as_nan():
     backend = strapgen.backend("euler", "rk1", backend="exact")
     states = backend.propagate(np.zeros((4, 2, 3)), orthonormalize_every=2, initial=np.zeros(4))
     np.testing.assert_array_equal(states[:2], np.zeros((2, 4)))

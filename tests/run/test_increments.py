@@ -20,7 +20,7 @@ from strapgen.run.increments import pulses, windows
     arrays(np.float64, (7, 2, 3), elements=st.floats(-0.1, 0.1)),
     st.floats(1e-6, 0.05),
 )
-def test_pulses_are_whole_and_carry_what_is_left(increments, size):
+def test_pulses_are_whole_and_carry_the_remainder(increments, size):
     given_ = pulses(increments, size)
     assert given_.shape == increments.shape
     counts = given_ / size

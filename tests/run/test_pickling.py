@@ -40,9 +40,7 @@ def increments(rng) -> np.ndarray:
     ("algorithm", "orthonormalization"),
     [("euler", None), ("dcm", "dcm-orthonormalize-first-order"), (FILE, None), (FILE, "mend")],
 )
-def test_a_copy_runs_bit_for_bit_like_what_it_was_copied_from(
-    name, algorithm, orthonormalization, increments
-):
+def test_copy_runs_bit_for_bit_like_the_original(name, algorithm, orthonormalization, increments):
     backend = strapgen.backend(algorithm, "rk2", backend=name, orthonormalization=orthonormalization)
     copy = copied(backend)
     assert (type(copy), copy.name, copy.kernel, copy.sources) == (
@@ -89,7 +87,7 @@ def test_a_back_end_that_was_built_by_hand_can_be_copied(increments):
 
 
 @pytest.mark.long
-def test_a_copy_refuses_what_the_back_end_refuses(increments):
+def test_copy_refuses_as_the_back_end(increments):
     backend = strapgen.backend(catalogue.choose(str(ALGORITHMS / "mrp.py")))
     with pytest.raises(InputError, match="has nothing to orthonormalize its state with"):
         copied(backend).propagate(increments, 1, 4)
@@ -107,7 +105,7 @@ def test_a_pool_of_processes_runs_back_ends(rng):
 
 
 @pytest.mark.long
-def test_what_arrives_needs_no_computer_algebra(tmp_path, increments):
+def test_unpickling_needs_no_computer_algebra(tmp_path, increments):
     backend = strapgen.backend(FILE, backend="numpy")
     (tmp_path / "backend.pickle").write_bytes(pickle.dumps(backend))
     np.save(tmp_path / "increments.npy", increments)

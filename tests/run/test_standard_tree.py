@@ -118,7 +118,7 @@ def readme_lists_the_operations(readme: str, listed: Iterable[Program]) -> None:
     assert rows == expected
 
 
-def test_the_files_of_a_few_kernels_say_which_command_made_them_and_what_they_cost():
+def test_files_name_their_command_and_cost():
     files_say_which_command_made_them(few())
     readme_lists_the_operations(few()["README.md"], map(lowered, FEW))
 
@@ -197,7 +197,7 @@ def test_check_as_json(folder, capsys):
     assert data["difference"].startswith("--- /dev/null\n+++ c/euler_rk4_2.c\n")
 
 
-def test_what_importing_leaves_behind_is_overlooked(folder, capsys):
+def test_bytecode_folders_are_ignored(folder, capsys):
     (folder / "numpy" / "__pycache__").mkdir()
     (folder / "numpy" / "__pycache__" / "euler_rk4_2.cpython-311.pyc").write_bytes(b"\x00")
     assert command(capsys, *CHECK, str(folder))[0] == 0
@@ -216,7 +216,7 @@ def test_the_diff_is_a_patch(folder, capsys, tmp_path):
 # Writing it
 
 
-def test_writing_rebuilds_what_is_out_of_step(folder, capsys):
+def test_writing_rebuilds_outdated_files(folder, capsys):
     path = folder / "c" / "euler_rk4_2.c"
     path.write_text(path.read_text().replace("1.5", "1.25"))
     (folder / "numpy" / "euler_rk4_2.py").unlink()
@@ -225,7 +225,7 @@ def test_writing_rebuilds_what_is_out_of_step(folder, capsys):
     assert contents(folder) == few()
 
 
-def test_what_the_catalogue_costs_stands_beside_it(folder, capsys):
+def test_catalogue_has_its_cost_page(folder, capsys):
     (folder / "COST.md").write_text("measured\n")
     assert command(capsys, *CHECK, str(folder))[0] == 0
     assert command(capsys, "generate", "--all", "--out", str(folder))[0] == 0

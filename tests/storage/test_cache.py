@@ -84,7 +84,7 @@ def test_failing_fill_leaves_nothing(root, error):
     assert names(root / "kind" / "key") == ["file", "manifest.json"]
 
 
-def test_full_disk_is_told_in_words(root):
+def test_full_disk_is_reported(root):
     def fill(draft: Path) -> None:
         write("half")(draft)
         raise OSError(28, "No space left on device")
@@ -276,7 +276,7 @@ def test_an_entry_in_use_is_not_pruned(root):
     assert "old" not in names(root / "kind")
 
 
-def test_a_user_without_a_home_folder_is_told_what_to_set(monkeypatch):
+def test_missing_home_folder_names_the_variable(monkeypatch):
     def unknown(_user):
         raise KeyError
 
@@ -331,7 +331,7 @@ def test_an_entry_that_another_process_removes_at_once_is_made_again(root, times
 
 
 @pytest.mark.parametrize("kind", ["programs", "sources", "builds"])
-def test_what_others_remove_while_it_is_read_is_made_again(kind, root, monkeypatch):
+def test_entries_removed_during_a_read_are_made_again(kind, root, monkeypatch):
     for name in ("_loaded", "_modules"):
         monkeypatch.setattr(compiler, name, {})
     monkeypatch.setattr(cache, "_results", {})
@@ -374,7 +374,7 @@ def doubled():
     return double, calls
 
 
-def test_a_result_is_worked_out_once_for_each_key(doubled, root, caplog):
+def test_result_is_computed_once_for_each_key(doubled, root, caplog):
     double, calls = doubled
     caplog.set_level("INFO", "strapgen")
     assert [double(3), double(3), double(4), double(3, ("x",))] == [
@@ -513,7 +513,7 @@ def test_a_temporary_folder_is_gone_when_the_program_ends_or_the_next_one_runs(r
 
 
 @pytest.mark.parametrize("umask", [0o000, 0o002, 0o077])
-def test_what_is_made_is_the_user_s_alone_whatever_the_umask(root, umask, monkeypatch, warnings):
+def test_created_folders_are_private_under_any_umask(root, umask, monkeypatch, warnings):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(root / "deep" / "er"))
     before = os.umask(umask)
     try:

@@ -125,7 +125,7 @@ def test_a_file_that_exists_keeps_its_permissions(mode, tmp_path):
     assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("y", mode)
 
 
-def test_what_replaces_a_private_file_is_private_before_it_is_whole(tmp_path, monkeypatch):
+def test_replacement_of_a_private_file_is_private_from_the_start(tmp_path, monkeypatch):
     path = write_file(tmp_path / "a", "x")
     path.chmod(0o600)
     modes = []
@@ -238,7 +238,7 @@ def forgotten(folder: Path, *names: str) -> Path:
 
 
 @pytest.mark.parametrize("where", [".", "deep/er"])
-def test_what_a_killed_process_left_is_removed(tmp_path, where):
+def test_leftovers_of_killed_processes_are_removed(tmp_path, where):
     place = forgotten(tmp_path / where, "0", "1", "17")
     write_files(tmp_path, FILES)
     assert not place.exists()
@@ -313,7 +313,7 @@ def test_a_draft_is_private_and_gone_after_the_block(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_renamed_stays(tmp_path):
+def test_renamed_folders_stay(tmp_path):
     with drafts.draft_folder(tmp_path, ".draft-") as place:
         (place / "file").write_text("x")
         place.rename(tmp_path / "whole")
@@ -372,8 +372,8 @@ def test_where_there_are_no_locks_age_decides(tmp_path, monkeypatch, age, is_for
 
 
 def test_a_draft_that_another_process_takes_at_once_is_made_again(tmp_path, monkeypatch):
-    locked, answers = drafts._locked, [None, None]
-    monkeypatch.setattr(drafts, "_locked", lambda place: answers.pop() if answers else locked(place))
+    locked, answers = drafts._lock, [None, None]
+    monkeypatch.setattr(drafts, "_lock", lambda place: answers.pop() if answers else locked(place))
     with drafts.draft_folder(tmp_path, ".draft-") as place:
         assert list(tmp_path.iterdir()) == [place]
 
@@ -390,7 +390,7 @@ def test_a_temporary_folder_of_a_killed_process_is_removed_by_the_next_one(tmp_p
 
 
 def test_a_busy_folder_is_an_error_and_no_endless_loop(tmp_path, monkeypatch):
-    monkeypatch.setattr(drafts, "_locked", lambda _: None)
+    monkeypatch.setattr(drafts, "_lock", lambda _: None)
     with pytest.raises(OSError, match="busy"), drafts.draft_folder(tmp_path, ".draft-"):
         raise AssertionError
     assert list(tmp_path.iterdir()) == []

@@ -46,7 +46,7 @@ def read(place: Path, parts: int = 1) -> bytes:
         return opened.read("file")
 
 
-def test_what_is_the_user_s_alone_is_read(folder):
+def test_private_files_are_read(folder):
     assert read(folder) == read(folder, 2) == b"text"
     with private_folder(folder) as opened:
         assert opened.names() == ["file"]
@@ -95,7 +95,7 @@ def test_no_link_leads_to_a_private_folder(folder, tmp_path):
 
 @as_root
 @pytest.mark.parametrize("whose", ["file", ".", ".."])
-def test_what_belongs_to_another_user_is_refused(folder, whose):
+def test_files_of_other_users_are_refused(folder, whose):
     os.chown(folder / whose, STRANGER, -1)
     with pytest.raises(ForeignFileError, match="belongs to another user"):
         read(folder)
@@ -196,7 +196,7 @@ def test_a_folder_that_the_user_s_group_writes_is_private_if_the_group_is_the_us
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system has no paths to open files")
-def test_a_path_to_an_open_file_leads_to_it_whatever_stands_in_its_place(folder):
+def test_path_to_an_open_file_survives_replacement(folder):
     with private_folder(folder) as opened, opened.opened("file") as descriptor:
         paths = [ownership.path_of(descriptor, folder / "file") for _ in range(20)]
         (folder / "file").unlink()

@@ -40,7 +40,7 @@ def test_sources_are_those_of_the_pipeline():
         assert pipeline.compile(choice, target) == strapgen.generate(program, target)
 
 
-def test_what_a_user_does_to_the_files_changes_no_sources_of_others():
+def test_changed_files_leave_other_sources_alone():
     sources = pipeline.compile(catalogue.choose("euler-product"), "numpy")
     files, operations = {**sources.files}, {**sources.operations}
     sources.files.clear()
@@ -56,7 +56,7 @@ def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):
     assert (pipeline.compile(choice, "numpy"), pipeline.fixed_program(choice)) == first
 
 
-def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, tmp_path):
+def test_process_keeps_the_last_used_entries(monkeypatch, tmp_path):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(cache, "_results", {})
     monkeypatch.setattr(cache, "_MOST_RESULTS", 2)
@@ -68,7 +68,7 @@ def test_a_process_remembers_so_many_entries_those_of_the_last_use(monkeypatch, 
 
     monkeypatch.setattr(cache, "stored", noted)
     for key in ("a", "b", "a", "c", "a", "b"):
-        assert cache._remembered("kind", [key], "", lambda key=key: key, False) == key
+        assert cache._load("kind", [key], "", lambda key=key: key, False) == key
     assert asked == ["a", "b", "c", "b"]
 
 

@@ -30,7 +30,7 @@ from strapgen.kernel.kernel import Kernel
 from strapgen.run.backends import of_sources
 from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
 from strapgen.storage import resources
-from strapgen.targets.c_fixed import _noted
+from strapgen.targets.c_fixed import _with_comment
 
 #: Steps of Cayley-Klein parameters are those of Euler parameters under other names, which tests/lowering proves.
 CHOICES = [choice for choice in FIXED_POINT if not (choice.method and choice.name == "cayley-klein")]
@@ -127,7 +127,7 @@ def test_a_widened_input_is_refused_and_nothing_is_touched():
                 assert (list(out) == [5] * 4 and list(residuals) == [7] * 8) == refused
 
 
-def test_what_is_refused_on_the_way_leaves_outputs_and_residuals_alone(rng):
+def test_refused_calls_leave_outputs_and_residuals_alone(rng):
     in_c, _ = pair(Choice("dcm-orthonormalize-second-order"), Settings(16, carry="full"))
     ffi, call = in_c.module.ffi, getattr(in_c.module.lib, in_c.function.name)
     (argument,) = in_c.interface.inputs
@@ -214,13 +214,13 @@ def test_strict_compilers_are_silent(word, methods, tmp_path):
         assert not done.returncode, done.stderr
 
 
-def test_a_note_stands_behind_a_statement_as_long_as_the_line_has_room():
+def test_note_follows_a_statement_if_the_line_has_room():
     """A function indents by 4, so that 95 of its own are 99 of the file."""
     statement, end = "x = y;", " /* note */"
     for width in (95, 96):
         padded = statement.rjust(width - len(end))
-        assert _noted(padded, "note") == padded + (end if width == 95 else f"\n       {end}")
-    assert _noted(f"{'x' * 95}\n{statement}", "note") == f"{'x' * 95}\n{statement}{end}", (
+        assert _with_comment(padded, "note") == padded + (end if width == 95 else f"\n       {end}")
+    assert _with_comment(f"{'x' * 95}\n{statement}", "note") == f"{'x' * 95}\n{statement}{end}", (
         "the last line counts"
     )
 

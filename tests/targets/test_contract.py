@@ -59,7 +59,7 @@ def test_limits_of_an_argument_are_rounded_outward():
     )
 
 
-def test_a_value_tells_its_format_and_its_range_outward_and_its_error_upward():
+def test_value_rounds_range_outward_and_error_upward():
     """Of integers from -7 to 1001 in Q5.10 the range is -0.0068359... to 0.97753..., rounded away from each other."""
     value = Value("x", IntegerSum(()), 10, False, -7, 1001, Fraction(0), Fraction(1, 999), 1001)
     assert value_text(value, 16) == "Q5.10, -0.00684 .. 0.978, error 0.0011"
@@ -203,7 +203,7 @@ def test_a_header_without_a_contract_has_none():
 
 
 @pytest.mark.parametrize("digits", [2, 3, 6])
-def test_numbers_of_a_header_are_rounded_away_from_what_they_bound(digits):
+def test_header_bounds_are_rounded_to_the_safe_side(digits):
     rng = np.random.default_rng(1969)
     drawn = [Fraction(int(a), int(b)) for a, b in rng.integers(1, 1 << 40, (200, 2))]
     for size in (*drawn, *(x / (1 << 60) for x in drawn), *(x * 10**20 for x in drawn), Fraction(7, 1000)):
@@ -234,7 +234,7 @@ def test_every_header_has_a_line_on_rounding_beside_the_operations(target):
 
 @pytest.mark.long
 @pytest.mark.parametrize("number", ["double", "float"])
-def test_the_text_says_no_less_than_what_is_proved(number):
+def test_header_text_has_all_proved_bounds(number):
     for name in programs():
         bounds, text = said(name, number)
         for output, worst in bounds.worst.items():
@@ -254,7 +254,7 @@ def test_the_text_of_a_step_is_a_bound_of_runs():
 
 
 @pytest.mark.long
-def test_all_conditions_are_told():
+def test_all_conditions_are_reported():
     assert "from 0.75 to 1.34375" in said("euler-normalize")[1]
     assert "sin of the C library within 1 ulp" in said("dcm-update")[1]
     for name in programs():
@@ -264,7 +264,7 @@ def test_all_conditions_are_told():
             assert all(condition.value in text for condition in (*bounds.inputs, *bounds.conditions))
 
 
-def test_what_has_no_error_or_no_bound_says_so():
+def test_missing_errors_and_bounds_are_stated():
     assert said("euler-from-cayley-klein")[1] == "none; every output is exact"
     assert said("euler-from-dcm")[1].startswith("no bound: rounding may turn a comparison")
 

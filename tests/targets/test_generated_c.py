@@ -343,7 +343,7 @@ def test_external_names_of_the_catalogue_differ_in_the_31_characters_that_c99_pr
     assert [start for start, count in Counter(name[:31] for name in names).items() if count > 1] == []
 
 
-def test_a_kernel_of_a_user_s_that_has_the_short_name_of_another_is_told_apart():
+def test_user_kernels_with_equal_short_names_differ():
     catalogued = [kernel.replace("-", "_") for kernel in KERNELS]
     shortened = [external(name) for name in catalogued if external(name) != name]
     assert "dcm_orth_optimal" in shortened

@@ -53,7 +53,7 @@ def lists(values: np.ndarray) -> list[float] | float:
 
 
 @pytest.mark.long
-def test_the_example_computes_what_numpy_does(toy, rng):
+def test_example_agrees_with_numpy(toy, rng):
     """Bit for bit, but where the sines of two libraries are rounded differently."""
     with_sines = 0
     for choice in filter(tells_more, catalogue.standard()):
@@ -172,7 +172,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("fault", BROKEN)
-def test_a_broken_target_is_told_in_one_line_when_it_is_used_or_listed(fault, site, capsys):
+def test_broken_target_is_reported_in_one_line(fault, site, capsys):
     text, line = BROKEN[fault]
     if text is not None:
         (site / "broken.py").write_text(text)
@@ -234,7 +234,7 @@ def test_a_name_in_two_packages(site):
         strapgen.generate(program(EULER), "mine")
 
 
-def test_a_name_that_nobody_has(toy):
+def test_unknown_name_is_refused(toy):
     with pytest.raises(InputError, match=r"^target 'fortran' is not known; allowed: numpy, .* shows all$"):
         strapgen.generate(program(EULER), "fortran")
 

@@ -41,7 +41,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("language", SECTIONS)
-def test_the_program_of_a_language_prints_what_the_page_says(language, workplace):
+def test_program_of_a_language_prints_the_text_of_the_page(language, workplace):
     try:
         compiler = COMPILERS[language]
         compiler.path()
@@ -55,7 +55,7 @@ def test_the_program_of_a_language_prints_what_the_page_says(language, workplace
     assert f"It prints `{said.stdout.strip()}`" in section
 
 
-def test_the_script_in_matlab_prints_what_the_page_says(workplace):
+def test_matlab_script_prints_the_text_of_the_page(workplace):
     if reason := octave.missing():
         pytest.skip(reason)
     section = PAGE.partition("\n## MATLAB and GNU Octave\n")[2].partition("\n## ")[0]

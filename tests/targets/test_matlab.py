@@ -137,7 +137,7 @@ def foreign(text: str) -> set[str]:
     return set(re.findall(r"(?<![\w.])[A-Za-z]\w*", plain)) - held - WORDS
 
 
-def test_the_text_keeps_to_what_matlab_and_octave_have_in_common():
+def test_text_is_valid_in_matlab_and_octave():
     """No MATLAB is at hand here: neither an operator nor a word of Octave alone stands in the text, and no toolbox."""
     calls: set[str] = set()
     for choice in [*catalogue.standard()[::4], *(catalogue.choose(*words) for words in DOUBLE)]:
@@ -197,7 +197,7 @@ def test_the_command_generates_names_and_checks(tmp_path, monkeypatch, capsys):
     )
 
 
-def test_functions_of_one_name_are_told_apart(has_octave):
+def test_functions_of_one_name_are_distinguished(has_octave):
     sources = sources_of(catalogue.choose("euler-normalize"))
     (name, text), *_ = sources.files.items()
     negative = replace(sources, files={name: re.sub(r"next = \[(.*)\];", r"next = -[\1];", text)})
@@ -215,7 +215,7 @@ def test_functions_of_one_name_are_told_apart(has_octave):
         ("next = [", "next = ([", "parse error"),
     ],
 )
-def test_what_octave_refuses_is_told_in_one_line(has_octave, old, new, reason):
+def test_octave_errors_are_reported_in_one_line(has_octave, old, new, reason):
     sources = sources_of(catalogue.choose("euler-normalize"))
     broken = replace(sources, files={name: text.replace(old, new) for name, text in sources.files.items()})
     with pytest.raises(CompilerError, match="Octave failed on euler-normalize: ") as caught:

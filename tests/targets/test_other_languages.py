@@ -253,7 +253,7 @@ def test_fused_operations_and_fast_mathematics_are_refused(tmp_path):
     assert "operations must round to double" in said.stderr
 
 
-def test_a_constant_stands_in_one_line_with_its_comment_or_below_it_up_to_the_width():
+def test_comment_of_a_constant_fits_the_width():
     def lines(value: str, meaning: str) -> list[str]:
         (text,) = constants([Macro("ONE", value, meaning, "int")])
         return text.split("\n")
@@ -268,7 +268,7 @@ def test_a_constant_stands_in_one_line_with_its_comment_or_below_it_up_to_the_wi
         assert lines(value, "one") == [comment, *broken]
 
 
-def test_what_calls_the_library_is_no_constant_expression():
+def test_library_calls_are_no_constant_expressions():
     header = pipeline.compile(catalogue.choose("euler-normalize"), "cpp").files["euler_normalize.hpp"]
     assert "constexpr std::array<double, 4> euler_normalize" not in header
     assert "inline std::array<double, 4> euler_normalize" in header
@@ -312,7 +312,7 @@ def test_a_program_that_is_missing_is_named_in_one_line(backend, variable, said,
         pytest.param("rust", "unsafe { sqrt(", "error", marks=pytest.mark.needs("rustc")),
     ],
 )
-def test_what_does_not_compile_is_told_in_one_line(target, call, said):
+def test_compiler_errors_are_reported_in_one_line(target, call, said):
     sources = pipeline.compile(catalogue.choose("euler-normalize"), target)
     broken = {
         name: text.replace(call, call.replace("sqrt", "sqroot")) for name, text in sources.files.items()

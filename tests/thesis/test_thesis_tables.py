@@ -251,7 +251,7 @@ def test_marks_are_explained_where_they_stand():
     assert "r round-off dominates" in text
 
 
-def test_a_note_stands_once_for_all_back_ends():
+def test_note_appears_once_for_all_back_ends():
     both = [*made("c", note="A repaired figure."), *made("d", note="A repaired figure of d.")]
     text = thesis_table_text(TABLE, both)
     assert text.count("A repaired figure.") == len(ALGORITHMS) * len(ORDERS)

@@ -143,7 +143,7 @@ def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] 
         rest -= sum(
             (x * lower.get(power + begin - other, sp.S.Zero) for other, x in leading.items()), sp.S.Zero
         )
-        value = _reduced(sp.expand(rest), lower[begin])
+        value = _reduce(sp.expand(rest), lower[begin])
         if value:
             leading[power] = value
     return dict(list(leading.items())[:terms])
@@ -158,7 +158,7 @@ def _parallel(vector: Sequence[sp.Expr], direction: Sequence[sp.Expr], place: in
     )
 
 
-def _reduced(upper: sp.Expr, lower: sp.Expr) -> sp.Expr:
+def _reduce(upper: sp.Expr, lower: sp.Expr) -> sp.Expr:
     """Return a quotient as a number if it is one, otherwise in lowest terms and factored unless it is too long."""
     if not upper:
         return sp.S.Zero

@@ -1,4 +1,4 @@
-"""A choice says which kernel to derive: `choose` returns it, and all later stages take it."""
+"""A `Choice` selects the kernel to derive: `choose` returns it, and all later stages take it."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ class _Head:
 
 
 class UserKernel:
-    """A user's kernel, whose formulas may lie in the cache; equal to one with the same formulas and arguments."""
+    """A user's kernel, loaded from the cache when needed; equal to one with the same formulas and arguments."""
 
     def __init__(self, head: _Head, restore: Callable[[], Kernel], arguments: str | None = None) -> None:
         self.head, self.arguments = head, arguments
@@ -267,7 +267,7 @@ class UserKernel:
 
 
 def packed(kernel: Kernel) -> bytes | None:
-    """Return the head of a kernel as bytes; None if they hold something of SymPy, which takes long to import."""
+    """Return the head of a kernel as bytes; None if it has SymPy objects, which are slow to import."""
     head = _Head.of(kernel)
     if b"sympy" in pickle.dumps(replace(head, text="")):
         return None

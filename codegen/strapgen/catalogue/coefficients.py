@@ -62,11 +62,11 @@ def number(what: str, value: Any) -> Number:
     if not isinstance(value, str):
         raise InputError(f'{what} is of type {type(value).__name__}; a string such as "9/44" is needed')
     try:
-        return _settled(_value(_parsed(value), value))
+        return _simplify(_value(_parse(value), value))
     except _NotAllowedError as error:
-        raise InputError(f"{what} is {_shown(value)}: {error}") from None
+        raise InputError(f"{what} is {_short(value)}: {error}") from None
     except RecursionError:
-        raise InputError(f"{what} is {_shown(value)}: it is nested too deeply") from None
+        raise InputError(f"{what} is {_short(value)}: it is nested too deeply") from None
 
 
 def short_text(value: Number) -> str:
@@ -79,12 +79,12 @@ def short_text(value: Number) -> str:
     return exact if len(exact) <= 40 else f"about {float(value):.9g}"
 
 
-def _shown(value: str) -> str:
+def _short(value: str) -> str:
     shown = repr(value)
     return shown if len(shown) <= 60 else f"{shown[:50]}..., {len(shown)} characters long"
 
 
-def _parsed(source: str) -> ast.expr:
+def _parse(source: str) -> ast.expr:
     if len(source) > MOST_CHARACTERS:
         raise _NotAllowedError(f"at most {MOST_CHARACTERS} characters are allowed")
     try:
@@ -113,7 +113,7 @@ def _value(node: ast.expr, source: str) -> Number:
         case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
             return _operation(node.op, _value(node.left, source), _value(node.right, source))
         case ast.Call(func=ast.Name(id="sqrt"), args=[argument], keywords=[]):
-            return root(_settled(_value(argument, source)))
+            return root(_simplify(_value(argument, source)))
     raise _NotAllowedError("numbers, + - * /, parentheses, whole powers with ** and sqrt are allowed")
 
 
@@ -123,7 +123,7 @@ def _literal(source: str) -> Fraction:
         raise _NotAllowedError(f"{source!r} is no number")
     if match[3] and abs(int(match[3])) > MOST_EXPONENT:
         raise _NotAllowedError(f"an exponent is at most {MOST_EXPONENT}")
-    return _bounded(Fraction(source))
+    return _check_size(Fraction(source))
 
 
 def _operation(operator: ast.operator, left: Number, right: Number) -> Number:
@@ -138,9 +138,9 @@ def _operation(operator: ast.operator, left: Number, right: Number) -> Number:
     else:
         result = left * right
     if isinstance(result, Fraction):
-        return _bounded(result)
+        return _check_size(result)
     # Products of sums are multiplied out at once, because a long product would take very long at the end.
-    return _settled(result) if isinstance(operator, ast.Mult) else result
+    return _simplify(result) if isinstance(operator, ast.Mult) else result
 
 
 def _power(base: Number, exponent: Number) -> Number:
@@ -148,19 +148,19 @@ def _power(base: Number, exponent: Number) -> Number:
         raise _NotAllowedError("a power must be whole; roots are written as sqrt")
     if abs(exponent) > MOST_EXPONENT:
         raise _NotAllowedError(f"a power is at most {MOST_EXPONENT}")
-    base = _settled(base)
+    base = _simplify(base)
     if exponent < 0:
         base, exponent = _inverse(base), -exponent
     if isinstance(base, Fraction):
         if max(base.numerator.bit_length(), base.denominator.bit_length()) * exponent > 2 * MOST_BITS:
             raise _NotAllowedError(f"numbers of over {MOST_BITS} binary digits are not allowed")
-        return _bounded(Fraction(base ** int(exponent)))
-    return _settled(base ** int(exponent))
+        return _check_size(Fraction(base ** int(exponent)))
+    return _simplify(base ** int(exponent))
 
 
 def _inverse(value: Number) -> Number:
     """Return the reciprocal of a number, with a rational denominator, since a zero could hide in an irrational one."""
-    value = _settled(value)
+    value = _simplify(value)
     if value == 0:
         raise _NotAllowedError("it divides by zero")
     if isinstance(value, Fraction):
@@ -168,7 +168,7 @@ def _inverse(value: Number) -> Number:
     from sympy.polys.constructor import construct_domain
 
     domain, (element,) = construct_domain([value], extension=True)
-    return _settled(domain.to_sympy(domain.one / element))
+    return _simplify(domain.to_sympy(domain.one / element))
 
 
 def root(square: Number) -> Number:
@@ -191,13 +191,13 @@ def _expression(value: Number) -> sp.Expr:
     return sp.Rational(value.numerator, value.denominator) if isinstance(value, Fraction) else value
 
 
-def _bounded(value: Fraction) -> Fraction:
+def _check_size(value: Fraction) -> Fraction:
     if max(value.numerator.bit_length(), value.denominator.bit_length()) > MOST_BITS:
         raise _NotAllowedError(f"numbers of over {MOST_BITS} binary digits are not allowed")
     return value
 
 
-def _settled(value: Number) -> Number:
+def _simplify(value: Number) -> Number:
     """Return a rational number as a `Fraction`, any other as a sum of multiples of roots; the decision is exact."""
     if isinstance(value, Fraction):
         return value
@@ -213,7 +213,7 @@ def _settled(value: Number) -> Number:
         domain, (element,) = construct_domain([value], extension=True)
         value = sp.expand(domain.to_sympy(element))
     for rational in value.atoms(sp.Rational):
-        _bounded(Fraction(rational.p, rational.q))
+        _check_size(Fraction(rational.p, rational.q))
     return Fraction(value.p, value.q) if value.is_Rational else value
 
 

@@ -29,14 +29,14 @@ def fold(kernel: Kernel, constants: Constants) -> Kernel:
     """
     if not constants:
         return kernel
-    signals = _checked(kernel, constants)
+    signals = _check(kernel, constants)
     values = {
         sp.Symbol(name, real=True): exact(number)
         for name, numbers in constants
         for name, number in zip(signals[name].elements, numbers, strict=True)
     }
-    stages = _folded(kernel.name, kernel.stages, values)
-    outputs = _folded(kernel.name, kernel.outputs, values)
+    stages = _fold_stages(kernel.name, kernel.stages, values)
+    outputs = _fold_stages(kernel.name, kernel.outputs, values)
     transition = next((stage for stage in stages if stage.signal.name == kernel.transition), None)
     if transition is not None and not any(expression.free_symbols for expression in transition.expressions):
         transition = None
@@ -56,7 +56,7 @@ def fold(kernel: Kernel, constants: Constants) -> Kernel:
     )
 
 
-def _checked(kernel: Kernel, constants: Constants) -> dict[str, Signal]:
+def _check(kernel: Kernel, constants: Constants) -> dict[str, Signal]:
     """Return by name the inputs that become constants."""
     states = [name for name, _ in kernel.recursion.states] if kernel.recursion else []
     signals = {signal.name: signal for signal in kernel.inputs}
@@ -80,7 +80,7 @@ def _checked(kernel: Kernel, constants: Constants) -> dict[str, Signal]:
     return {name: signals[name] for name, _ in constants}
 
 
-def _folded(name: str, stages: tuple[Stage, ...], values: dict[sp.Symbol, sp.Expr]) -> tuple[Stage, ...]:
+def _fold_stages(name: str, stages: tuple[Stage, ...], values: dict[sp.Symbol, sp.Expr]) -> tuple[Stage, ...]:
     """Return stages with the values of symbols; elements that are numbers then join the values."""
     folded = []
     for stage in stages:

@@ -45,6 +45,7 @@ from strapgen.catalogue import coefficients
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives, counted, unknown
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 #: Fractions take no time to read, and those of filters for a gyro are long.
 _FRACTION, _MOST_CHARACTERS = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?"), 4000
@@ -54,7 +55,7 @@ _RATIONAL, _ALGEBRAIC = r"^[0-9eE+\-*/(). ]+$", r"^[0-9eEsqrt+\-*/(). ]+$"
 
 @dataclass(frozen=True)
 class Key:
-    """What stands under a key, beside its type."""
+    """Description, unit and limits of a key."""
 
     #: One line for readers
     text: str = ""
@@ -82,7 +83,7 @@ class Key:
         return {"description": f"{self.text} [{self.unit}]", "unit": self.unit}
 
     def excludes(self, number: Any) -> bool:
-        """Tell whether a number is none that is allowed."""
+        """Return whether a number is outside the limits."""
         above, least, below, most = (
             None if limit is None else Fraction(str(limit))  # 1e-5 is 1/100000 here
             for limit in (self.above, self.least, self.below, self.most)
@@ -122,7 +123,7 @@ class Readable(Protocol):
 
 
 def shown(value: Any) -> str:
-    """Return a value as it stands in a file, on one line."""
+    """Return a value as TOML, on one line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict):
@@ -136,7 +137,7 @@ def shown(value: Any) -> str:
 
 
 def refused(where: str, value: Any, words: str) -> InputError:
-    """Return the refusal of a value; `words` say what is needed."""
+    """Return the error for a value; `words` state the requirement."""
     return InputError(f"{where} is {shown(value)}; {words} is needed")
 
 
@@ -165,7 +166,7 @@ def algebraic(where: str, value: Any) -> coefficients.Number:
 
 
 class _Form:
-    """What may stand at a place: a type of TOML, what a message calls it, how it is read, and its JSON Schema."""
+    """The form of a value: its type in TOML, its name in messages, its reader and its JSON Schema."""
 
     takes: ClassVar[tuple[type, ...]]
     #: What several are called
@@ -309,7 +310,7 @@ class _Names(_Form):
 
 
 class _Either(_Form):
-    """One of several forms, by the type of what stands there."""
+    """One of several forms, selected by the type of the value."""
 
     def __init__(self, forms: list[_Form]) -> None:
         self.forms, self.words = forms, alternatives([form.words for form in forms])
@@ -325,7 +326,7 @@ class _Either(_Form):
 
 
 class _Own(_Form):
-    """A class with a form of its own, a `Readable`."""
+    """A class that reads itself, a `Readable`."""
 
     def __init__(self, kind: Any) -> None:
         self.words, self._kind = kind.WORDS, kind
@@ -427,7 +428,7 @@ _table = cache(_Table)
 
 
 def parse(hint: Any, value: Any, where: str = "") -> Any:
-    """Return what an annotation, for instance a model, makes of a value of a file.
+    """Convert a value of a file by an annotation, for instance a model.
 
     Raises
     ------
@@ -467,7 +468,7 @@ class UserFile(Generic[T]):
         return self.convert(path, lambda model: model)
 
     def convert(self, path: str | Path, then: Callable[[T], R]) -> R:
-        """Return what `then` makes of the model of a file; every refusal begins with the path."""
+        """Return `then` of the model of a file; every error message begins with the path."""
         data = self.content(path)
         try:
             return then(parse(self.model, data))
@@ -494,7 +495,7 @@ def content(path: str | Path, what: str, most_bytes: int) -> dict[str, Any]:
     """Return the content of a TOML file of at most `most_bytes`; error messages say `what` it holds."""
     place = checks.path("path", path)
     try:
-        with place.open("rb") as file:
+        with streams.opened(place) as file:
             data = file.read(most_bytes + 1)
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from None

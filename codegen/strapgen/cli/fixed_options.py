@@ -201,7 +201,7 @@ class FixedOptions:
         """Refuse a largest rate or angle for a kernel that takes neither."""
         from strapgen import pipeline
         from strapgen.fixedpoint.sensor_scale import counted
-        from strapgen.ir.fixed_settings import TURNING
+        from strapgen.ir.fixed_settings import ROTATION_INPUTS
 
         options = {*stated(self)}
         of_gyro = options & {"--sample-hz", "--lsb", "--lsb-rad", "--input-bits"}
@@ -213,7 +213,7 @@ class FixedOptions:
             raise InputError(
                 f"kernel {choice.kernel} takes no increments; {min(of_gyro)} does not go with it"
             )
-        if of_angle and not {signal.name for signal in program.inputs} & {*TURNING}:
+        if of_angle and not {signal.name for signal in program.inputs} & {*ROTATION_INPUTS}:
             raise InputError(
                 f"kernel {choice.kernel} takes no increments; a largest rate or angle does not go with it"
             )

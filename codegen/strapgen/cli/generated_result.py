@@ -97,7 +97,7 @@ class FixedBounds:
 
 @dataclass(frozen=True)
 class GeneratedSources:
-    """What was generated of a kernel for a target."""
+    """The code of a kernel for a target."""
 
     kernel: str
     target: str
@@ -114,7 +114,7 @@ class GeneratedSources:
 
     @staticmethod
     def of(choice: Choice, sources: Sources, target: str, files: Sequence[str]) -> GeneratedSources:
-        """Return what was generated for a target, by the name that was asked for."""
+        """Return the code for a target, under the requested name."""
         from strapgen import pipeline
 
         kinds = ("add", "multiply", "divide", "sqrt")
@@ -132,7 +132,7 @@ class GeneratedSources:
 
 @dataclass(frozen=True)
 class GenerateResult(Result):
-    """What was generated of a kernel, for one target or several."""
+    """The code of a kernel, for one target or several."""
 
     each = GeneratedSources
 
@@ -140,7 +140,7 @@ class GenerateResult(Result):
     said: str = ""
 
     def results(self) -> Sequence[GeneratedSources]:
-        """Return what was generated for each target."""
+        """Return the code for each target."""
         return self.generated
 
     def text(self) -> str:
@@ -150,7 +150,7 @@ class GenerateResult(Result):
 
 @dataclass(frozen=True)
 class StepCheck(Result):
-    """Whether files are what their command generates."""
+    """Whether files agree with the output of their command."""
 
     #: True if nothing differs
     in_step: bool

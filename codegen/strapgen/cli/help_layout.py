@@ -68,9 +68,9 @@ _JOBS = {
 
 def first_steps() -> str:
     """Return what strapgen does in five jobs, for a command line without words."""
-    lines = [*_filled(PROGRAM.paragraphs[0], "", "")]
+    lines = [*_fill(PROGRAM.paragraphs[0], "", "")]
     for name, (what, command) in _JOBS.items():
-        lines += ["", *_filled(f"{name}: {what}", "", "  "), *_command_lines(command)]
+        lines += ["", *_fill(f"{name}: {what}", "", "  "), *_command_lines(command)]
     return "\n".join([*lines, "", "strapgen --help shows all commands and options."])
 
 
@@ -96,7 +96,7 @@ def commands() -> dict[str, dict[str, str]]:
 
 def lay_out(parts: CommandHelp, commands: Mapping[str, Mapping[str, str]]) -> str:
     """Return the text of a help; `commands` are those of a group with their summaries, by heading."""
-    lines = [*_filled(f"Usage: {parts.usage}", "", "       "), "", *_text(parts)]
+    lines = [*_fill(f"Usage: {parts.usage}", "", "       "), "", *_text(parts)]
     labels = [label for rows in parts.panels.values() for label, _ in rows]
     width = min(_MOST_OPTION, _width() // 3, max(map(len, labels)))
     for title, rows in parts.panels.items():
@@ -128,7 +128,7 @@ def _definitions(rows: Sequence[tuple[str, str]], width: int) -> list[str]:
     for term, meaning in rows:
         fits = len(term) <= width
         head = f"  {term}{' ' * (width - len(term))}  " if fits else rest
-        lines += ([] if fits else [f"  {term}"]) + (_filled(meaning, head, rest) or [head.rstrip()])
+        lines += ([] if fits else [f"  {term}"]) + (_fill(meaning, head, rest) or [head.rstrip()])
     return lines
 
 
@@ -136,7 +136,7 @@ def _text(parts: CommandHelp) -> list[str]:
     """Return the paragraphs of a help text, the examples under a heading of their own at its end."""
     lines: list[str] = []
     for part in parts.paragraphs:
-        lines += ["", *_filled(part, "  ", "  ")]
+        lines += ["", *_fill(part, "  ", "  ")]
     if parts.examples:
         lines += ["", "Examples:" if len(parts.examples) > 1 else "Example:"]
     for command in parts.examples:
@@ -144,7 +144,7 @@ def _text(parts: CommandHelp) -> list[str]:
     return lines[1:]
 
 
-def _unbroken(remark: str, room: int) -> str:
+def _on_one_line(remark: str, room: int) -> str:
     """Return a remark in which no line ends, if it is short enough."""
     return remark.replace(" ", _SPACE) if len(remark) <= room else remark
 
@@ -171,10 +171,10 @@ def _chunks(command: str) -> Iterator[str]:
     yield " ".join(chunk)
 
 
-def _filled(text: str, first: str, rest: str) -> list[str]:
+def _fill(text: str, first: str, rest: str) -> list[str]:
     """Return a text in lines as wide as the terminal; names with hyphens stay whole."""
     room = min(_MOST_REMARK, _width() - len(rest))
-    whole = re.sub(r"\[(?:default|required)[^]]*\]", lambda m: _unbroken(m[0], room), text)
+    whole = re.sub(r"\[(?:default|required)[^]]*\]", lambda m: _on_one_line(m[0], room), text)
     lines = textwrap.wrap(
         whole,
         _width(),

@@ -22,6 +22,7 @@ from strapgen.cli import completion, values
 from strapgen.cli.values import written
 from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -44,7 +45,7 @@ VARIANT = Parameter(
 
 
 def grouped(command: Command) -> Command:
-    """Let Typer read the options of a command, and give the command typed values and objects of its groups.
+    """Decorate a command for Typer, so that it takes typed values and objects of its groups of options.
 
     A group is a parameter whose type is a dataclass with fields annotated as Typer reads them. Its class variable
     `panel` is the heading of its options, and `rules` says which of them go together.
@@ -117,7 +118,7 @@ class Group(NamedTuple):
 
 
 class CommandOptions:
-    """The options of a command in the order of its help, its groups, and the rules of what goes with what."""
+    """The options of a command in the order of its help, its groups, and the rules between options."""
 
     def __init__(self, command: Callable[..., Any]) -> None:
         self.options: dict[str, Option] = {}
@@ -153,6 +154,7 @@ class CommandOptions:
             {one.spelling: one.value(_optional(one.parameter.default)) for one in self.options.values()},
             {name: group.spellings for name, group in self.groups.items()},
         )
+        _check_standard_input(line)
         check(self.rules, line)
         for group in self.groups.values():
             check(getattr(group.kind, "rules", ()), line.of(group.spellings))
@@ -213,7 +215,7 @@ def _option(name: str, hint: Any, default: Any, panel: str | None = None) -> Opt
 
 
 def stated(group: Any) -> dict[str, Any]:
-    """Return the options of a group that have not their defaults, with their values."""
+    """Return the options of a group whose values differ from the defaults."""
     return {
         option.spelling: value
         for option in _fields(type(group), ())
@@ -241,7 +243,7 @@ def command_line(command: str, *parts: Any, files_by_name: bool = False) -> str:
 
 
 def rules(*table: Rule) -> Callable[[Command], Command]:
-    """Declare what goes together of the options of a command."""
+    """Declare which options of a command need or exclude each other."""
 
     def declare(command: Command) -> Command:
         command.__dict__["rules"] = table
@@ -272,7 +274,7 @@ class CommandLine(NamedTuple):
         return self._replace(values={name: self.values[name] for name in options})
 
     def stated(self, conditions: str) -> list[str]:
-        """Return the options of conditions that are given and have not their defaults; "@group" is all of a group."""
+        """Return the options of conditions whose values differ from the defaults; "@group" stands for a whole group."""
         several = [
             name
             for condition in conditions.split()
@@ -343,6 +345,13 @@ def check(table: Sequence[Rule], line: CommandLine) -> None:
     for rule in table:
         if refusal := rule.refusal(line):
             raise InputError(refusal)
+
+
+def _check_standard_input(line: CommandLine) -> None:
+    """Refuse a command line that reads standard input twice."""
+    reading = [name for name, value in line.values.items() if value == streams.STANDARD and name != "--out"]
+    if len(reading) > 1:
+        raise InputError(f"{reading[0]} and {reading[1]} are both -; standard input is read once")
 
 
 def _in_words(condition: str) -> str:

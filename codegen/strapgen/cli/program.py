@@ -130,7 +130,7 @@ def _needs(command: Any, name: str, context: Any) -> str:
 
 
 def _meaning(parameter: Any, context: Any) -> str:
-    """Return the help of a parameter, to stand behind a colon."""
+    """Return the help of a parameter, for use after a colon."""
     text = re.sub(r"\s*\[.*\]$", "", _help_text(parameter, context)).rstrip(".")
     return text if text[1:2].isupper() else f"{text[:1].lower()}{text[1:]}"
 
@@ -330,7 +330,7 @@ def _add_own(*names: str) -> None:
 
 
 def _add_asked(words: Sequence[str]) -> None:
-    """Add the command of a command line alone; all of them where that is not enough, or a shell asks for one."""
+    """Add only the command of a command line; all commands if that is not enough or a shell asks for one."""
     asked = next((word for word in words if not word.startswith("-")), "")
     if asked not in _OWN and (asked or completion.is_asked()):
         _add_own(*_OWN)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 #: Reads a word of the command line: the option's name and the word, which is a path where the type is one.
 Reader = Callable[[str, Any], Any]
@@ -77,7 +78,7 @@ def line(option: str, text: str) -> str:
 
 
 def single(option: str, text: str) -> str:
-    """Read one name, which no list is taken for."""
+    """Read one name; refuse a list."""
     if "," in text:
         raise InputError(f"{option} {text} is a list; one name is needed here")
     return text
@@ -108,7 +109,7 @@ def whole(smallest: int, largest: int | None = None) -> Reader:
 
 def folder(option: str, path: Path) -> Path:
     """Return a folder; elsewhere - stands for the terminal."""
-    if path == Path("-"):
+    if path == streams.STANDARD:
         raise InputError(f"{option} - is no folder; files are not written to the terminal")
     return path
 
@@ -124,7 +125,7 @@ def split(kind: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def reader(kind: Any, read: Reader | None) -> Reader | None:
-    """Return what reads the values of a type; `read` reads one of several. None for what is taken as it is."""
+    """Return the reader of values of a type; `read` reads one of several. None for text without conversion."""
     whole_kind, parts = split(kind)
     if whole_kind is tuple:
         return _tuple_reader(
@@ -199,5 +200,5 @@ def filled(kind: type[Record], settings: Mapping[str, Fraction] | None) -> Recor
 
 
 def written(value: Any) -> str:
-    """Return a value as it stands on a command line."""
+    """Return a value as on a command line."""
     return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

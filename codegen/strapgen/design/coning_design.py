@@ -147,14 +147,14 @@ class ConingProblem:
             )
         self._shape = shape
         conditions = [*coning_drift.powers(shape, powers), *coning_drift.products(shape, products)]
-        self._pivots, self._reduced = _reduced(conditions, shape.unknowns)
+        self._pivots, self._reduce = _reduce(conditions, shape.unknowns)
         self._outer = [k for k in range(shape.unknowns) if k not in self._pivots]
         self.free = len(self._outer)
 
     def complete(self, outer: Sequence[Fraction]) -> list[Fraction]:
         """Return all coefficients from the free ones, exactly."""
         values = dict(zip(self._outer, outer, strict=True))
-        for pivot, row in zip(self._pivots, self._reduced, strict=True):
+        for pivot, row in zip(self._pivots, self._reduce, strict=True):
             values[pivot] = row[-1] - sum(
                 (row[k] * x for k, x in values.items() if k in self._outer), Fraction(0)
             )
@@ -190,7 +190,7 @@ class ConingProblem:
         return tuple(self.complete([nearest(value, bits) for value in free]))
 
 
-def _reduced(
+def _reduce(
     conditions: Sequence[tuple[list[Fraction], Fraction]], unknowns: int
 ) -> tuple[list[int], list[list[Fraction]]]:
     """Return which unknowns conditions determine, and each of these in the others and a constant."""

@@ -89,14 +89,14 @@ def design(
     from strapgen.design.selection.candidates import contenders
     from strapgen.design.selection.judgement import in_order, judgements
     from strapgen.design.selection.selection_report import SelectionResult
-    from strapgen.design.selection.simulated import confirmed
+    from strapgen.design.selection.simulated import confirm
 
     brief = read_brief(file)
     several = contenders(brief, methods)
     rows = track(judgements(file, several, results, count, cluster), "judging", len(several))
     with waiting("running the answer"):
-        ordered = confirmed(brief, file, in_order(one for row in rows for one in row))
-    runs = None if simulate is None else _simulated(brief, file, ordered[:simulate], count)
+        ordered = confirm(brief, file, in_order(one for row in rows for one in row))
+    runs = None if simulate is None else _simulate(brief, file, ordered[:simulate], count)
     result = SelectionResult(brief, ordered, runs, file.stem)
     if generate is not None:
         _write(brief, file, ordered, generate, result.text())
@@ -110,7 +110,7 @@ def _check_results(results: Path | None, output: Output) -> None:
             raise InputError(f"{name} and --results are both {path}; two files are needed")
 
 
-def _simulated(
+def _simulate(
     brief: DesignBrief, file: Path, ordered: list[Judgement], jobs: int | None
 ) -> dict[str, Simulated]:
     """Return time simulations of the algorithms that meet the brief, and of those that do not because of their runs."""

@@ -46,9 +46,9 @@ TOOL = Tool(
 
 def check(subject: Subject, folder: Path) -> list[Verdict]:
     """Compare calls, and a run of a step, with balls."""
-    claims = {"calls": partial(_judged_calls, subject)}
+    claims = {"calls": partial(_judge_calls, subject)}
     if subject.fixed.interface.accumulation is not None:
-        claims["steps"] = partial(_judged_run, subject)
+        claims["steps"] = partial(_judge_run, subject)
     return [
         verdict(subject.name, f"error bound: {COUNT} {what}", TOOL, judge) for what, judge in claims.items()
     ]
@@ -57,7 +57,7 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
 # Calls
 
 
-def _judged_calls(subject: Subject) -> tuple[Result, str]:
+def _judge_calls(subject: Subject) -> tuple[Result, str]:
     accepted, share, radius = errors_of_calls(subject, COUNT)
     if radius >= LARGEST_RADIUS:
         return "fails", "balls become too wide"
@@ -114,7 +114,7 @@ class CertifiedRun(NamedTuple):
     proper: bool
 
 
-def _judged_run(subject: Subject) -> tuple[Result, str]:
+def _judge_run(subject: Subject) -> tuple[Result, str]:
     angles = subject.fixed.interface.angle_accumulation
     if angles is None:
         return "not examined", "the header's bound of a run grows beyond all numbers"

@@ -194,10 +194,10 @@ def collect(subjects: Sequence[Subject], folder: Path, tools: Sequence[str] = ()
         subject.sources  # noqa: B018 - one line of refusal before any work, and once for all processes
     each = [(tool, subject, folder / subject.name) for tool in tools or CHECKS for subject in subjects]
     if len(each) == 1:  # it needs no other process
-        yield _examined(*each[0])
+        yield _verify(*each[0])
         return
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), end_with_parent) as pool:
-        tasks = [pool.submit(_examined, *task) for task in each]
+        tasks = [pool.submit(_verify, *task) for task in each]
         try:
             for task in as_completed(tasks):
                 yield task.result()
@@ -212,7 +212,7 @@ def in_order(verdicts: Sequence[Verdict], subjects: Sequence[Subject]) -> list[V
     return sorted(verdicts, key=lambda verdict: (place[verdict.kernel], claims[verdict.claim], verdict.tool))
 
 
-def _examined(tool: str, subject: Subject, folder: Path) -> list[Verdict]:
+def _verify(tool: str, subject: Subject, folder: Path) -> list[Verdict]:
     module, function = CHECKS[tool]
     folder.mkdir(parents=True, exist_ok=True)
     verdicts: list[Verdict] = getattr(importlib.import_module(module), function)(subject, folder)

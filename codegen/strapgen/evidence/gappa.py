@@ -101,11 +101,11 @@ def compare_bounds(script: Script, bounds: Sequence[Fraction], complaint: str) -
         return "fails", "Gappa finds no bound of every output"
     pairs = list(zip(bounds, stated, strict=True))
     if any(bound > limit for bound, limit in pairs):
-        return "fails", _compared([pair for pair in pairs if pair[0] > pair[1]])
-    return "proved", _compared([pair for pair in pairs if pair[1]])
+        return "fails", _compare([pair for pair in pairs if pair[0] > pair[1]])
+    return "proved", _compare([pair for pair in pairs if pair[1]])
 
 
-def _compared(pairs: Sequence[tuple[Fraction, Fraction]]) -> str:
+def _compare(pairs: Sequence[tuple[Fraction, Fraction]]) -> str:
     """Return the largest bounds beside those of the header, and their ratio."""
     if not pairs:
         return "exact"

@@ -313,7 +313,7 @@ class _FixedScriptWriter:
 
     # Quotients and roots
 
-    def _scaled(self, scaled: Scaled, fraction: int) -> tuple[str, str]:
+    def _scale(self, scaled: Scaled, fraction: int) -> tuple[str, str]:
         """Return a value or a constant as an integer of so many fraction bits stands for it, and exactly."""
         if isinstance(scaled.value, int):
             text = number(scaled.value * Fraction(2) ** (scaled.shift - fraction))
@@ -327,7 +327,7 @@ class _FixedScriptWriter:
 
     def _quotient(self, value: Value, numerator: Scaled, denominator: str) -> None:
         name, fraction = value.name, value.fraction
-        top, exact_top = self._scaled(numerator, fraction + self.fractions[denominator])
+        top, exact_top = self._scale(numerator, fraction + self.fractions[denominator])
         below, exact_below = f"c_{denominator}", self._exact(denominator)
         mode = "na" if self.nearest else "zr"  # of magnitudes, the sign comes last
         self.script.define(f"s_{name}", f"{top} / {below}")
@@ -342,7 +342,7 @@ class _FixedScriptWriter:
 
     def _root(self, value: Value, argument: Scaled) -> None:
         name, fraction = value.name, value.fraction
-        inside, exact_inside = self._scaled(argument, 2 * fraction)
+        inside, exact_inside = self._scale(argument, 2 * fraction)
         mode = "ne" if self.nearest else "dn"  # no root of an integer lies halfway between two integers
         self.script.define(f"c_{name}", f"fixed<{-fraction},{mode}>(sqrt({inside}))")
         self.script.define(f"e_{name}", f"sqrt({exact_inside})")

@@ -87,7 +87,7 @@ def same_bits(subject: Subject, folder: Path) -> list[Verdict]:
 
     def judged(runner: Runner) -> tuple[Result, str]:
         expected.extend(() if expected else model_parts(subject, run))
-        return _judged(runner, place, [*_code(subject), f"run_{subject.name}.c"], expected)
+        return _judge(runner, place, [*_code(subject), f"run_{subject.name}.c"], expected)
 
     return [
         verdict(subject.name, f"same bits: {runner.name}", tool_of(runner), partial(judged, runner))
@@ -104,7 +104,7 @@ def _code(subject: Subject) -> list[str]:
     return [name for name in subject.sources.step_files if name.endswith(".c")]
 
 
-def _judged(runner: Runner, place: Path, sources: Sequence[str], expected: list[Part]) -> tuple[Result, str]:
+def _judge(runner: Runner, place: Path, sources: Sequence[str], expected: list[Part]) -> tuple[Result, str]:
     """Return whether what a processor reports is what the model computes."""
     folder = place / runner.name
     folder.mkdir(exist_ok=True)

@@ -37,7 +37,7 @@ def check(subject: Subject, folder: Path) -> list[Verdict]:
     stretch = cache(lambda: stretch_of(program.transition_program(), _limit(subject)))
     claims = {"stays in its format": (_calls, in_format), "stays proper": (_steps, is_proper)}
     return [
-        verdict(subject.name, f"state: {name}", TOOL, partial(_judged, number, compare, subject, stretch))
+        verdict(subject.name, f"state: {name}", TOOL, partial(_judge, number, compare, subject, stretch))
         for name, (number, compare) in claims.items()
     ]
 
@@ -60,7 +60,7 @@ def _limit(subject: Subject) -> Fraction:
     return samples.high * samples.unit
 
 
-def _judged(
+def _judge(
     number: Callable[[Subject], int],
     compare: Callable[[Subject, Stretch], tuple[Result, str]],
     subject: Subject,
@@ -211,7 +211,7 @@ def eigenvalue_bound(matrices: list[Matrix]) -> Fraction:
     power = min(
         (int(powers[0]) for m in matrices for row in m for p in row for powers in p.to_dict()), default=0
     )
-    quotients = [[[_divided(p, power) for p in row] for row in matrix] for matrix in matrices]
+    quotients = [[[_divide(p, power) for p in row] for row in matrix] for matrix in matrices]
     zero, one = Fraction(0), Fraction(1)
     order, reached = itertools.count(), 0.0
     start: _Box = ((zero, one), (-one, one), (zero, one))
@@ -239,7 +239,7 @@ def eigenvalue_bound(matrices: list[Matrix]) -> Fraction:
     return Fraction(-pending[0][0])
 
 
-def _divided(polynomial: Any, power: int) -> Any:
+def _divide(polynomial: Any, power: int) -> Any:
     """Return a polynomial divided by a power of x."""
     terms = {(n - power, *others): c for (n, *others), c in polynomial.to_dict().items()}
     return polynomial.context().from_dict(terms)
@@ -276,7 +276,7 @@ def _eigenvalues(matrix: Matrix, box: _Box) -> tuple[float, float]:
         sum((sign * slope for sign, slope in zip(signs, slopes, strict=True)), middle)
         for signs in itertools.product((-1, 1), repeat=_SPACE)
     ]
-    return _largest_eigenvalue(middle), max(map(_above, corners)) + _rounded_up(rest)
+    return _largest_eigenvalue(middle), max(map(_above, corners)) + _round_up(rest)
 
 
 def _least_square(box: _Box) -> Fraction:
@@ -313,6 +313,6 @@ def _exceeds(number: Any, matrix: Any) -> bool:
     return all(minor > 0 for minor in minors)
 
 
-def _rounded_up(number: Any) -> float:
+def _round_up(number: Any) -> float:
     """Return a number that is not below an exact one of 0 or more."""
     return math.nextafter(int(number.p) / int(number.q), math.inf)

@@ -25,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
 from strapgen.run.standard_tree import command_of, text_of
+from strapgen.storage import streams
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -183,6 +184,8 @@ def _regular(word: str) -> Path:
     Files of the kernel, which can wait too, have no size.
     """
     path = Path(word)
+    if path == streams.STANDARD:
+        raise InputError("the header's command reads standard input, which nobody has kept")
     if path.exists() and not (path.is_file() and path.stat().st_size):
         raise InputError(f"{word} in the header's command is no regular file, or empty")
     return path

@@ -1,4 +1,4 @@
-"""What the folder brings."""
+"""Registration of this folder."""
 
 from __future__ import annotations
 

@@ -128,14 +128,14 @@ def _samples(runner: Loops, part: int, stream: random.Random) -> dict[str, list[
     counts = (FAST * SLOW * NAVIGATION, SLOW * NAVIGATION)
     return {
         signal.name: [
-            tuple(_drawn(loops, signal, part, stream) for _ in range(signal.size)) for _ in range(count)
+            tuple(_draw(loops, signal, part, stream) for _ in range(signal.size)) for _ in range(count)
         ]
         for signals, count in zip(wires.samples[:2], counts, strict=True)
         for signal in signals
     }
 
 
-def _drawn(loops: tuple[Sources, ...], signal: Signal, part: int, stream: random.Random) -> Any:
+def _draw(loops: tuple[Sources, ...], signal: Signal, part: int, stream: random.Random) -> Any:
     """Return a random element of a signal."""
     drawn = 2 * stream.random() - 1
     arguments = [a for loop in loops if loop.fixed for a in loop.fixed.inputs if a.signal.name == signal.name]

@@ -267,7 +267,7 @@ def _corners(boxes: Sequence[_Box]) -> Iterator[tuple[tuple[Any, ...], ...]]:
     for box in boxes:
         for place in range(box.signal.size):
             for limit in (box.low, box.high):
-                yield _with(boxes, box, _replaced(box.rest, place, limit))
+                yield _with(boxes, box, _replace(box.rest, place, limit))
 
 
 def _outside(boxes: Sequence[_Box]) -> Iterator[tuple[tuple[int, ...], ...]]:
@@ -278,7 +278,7 @@ def _outside(boxes: Sequence[_Box]) -> Iterator[tuple[tuple[int, ...], ...]]:
             limits = (box.low - 1, box.high + 1) if place else (box.low - 1, box.high + 1, lowest, highest)
             for value in limits:
                 if lowest <= value <= highest and not box.low <= value <= box.high:
-                    yield _with(boxes, box, _replaced(box.rest, place, value))
+                    yield _with(boxes, box, _replace(box.rest, place, value))
 
 
 def _random(boxes: Sequence[_Box], stream: random.Random) -> Iterator[tuple[tuple[Any, ...], ...]]:
@@ -325,7 +325,7 @@ def _with(boxes: Sequence[_Box], box: _Box, values: tuple[Any, ...]) -> tuple[tu
     return tuple(values if other is box else other.rest for other in boxes)
 
 
-def _replaced(values: tuple[Any, ...], place: int, value: Any) -> tuple[Any, ...]:
+def _replace(values: tuple[Any, ...], place: int, value: Any) -> tuple[Any, ...]:
     return (*values[:place], value, *values[place + 1 :])
 
 

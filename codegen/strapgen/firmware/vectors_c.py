@@ -94,12 +94,12 @@ def _row(row: CallVector, numbers: NumberText) -> str:
     results = [[numbers.literal(value) for value in group] for group in row.outputs]
     results += [words[1]] if words[1] else []
     status = [str(row.status)] if numbers.word else []
-    parts = [_braced(group) for group in groups] + status + [_braced(group) for group in results]
+    parts = [_braces(group) for group in groups] + status + [_braces(group) for group in results]
     lines = [fill_arguments(f"{part},", "      ", 94) for part in parts]
     return "{" + "\n     ".join(lines).removesuffix(",") + "},"
 
 
-def _braced(parts: Sequence[str]) -> str:
+def _braces(parts: Sequence[str]) -> str:
     return f"{{{', '.join(parts)}}}"
 
 

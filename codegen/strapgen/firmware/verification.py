@@ -20,7 +20,7 @@ from strapgen import pipeline
 from strapgen.firmware.vectors import MODEL, vectors_of_choice
 from strapgen.firmware.vectors_c import CallVector
 from strapgen.ir.exceptions import CompilerError, InputError
-from strapgen.ir.fixed_settings import TURNING
+from strapgen.ir.fixed_settings import ROTATION_INPUTS
 from strapgen.ir.formats import float_above, places_above
 from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.sources import Sources
@@ -294,14 +294,14 @@ def differing_lines(path: Path, text: str, new: str, reason: str) -> Iterator[st
         if kind == "equal":
             continue
         for k in range(max(b - a, d - c)):
-            was = _shown(lines[0][a + k]) if a + k < b else "nothing"
+            was = _show(lines[0][a + k]) if a + k < b else "nothing"
             expected = lines[1][c + k].strip() if c + k < d else "nothing"
             yield f"{path}:{min(a + k, max(b - 1, a)) + 1}: {reason}: {was}; generated: {expected}"
     if text != new and lines[0] == lines[1]:
         yield f"{path}:{len(lines[0])}: edited: ends of lines; generated: ends of lines of Unix"
 
 
-def _shown(line: str) -> str:
+def _show(line: str) -> str:
     """Return a line of a file without characters that would act on a terminal."""
     return "".join(character if character.isprintable() else "?" for character in line.strip())
 
@@ -338,7 +338,7 @@ def _fixed(
     model = ModelEvaluator(pipeline.compile(request.choice, MODEL, request.settings))
     exact, wrong, worst = _Exact(request, sources.fixed), 0, 0.0
     for row in rows:
-        inputs, outputs = _called(of, row)
+        inputs, outputs = _call(of, row)
         same = outputs == (row.outputs if row.status == 0 else None)
         wrong += not same
         if outputs is not None:
@@ -374,7 +374,7 @@ def _refused(evaluator: Evaluator, arguments: Sequence[Array], feedback: Array) 
     return False
 
 
-def _called(of: CEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
+def _call(of: CEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
     """Return the integers of a call and what it returns; None for a refusal."""
     inputs = [tuple(map(int, values)) for values in row.inputs]
     feedback = np.array([row.feedback], of.feedback_type).reshape(1, -1)
@@ -401,13 +401,13 @@ class _Exact:
             ]
             results = self.interpreter.outputs(*numbers)
             return max(
-                float(abs(word - _stored(value, argument) / number(argument.format.unit)))
+                float(abs(word - _store(value, argument) / number(argument.format.unit)))
                 for argument, words in zip(self.interface.outputs, outputs, strict=True)
                 for word, value in zip(words, results[argument.signal.name], strict=True)
             )
 
 
-def _stored(value: Any, argument: Argument) -> Any:
+def _store(value: Any, argument: Argument) -> Any:
     """Return the exact value of an output, at the end of the range of one that saturates."""
     return min(max(value, mpmath.mpf(-1)), mpmath.mpf(1)) if argument.saturates else value
 
@@ -467,7 +467,7 @@ def _identity(sources: Sources) -> list[int]:
 
 def _cone(interface: Interface) -> Array | None:
     """Return the increments of a cone whose angles are near the largest ones; None for what is no step."""
-    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in TURNING:
+    if len(interface.inputs) != 2 or interface.inputs[1].signal.name not in ROTATION_INPUTS:
         return None
     argument = interface.inputs[1]
     angles = np.arange(STEPS * argument.signal.size // 3) * (math.pi / 37)

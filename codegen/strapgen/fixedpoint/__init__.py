@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import TURNING, Settings
+from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.integer_program import FixedProgram
 from strapgen.ir.interfaces import Interface
@@ -41,6 +41,6 @@ OPERATIONS = frozenset(
 def can_lower(program: Program) -> bool:
     """Tell whether a program can be lowered as it is: its operations exist here, and its inputs have known ranges."""
     nodes = (node for assignment in program.body for node in walk(assignment.value))
-    return all(signal.bound is not None or signal.name in TURNING for signal in program.inputs) and all(
-        node.kind in OPERATIONS for node in nodes if isinstance(node, Operation)
-    )
+    return all(
+        signal.bound is not None or signal.name in ROTATION_INPUTS for signal in program.inputs
+    ) and all(node.kind in OPERATIONS for node in nodes if isinstance(node, Operation))

@@ -222,7 +222,7 @@ def _expanded_stretch(
     rotation does not have cancel.
     """
     series = Truncated(sizes, _MOST_TERMS)
-    elements = _expanded(program, transition, series)
+    elements = _expand(program, transition, series)
     rows = [elements[k : k + width] for k in range(0, len(elements), width)]
     one = series.constant(Fraction(1))
     largest = Fraction(0)
@@ -235,7 +235,7 @@ def _expanded_stretch(
     return largest
 
 
-def _expanded(program: Program, transition: Result, series: Truncated) -> list[Series]:
+def _expand(program: Program, transition: Result, series: Truncated) -> list[Series]:
     """Return the elements of the transition as truncated series in the inputs."""
     inputs = [name for signal in program.inputs[1:] for name in signal.elements]
     known = {name: series.variable(place) for place, name in enumerate(inputs)}
@@ -339,7 +339,7 @@ def _turns_with_vectors(elements: Sequence[Polynomial]) -> bool:
     A small turn G of the vectors must change a matrix T by G T - T G, and of a quaternion the vector part by G v.
     """
     for i, j in ((0, 1), (1, 2)):
-        turned = [_turned(element, i, j) for element in elements]
+        turned = [_turn(element, i, j) for element in elements]
         expected: list[Polynomial] = [{} for _ in elements]
         if len(elements) == _QUATERNION:
             expected[j], expected[i] = elements[i], scale(elements[j], -1)
@@ -355,7 +355,7 @@ def _turns_with_vectors(elements: Sequence[Polynomial]) -> bool:
     return True
 
 
-def _turned(p: Polynomial, i: int, j: int) -> Polynomial:
+def _turn(p: Polynomial, i: int, j: int) -> Polynomial:
     """Return the derivative of a polynomial when all vectors turn from axis i to axis j."""
     change: Polynomial = {}
     for monomial, coefficient in p.items():

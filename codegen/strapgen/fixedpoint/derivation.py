@@ -57,14 +57,12 @@ def quantities(
     program: Program, ranges: Mapping[str, Interval], split: bool = False, word: int = 32
 ) -> Quantities:
     """Turn a program into exact quantities, given the range of every element of an input."""
-    derived = _derived(program, tuple(ranges.items()), split, word)
+    derived = _derive(program, tuple(ranges.items()), split, word)
     return Quantities(dict(derived.items), dict(derived.results))
 
 
 @lru_cache(maxsize=8)
-def _derived(
-    program: Program, ranges: tuple[tuple[str, Interval], ...], split: bool, word: int
-) -> Quantities:
+def _derive(program: Program, ranges: tuple[tuple[str, Interval], ...], split: bool, word: int) -> Quantities:
     """Derive the quantities once for all roundings and residuals of a kernel."""
     with np.errstate(all="ignore"):  # samples are hints: what is not finite hints at nothing
         context = _context(program, dict(ranges), split, word)

@@ -224,7 +224,7 @@ def store(
         exact_addends, rest = _split(context, rest)
     if constant and not offset:
         rest[()] = constant
-    note_samples(context, name, lambda values: _evaluated(rest, values))
+    note_samples(context, name, lambda values: _evaluate(rest, values))
     seen = float(np.nan_to_num(np.abs(context.anywhere[name]), posinf=0).max()) or 1e-300
     enclosure = context.ranges.of_sum(name, rest, seen)
     definition = Sum(tuple(rest.items()))
@@ -234,7 +234,7 @@ def store(
 
 
 def stem(name: str) -> str:
-    """Return a name without the suffixes of operations: of a part of a part, the last suffix says enough."""
+    """Return a name without the suffixes of operations; a part of a part keeps the last suffix only."""
     for suffix in (*_SUFFIXES.values(), "numerator", "denominator"):
         name = name.removesuffix(f"_{suffix}")
     return name
@@ -316,7 +316,7 @@ def _factor(context: DerivationContext, terms: Terms, name: str) -> Terms:
     return stored_terms(context, inner)
 
 
-def _evaluated(terms: Terms, values: Samples) -> NDArray[np.float64]:
+def _evaluate(terms: Terms, values: Samples) -> NDArray[np.float64]:
     """Return the values of a sum on samples."""
     total = np.zeros(len(values[""]))
     for monomial, coefficient in terms.items():

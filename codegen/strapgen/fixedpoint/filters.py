@@ -1,4 +1,4 @@
-"""Rounds the coefficients of a filter together, so that sums which hold exactly also hold for the rounded ones.
+"""Rounds the coefficients of a filter together, so that the exact sums of coefficients also hold after rounding.
 
 A filter is a sum of many samples, each times a coefficient. What it makes of a constant rate, and of one that grows
 evenly, is the sum of its coefficients and their first moment over the samples: often nothing, or a short binary

@@ -18,7 +18,7 @@ from strapgen.fixedpoint.quantities import (
 )
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import TURNING, Settings, rounded_limit
+from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings, rounded_limit
 from strapgen.ir.formats import Format, finest
 from strapgen.ir.integer_program import Value
 from strapgen.ir.interfaces import Argument
@@ -200,7 +200,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
             continue
         largest = largest_magnitude(program, signal, settings)
         if signal in counted(program) and settings.input_bits is not None:
-            stated.append(_counted(signal, largest, settings, settings.input_bits))
+            stated.append(_counts_format(signal, largest, settings, settings.input_bits))
             continue
         text = _stated_format(settings, signal)
         if text is not None:
@@ -221,7 +221,7 @@ def limits(program: Program, settings: Settings) -> list[Limit]:
     return stated
 
 
-def _counted(signal: Signal, largest: Fraction, settings: Settings, bits: int) -> Limit:
+def _counts_format(signal: Signal, largest: Fraction, settings: Settings, bits: int) -> Limit:
     """Return the range of increments of so many bits: counts of a gyro, or numbers in the format that fits best."""
     if signal.name in settings.formats:
         raise InputError(f"the format of {signal.name} follows from their bits; it takes no other")
@@ -241,7 +241,7 @@ def ranges_of_copies(program: Program, settings: Settings, copied: Mapping[str, 
     accepted = {}
     for signal in counted(program):
         largest = largest_magnitude(program, signal, settings)
-        argument = _counted(signal, largest, settings, settings.input_bits).argument(0)
+        argument = _counts_format(signal, largest, settings, settings.input_bits).argument(0)
         accepted[signal.name] = rounded_limit(max(-argument.low, argument.high) * argument.unit)
     return {state: accepted[name] for state, name in copied.items() if name in accepted}
 
@@ -261,12 +261,12 @@ def state_fraction(word: int, largest: Fraction) -> int:
 def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> Fraction:
     """Return the largest magnitude of the elements of an input."""
     if signal.name in settings.ranges:
-        if signal.constraint or signal.name in TURNING:
+        if signal.constraint or signal.name in ROTATION_INPUTS:
             raise InputError(
                 f"the range of {signal.name} follows from the drift allowance and the largest angle; it takes no other"
             )
         return settings.ranges[signal.name]
-    if signal.name in TURNING:
+    if signal.name in ROTATION_INPUTS:
         return settings.largest_angle
     if signal.constraint:
         return (signal.bound or Fraction(1)) + settings.allowance

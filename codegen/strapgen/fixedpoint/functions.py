@@ -90,7 +90,7 @@ def _wave(chain: Chain, first: int, angle: str) -> str:
     """Return the sine, for first 1, or the cosine, for 0, of an exact quantity."""
     if chain.range(angle).magnitude <= _UNREDUCED:
         return _wave_series(chain, first, angle, chain.square(angle))
-    turns, rest = _reduced(chain, angle)
+    turns, rest = _reduce_angle(chain, angle)
     square = chain.square(rest)
     up, across = (_wave_series(chain, degree, rest, square) for degree in (1, 0))
     down, back = (chain.sum("opposite", ((value,), -_ONE)) for value in (up, across))
@@ -100,7 +100,7 @@ def _wave(chain: Chain, first: int, angle: str) -> str:
     return chain.selection("quarter", *cases, otherwise=values[0])
 
 
-def _reduced(chain: Chain, angle: str) -> tuple[str, str]:
+def _reduce_angle(chain: Chain, angle: str) -> tuple[str, str]:
     """Return the quarter turns in an angle, from -2 to 1 without full turns, and the angle that is left."""
     inside = chain.range(angle)
     # Any number of quarter turns would be right: the nearest, which the code computes, keeps the rest small.

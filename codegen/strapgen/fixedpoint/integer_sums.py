@@ -159,20 +159,20 @@ def _is_polynomial(quantities: Quantities, name: str) -> bool:
 
 def lower_sum(context: Quantization, quantity: Quantity, definition: Sum) -> None:
     """Lower a sum of products to a word, or to a wide number where no word is needed."""
-    value = _lowered(context, quantity, definition)
+    value = _lower(context, quantity, definition)
     if (
         quantity.range_checked
         and quantity.name not in context.resets
         and _note_squares(context, quantity, definition)
     ):
         # In calls that pass, errors are smaller; the limits of the check are those of any call.
-        again = _lowered(context, quantity, definition)
+        again = _lower(context, quantity, definition)
         if again.fraction == value.fraction:
             value = replace(value, error=min(value.error, again.error))
     context.add(value)
 
 
-def _lowered(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
+def _lower(context: Quantization, quantity: Quantity, definition: Sum) -> Value:
     """Return the integer of a sum."""
     terms = _integer_terms(context, definition)
     followed = _followed_error(context, quantity)
@@ -183,11 +183,11 @@ def _lowered(context: Quantization, quantity: Quantity, definition: Sum) -> Valu
     useful = natural if _counts_alone(context, terms) else max(places, default=natural)
     fraction = min(natural, useful, context.most.get(quantity.name, natural))
     fraction = context.plan.forced.get(quantity.name, fraction)
-    value = _rounded(context, quantity, terms, fraction, followed)
+    value = _round(context, quantity, terms, fraction, followed)
     while value.magnitude > context.largest(value.fraction):
         if quantity.name in context.plan.forced:
-            return _limited(context, quantity, value)
-        value = _rounded(context, quantity, terms, value.fraction - 1, followed)
+            return _limit(context, quantity, value)
+        value = _round(context, quantity, terms, value.fraction - 1, followed)
     return value
 
 
@@ -220,9 +220,9 @@ def word_of(context: Quantization, name: str) -> str:
         )
         terms = [Placed(Term((name,), 1), wide.fraction, wide.error)]
         fraction = min(finest(exact.range.magnitude, context.word), wide.fraction)
-        value = _rounded(context, quantity, terms, fraction)
+        value = _round(context, quantity, terms, fraction)
         while value.magnitude > context.largest(value.fraction):
-            value = _rounded(context, quantity, terms, value.fraction - 1)
+            value = _round(context, quantity, terms, value.fraction - 1)
         context.add(value)
     return rounded
 
@@ -326,7 +326,7 @@ def _wide(context: Quantization, quantity: Quantity, terms: Sequence[Placed], fo
     return integer_value(context, quantity, definition, fraction, total.error, total.peak, True, followed)
 
 
-def _rounded(
+def _round(
     context: Quantization,
     quantity: Quantity,
     terms: Sequence[Placed],
@@ -396,7 +396,7 @@ def _fine(context: Quantization, name: str, terms: Sequence[Placed], fraction: i
     raise context.too_short(name)
 
 
-def _limited(context: Quantization, quantity: Quantity, value: Value) -> Value:
+def _limit(context: Quantization, quantity: Quantity, value: Value) -> Value:
     """Return a value in a fixed format that does not hold its range: it is checked if its range is otherwise known."""
     largest = context.largest(value.fraction)
     if context.settings.state and _is_attitude(context, quantity.name):

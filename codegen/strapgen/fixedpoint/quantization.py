@@ -49,10 +49,10 @@ _WORSE = Fraction(101, 100)
 
 def lowered(program: Program, settings: Settings) -> FixedProgram:
     """Lower a program to integers; parameters and errors are those of `strapgen.fixedpoint.quantize`."""
-    quantities, plan = _planned(program, settings)
-    finest = _walked(program, settings, quantities, plan, {})
+    quantities, plan = _plan(program, settings)
+    finest = _walk(program, settings, quantities, plan, {})
     coarser = aligning(finest.body, finest.values, plan.forced)
-    shorter = _walked(program, settings, quantities, plan, coarser)
+    shorter = _walk(program, settings, quantities, plan, coarser)
     context, fixed = finest, _fixed_program(finest)
     aligned = _fixed_program(shorter)
     if not _is_worse(aligned, fixed):
@@ -71,7 +71,7 @@ def lowered(program: Program, settings: Settings) -> FixedProgram:
     return replace(fixed, interface=interface)
 
 
-def _planned(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:
+def _plan(program: Program, settings: Settings) -> tuple[Quantities, FormatPlan]:
     """Return the exact quantities and the formats of the inputs, with guard bits if they make sums of inputs exact."""
     stated = limits(program, settings)
     first = _with_guard_bits(program, settings, stated, 0)
@@ -95,7 +95,7 @@ def _with_guard_bits(
 
 
 def _splits(program: Program, settings: Settings) -> bool:
-    """Tell whether the increments are split off the transition: where the rounding of that has no feedback of its own.
+    """Return whether the increments are split off the transition, whose rounding has no error feedback then.
 
     A rotation vector that is a word of its own is rounded before the transition, out of reach of the feedback.
     """
@@ -104,10 +104,10 @@ def _splits(program: Program, settings: Settings) -> bool:
     return settings.carry == "state" or (settings.carry == "full" and through_vector)
 
 
-def _walked(
+def _walk(
     program: Program, settings: Settings, quantities: Quantities, plan: FormatPlan, most: Mapping[str, int]
 ) -> Quantization:
-    """Lower the quantities one by one, and return all that is known then."""
+    """Lower the quantities one by one, and return the final state of the walk."""
     names = _feedback_names(program, settings, quantities)
     context = Quantization(program, settings, quantities, plan, most, names)
     for quantity in quantities.items.values():
@@ -132,13 +132,13 @@ def _feedback_names(program: Program, settings: Settings, quantities: Quantities
     if settings.carry == "none":
         return {}
     elements = [
-        name for result in _handed_on(program, settings) for name in quantities.results[result.signal.name]
+        name for result in _feed_back(program, settings) for name in quantities.results[result.signal.name]
     ]
     return {name: f"residual_{name}" for name in elements if isinstance(name, str)}
 
 
-def _handed_on(program: Program, settings: Settings) -> list[Result]:
-    """Return the results whose rounding errors go into the next call."""
+def _feed_back(program: Program, settings: Settings) -> list[Result]:
+    """Return the results whose rounding errors are fed back into the next call."""
     first, result = program.inputs[0], program.outputs[0]
     is_state = (first.shape, first.constraint) == (result.signal.shape, result.signal.constraint)
     handed_on = [result] if is_state else []
@@ -173,7 +173,7 @@ def _fixed_program(context: Quantization) -> FixedProgram:
 
 
 def _require_last(context: Quantization) -> None:
-    """Refuse a program that goes on with a value that saturates: it may be far from the exact one."""
+    """Refuse a program that uses a saturated value further: it may be far from the exact one."""
     saturated = {value.name for value in context.body if value.saturated}
     for value in context.body:
         if saturated.intersection(used_by(value)):
@@ -423,7 +423,7 @@ _FED_BACK = 4
 
 
 def aligning(body: Iterable[Value], values: Mapping[str, Value], fixed: Container[str]) -> dict[str, int]:
-    """Return, by name, the most fraction bits of values that are finer than the sums that use them can tell.
+    """Return, by name, the largest useful number of fraction bits of values that are finer than the sums that use them.
 
     In `body` every value has its finest format; values in `fixed` keep theirs.
     """

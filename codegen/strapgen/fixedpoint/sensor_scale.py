@@ -99,7 +99,7 @@ def _with_angles_first(program: Program, angles: Mapping[str, str]) -> Program:
     """Return the program with angles that it computes from the increments and goes on with."""
     used = program.used()
     first = [Assignment(angles[name], Reference(name)) for name in angles if name in used]
-    body = (replace(a, value=_renamed(a.value, angles)) for a in program.body)
+    body = (replace(a, value=_rename(a.value, angles)) for a in program.body)
     return _with_results(program, (*first, *body), angles)
 
 
@@ -107,18 +107,18 @@ def _with_results(program: Program, body: tuple[Assignment, ...], names: Mapping
     """Return a program with another body, and results by other names."""
 
     def renamed(result: Result) -> Result:
-        return replace(result, nodes=tuple(_renamed(node, names) for node in result.nodes))
+        return replace(result, nodes=tuple(_rename(node, names) for node in result.nodes))
 
     outputs, transition = tuple(map(renamed, program.outputs)), program.transition
     return replace(program, body=body, outputs=outputs, transition=transition and renamed(transition))
 
 
-def _renamed(node: Node, names: Mapping[str, str]) -> Node:
+def _rename(node: Node, names: Mapping[str, str]) -> Node:
     """Return a node with other names."""
     if isinstance(node, Reference):
         return Reference(names.get(node.name, node.name))
     if isinstance(node, Operation):
-        return Operation(node.kind, tuple(_renamed(argument, names) for argument in node.arguments))
+        return Operation(node.kind, tuple(_rename(argument, names) for argument in node.arguments))
     return node
 
 

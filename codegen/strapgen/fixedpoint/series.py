@@ -57,11 +57,11 @@ class Truncated:
 
     def sum(self, one: Series, other: Series) -> Series:
         """Return a sum."""
-        return self._combined(one, other, 1)
+        return self._combine(one, other, 1)
 
     def less(self, one: Series, other: Series) -> Series:
         """Return a difference."""
-        return self._combined(one, other, -1)
+        return self._combine(one, other, -1)
 
     def product(self, one: Series, other: Series) -> Series:
         """Return a product."""
@@ -92,7 +92,7 @@ class Truncated:
             total = self.sum(total, self.product(left, right))
         return total
 
-    def _combined(self, one: Series, other: Series, sign: int) -> Series:
+    def _combine(self, one: Series, other: Series, sign: int) -> Series:
         """Return a series plus or minus another."""
         terms = {degree: dict(part) for degree, part in one.terms.items()}
         for degree, part in other.terms.items():

@@ -39,7 +39,7 @@ def choice(what: str, value: str, allowed: Iterable[str], also: str = "", sectio
 def unknown_name(
     what: str, value: object, names: Iterable[str], also: str = "", section: str = ""
 ) -> InputError:
-    """Return the refusal of a name that nothing has."""
+    """Return the error for an unknown name."""
     error = InputError(unknown(what, value, names, also, section))
     error.unknown_name = True
     return error
@@ -72,7 +72,7 @@ def whole(what: str, text: str) -> int:
 
 
 def _is_plain(text: str) -> bool:
-    """Tell whether a text holds none of the characters that Python alone takes for parts of a number."""
+    """Return whether a text is ASCII without underscores, which Python alone allows in numbers."""
     return "_" not in text and text.strip().isascii()
 
 
@@ -275,7 +275,7 @@ SYNONYMS["reference"] = SYNONYMS["backend"]
 
 
 def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
-    """Return the allowed names that were perhaps meant, the likeliest first: at most three, by synonym or by likeness.
+    """Return at most three allowed names by synonym or similarity, the likeliest first.
 
     >>> suggestions("algorithm", "Euler parameters", ["dcm", "euler"])
     ['euler']
@@ -296,7 +296,7 @@ def suggestions(what: str, value: str, allowed: Iterable[str]) -> list[str]:
 
 
 def unknown(what: str, value: object, allowed: Iterable[str], also: str = "", section: str = "") -> str:
-    """Return the message that a name is not known; `also` and `section` say where others are.
+    """Return the message for an unknown name; `also` and `section` refer to further names.
 
     >>> unknown("target", "numpi", ["numpy", "c"])
     "target 'numpi' is not known (did you mean numpy?); allowed: numpy, c"
@@ -313,7 +313,7 @@ def unknown(what: str, value: object, allowed: Iterable[str], also: str = "", se
 
 
 def shown(value: object) -> str:
-    """Return a value on one line; of a long one the beginning."""
+    """Return a value on one line, cut if it is long."""
     line = " ".join(repr(value).split())
     return line if len(line) <= _MOST_CHARACTERS else f"{line[:_MOST_CHARACTERS]}..."
 
@@ -329,7 +329,7 @@ def needed(number: int) -> str:
 
 
 def some(names: Iterable[str]) -> str:
-    """Return names in a list; of many the first ones, and the number of the others."""
+    """Return a list of names: the first ones, and the number of the others."""
     every = list(names)
     more = len(every) - MOST_NAMES
     return ", ".join(every) if more < 2 else f"{', '.join(every[:MOST_NAMES])} and {more} more"
@@ -382,7 +382,7 @@ _TAKERS = {
 
 
 def require(function: str, value: Any, *classes: type) -> None:
-    """Refuse an argument of a class that a stage does not take, with the call that makes the right one.
+    """Refuse an argument of a wrong class; the message names the call that makes the right one.
 
     >>> require("derive", 3, str)
     Traceback (most recent call last):
@@ -412,7 +412,7 @@ def _stage_class(value: Any) -> str:
 
 
 def _remedy(function: str, value: Any, needed: str) -> str:
-    """Return the call that makes a needed class from a value; if there is none, the function that takes the value."""
+    """Return the call that converts a value to a needed class, or else the function that takes the value."""
     reached = _stage_class(value)
     call = describe(value) if reached == "str" else reached.lower()
     if reached == "str" and needed in _NAMED:

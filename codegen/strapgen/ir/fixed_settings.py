@@ -34,8 +34,10 @@ SMALLEST_ANGLE, LARGEST_ANGLE = Fraction(1, 10**11), 4
 DEFAULT_ALLOWANCE = Fraction(1, 16)
 #: Most increments of a step.
 _MOST_INCREMENTS = 8
+#: Names of the input of a step with its rates at nodes, each times the step; the second one is the name before.
+NODE_ROTATIONS = ("node_rotations", "turns")
 #: Names of the inputs that the largest angle bounds.
-TURNING = ("increments", "turns")
+ROTATION_INPUTS = ("increments", *NODE_ROTATIONS)
 
 #: A rational above pi/180, by less than 1e-18.
 _DEGREE = Fraction(math.ceil(Fraction(3141592653589793239, 180) * 10**3), 10**21)
@@ -190,7 +192,7 @@ class Settings:
             Format.parse(text, self.word)
 
     def _check_inputs(self) -> None:
-        """Check the bits of an increment, and fill in those of a usual gyro."""
+        """Check the bits of an increment, and fill in the default for a gyro with counts."""
         if self.input_bits is None:
             object.__setattr__(self, "input_bits", self.default_input_bits)
         bits = self.input_bits

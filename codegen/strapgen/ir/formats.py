@@ -82,7 +82,7 @@ class Format:
 
 
 def finest(largest: Fraction, word: int) -> int:
-    """Return the most fraction bits with which a word holds a magnitude."""
+    """Return the largest number of fraction bits with which a word holds a magnitude."""
     top = (1 << (word - 1)) - 1
     if not largest:
         return word - 1
@@ -153,15 +153,15 @@ def above(value: Fraction, digits: int = 6, style: str = "g") -> str:
     >>> above(Fraction(2, 3)), above(Fraction(-2, 3), 2), above(Fraction(1, 3000), 3, "e")
     ('0.666667', '-0.66', '3.34e-04')
     """
-    return _rounded(value, digits, style, ROUND_CEILING)
+    return _round(value, digits, style, ROUND_CEILING)
 
 
 def below(value: Fraction, digits: int = 6, style: str = "g") -> str:
     """Return a decimal number that is not above a value, see `above`."""
-    return _rounded(value, digits, style, ROUND_FLOOR)
+    return _round(value, digits, style, ROUND_FLOOR)
 
 
-def _rounded(value: Fraction, digits: int, style: str, rounding: str) -> str:
+def _round(value: Fraction, digits: int, style: str, rounding: str) -> str:
     quotient = Context(digits, rounding).divide(Decimal(value.numerator), Decimal(value.denominator))
     return f"{float(quotient):.{digits - (style == 'e')}{style}}"
 

@@ -179,7 +179,7 @@ class FixedProgram:
 
     @property
     def info(self) -> KernelInfo:
-        """What is said of the kernel."""
+        """Metadata of the kernel."""
         return self.program.info
 
     @property

@@ -1,4 +1,4 @@
-"""What a caller of generated code must know: formats, ranges, and proved error bounds of a call and of a run.
+"""The interface of generated code: formats, ranges, and proved error bounds of a call and of a run.
 
 `Interface` is that of fixed-point code, `RoundingBounds` that of floating-point code.
 """
@@ -116,7 +116,7 @@ class Interface:
 
     @property
     def normalized_within(self) -> int:
-        """The most steps between normalizations that are proved to be accepted and to keep the state proper, or 0."""
+        """The proved number of steps between normalizations without a refused call or an improper state, or 0."""
         if self.accumulation is None or self.angle_accumulation is None:
             return 0
         return min(
@@ -125,7 +125,7 @@ class Interface:
 
     @property
     def companion_settings(self) -> Settings:
-        """The settings of a kernel that works on the same state beside a step: an orthonormalization."""
+        """The settings of a kernel on the same state as a step, for instance an orthonormalization."""
         formats = {} if self.settings.state else {"state": str(self.inputs[0].format)}
         return replace(self.settings, ranges={}, formats=formats).without_counts()
 

@@ -1,4 +1,4 @@
-"""What every stage passes on of a kernel: names, source, orders, recursion, and the kernels of an attitude step."""
+"""Metadata of a kernel, which all stages keep: names, source, orders, recursion, kernels of an attitude step."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class AttitudeStep:
 
     @property
     def beside(self) -> int:
-        """Number of increments that the step takes in addition to its own."""
+        """Number of increments before and after the step that it also takes."""
         return self.previous + self.ahead
 
 
@@ -207,7 +207,7 @@ class Recursion:
 
 
 class Description(Protocol):
-    """What a file describes for a kernel: a frozen dataclass with a name, a title and the path of the file."""
+    """The description of a kernel in a file: a frozen dataclass with a name, a title and the path of the file."""
 
     @property
     def name(self) -> str:

@@ -124,7 +124,7 @@ def eigenvalue_bounds(
     if not largest:
         return Fraction(0), Fraction(0)
     unit = largest / (1 << _BITS)
-    reached = np.array([_reached(form, unit * common, samples) for form, common in forms])
+    reached = np.array([_sampled_eigenvalues(form, unit * common, samples) for form, common in forms])
     low, high = (
         _bound(
             [_BernsteinForms.of(form * sign, unit * common) for form, common in forms],
@@ -173,8 +173,10 @@ def _bernstein(matrix: Sequence[Sequence[Powers]]) -> tuple[NDArray[Any], int]:
     return form, common
 
 
-def _reached(form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the smallest and the largest eigenvalue at points, in a unit."""
+def _sampled_eigenvalues(
+    form: NDArray[Any], unit: Fraction, samples: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return the smallest and the largest eigenvalue at sample points, as multiples of a unit."""
     values = (form * unit.denominator // unit.numerator).astype(np.float64)[None]
     for x in samples.T:
         degree = values.shape[2] - 1

@@ -83,7 +83,7 @@ class Decomposition:
                 other = (
                     cross_elements(vectors[rest[0]], vectors[rest[1]]) if len(rest) == 2 else vectors[rest[0]]
                 )
-                product = _symmetrized(vectors[first], other)
+                product = _symmetrize(vectors[first], other)
             s = [a + b * value(polynomial) for a, b in zip(s, product, strict=True)]
         xx, xy, xz, yy, yz, zz = s
         x, y, z = v
@@ -141,11 +141,11 @@ class Frame:
             if sum(degree) % 2:
                 for j, k in itertools.combinations(range(self.count), 2):
                     if min(rest := _less(degree, i, j, k)) >= 0:
-                        yield (i, j, k), _symmetrized(u[i], cross_elements(u[j], u[k])), rest
+                        yield (i, j, k), _symmetrize(u[i], cross_elements(u[j], u[k])), rest
             else:
                 for j in range(i, self.count):
                     if min(rest := _less(degree, i, j)) >= 0:
-                        yield (i, j), _symmetrized(u[i], u[j]), rest
+                        yield (i, j), _symmetrize(u[i], u[j]), rest
         yield (), [self.ring(number) for number in _UNIT], degree
 
     def _solve(self, elements: list[Any], ansatz: _Ansatz) -> Coefficients:
@@ -230,7 +230,7 @@ def _less(degree: _Degree, *vectors: int) -> _Degree:
     return tuple(rest)
 
 
-def _symmetrized(a: list[Any], b: list[Any]) -> list[Any]:
+def _symmetrize(a: list[Any], b: list[Any]) -> list[Any]:
     return [a[i] * b[j] + a[j] * b[i] for i in range(3) for j in range(i, 3)]
 
 

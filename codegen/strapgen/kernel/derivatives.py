@@ -31,7 +31,7 @@ def add_tangents(
     ending: str,
     unit: str,
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Add a stage for the change of every stage that changes, and return the changes of all symbols.
+    """Add a stage for the derivative of every stage that changes, and return the derivatives of all symbols.
 
     `ending` ends the names of these stages; where a stage is an angle in rad, its change has the `unit`.
 
@@ -59,7 +59,7 @@ def add_tangents(
         signal = replace(
             stage.signal,
             name=f"{stage.signal.name}_{ending}",
-            elements=tuple(_named(name, ending) for name in stage.signal.elements),
+            elements=tuple(_name_of(name, ending) for name in stage.signal.elements),
             unit=unit if stage.signal.unit == "rad" else stage.signal.unit,
             meaning=f"change of: {stage.signal.meaning}",
             bound=None,
@@ -87,7 +87,7 @@ def _partial(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     return sp.diff(expression, symbol)
 
 
-def _named(element: str, ending: str) -> str:
+def _name_of(element: str, ending: str) -> str:
     """Return the name of an element's change: the axis stays last."""
     name, separator, axis = element.rpartition("_")
     return f"{name}_{ending}_{axis}" if separator and len(axis) == 1 else f"{element}_{ending}"
@@ -164,7 +164,7 @@ class CovariantFunction:
         size = 4 if decomposition.scalar is not None else 9
         terms = []
         for covariant, weight in decomposition.vector.items():
-            written, named = self._vector(covariant), self._named(covariant)
+            written, named = self._vector(covariant), self._name_of(covariant)
             if size == 9:
                 terms.append(self._term(covariant, weight, list(skew(written)), list(skew(named))))
             else:
@@ -173,7 +173,7 @@ class CovariantFunction:
             unit = [sp.Integer(0)] * 3 + [sp.Integer(1)]
             terms.append(_Term("scalar", decomposition.scalar, unit, unit))
         for covariant, weight in decomposition.symmetric.items():
-            written, named = (self._symmetric(covariant, which) for which in (self._vector, self._named))
+            written, named = (self._symmetric(covariant, which) for which in (self._vector, self._name_of))
             name = "_".join(map(str, ("symmetric", *covariant)))
             terms.append(_Term(name, weight, written, named))
         return terms
@@ -188,7 +188,7 @@ class CovariantFunction:
         first, *rest = (self._vectors[k] for k in covariant)
         return cross(first, rest[0]) if rest else first
 
-    def _named(self, covariant: Covariant) -> sp.Matrix:
+    def _name_of(self, covariant: Covariant) -> sp.Matrix:
         """Return a vector, or the stage of a cross product."""
         if len(covariant) == 1:
             return self._vectors[covariant[0]]

@@ -61,7 +61,7 @@ def evaluate_stages(
     number: Callable[[sp.Rational], Any] | None = None,
     function: Callable[[sp.Expr, list[Any]], Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the given values together with those of all elements of the stages, each of which may use those before.
+    """Return the given values and those of all elements of the stages, evaluated in order.
 
     There is a value for every symbol that no stage defines; `number` and `function` are those of `algebra.evaluate`.
     """
@@ -121,7 +121,7 @@ class Kernel(KernelInfo):
 
     @property
     def info(self) -> KernelInfo:
-        """What programs and sources of the kernel have of it."""
+        """Names, source, orders and recursion, which programs and sources of the kernel keep."""
         return KernelInfo(**{field.name: getattr(self, field.name) for field in fields(KernelInfo)})
 
     @property
@@ -406,20 +406,20 @@ def degree(stages: Iterable[Stage], variables: Iterable[str], results: Sequence[
 DIGITS = 80
 
 
-def rationalized(kernel: Kernel) -> Kernel:
+def rationalize(kernel: Kernel) -> Kernel:
     """Return a kernel with its irrational constants rounded and a note that says so; itself if it has none."""
-    stages, outputs = (tuple(map(_rounded_stage, group)) for group in (kernel.stages, kernel.outputs))
+    stages, outputs = (tuple(map(_round_stage, group)) for group in (kernel.stages, kernel.outputs))
     if stages == kernel.stages and outputs == kernel.outputs:
         return kernel
     note = f"Irrational constants are rounded to {DIGITS} digits, and once more to the format of the target."
     return replace(kernel, stages=stages, outputs=outputs, notes=(*kernel.notes, note))
 
 
-def _rounded_stage(stage: Stage) -> Stage:
-    return replace(stage, expressions=tuple(map(_rounded, stage.expressions)))
+def _round_stage(stage: Stage) -> Stage:
+    return replace(stage, expressions=tuple(map(_round, stage.expressions)))
 
 
-def _rounded(expression: sp.Expr) -> sp.Expr:
+def _round(expression: sp.Expr) -> sp.Expr:
     numbers = expression.atoms(sp.Pow, sp.NumberSymbol, sp.Function)
     if not any(part.is_number and not part.is_Rational for part in numbers):
         return expression  # rebuilding it could make SymPy multiply it out
@@ -428,5 +428,5 @@ def _rounded(expression: sp.Expr) -> sp.Expr:
     if expression.is_Mul:  # all its numbers together are one constant
         numbers, rest = expression.as_independent(*expression.free_symbols, as_Add=False)
         if numbers != 1:
-            return sp.Mul(_rounded(numbers), _rounded(rest))
-    return expression.func(*map(_rounded, expression.args))
+            return sp.Mul(_round(numbers), _round(rest))
+    return expression.func(*map(_round, expression.args))

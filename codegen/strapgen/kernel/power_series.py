@@ -50,11 +50,11 @@ class Powers:
         if isinstance(other, _SeriesRoot):
             return NotImplemented
         if not isinstance(other, Powers):
-            return self._scaled(self.ring(other))
+            return self._scale(self.ring(other))
         if len(other.parts) == 1 and 0 in other.parts:
-            return self._scaled(other.parts[0])
+            return self._scale(other.parts[0])
         if len(self.parts) == 1 and 0 in self.parts:
-            return other._scaled(self.parts[0])
+            return other._scale(self.parts[0])
         total: dict[int, Any] = {}
         for n, a in self.parts.items():
             for m, b in other.parts.items():
@@ -65,7 +65,7 @@ class Powers:
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def _scaled(self, factor: Any) -> Powers:
+    def _scale(self, factor: Any) -> Powers:
         if factor.is_ground:
             factor = factor.LC  # a number
         return Powers(self.ring, {power: part * factor for power, part in self.parts.items()}, self.top)
@@ -239,7 +239,7 @@ def function(expression: sp.Expr, arguments: list[Any]) -> Any:
     if isinstance(expression, sp.Max):
         return _largest(expression, arguments)
     if expression.is_Relational:
-        return bool(expression.func(*_compared(expression, *arguments)))
+        return bool(expression.func(*_compare(expression, *arguments)))
     if not arguments:
         raise ArithmeticError(f"{expression} is no root of a polynomial")
     if expression.func in (sp.cos, sp.sinc):
@@ -294,12 +294,12 @@ def _odd(expression: sp.Expr, angle: Powers, across: Powers | None = None) -> Po
 def _largest(expression: sp.Expr, arguments: list[Any]) -> Any:
     best, *rest = arguments
     for other in rest:
-        mine, others = _compared(expression, best, other)
+        mine, others = _compare(expression, best, other)
         best = other if others > mine else best
     return best
 
 
-def _compared(expression: sp.Expr, left: Any, right: Any) -> tuple[Any, Any]:
+def _compare(expression: sp.Expr, left: Any, right: Any) -> tuple[Any, Any]:
     """Return the numbers that decide a comparison of two series: their coefficients of the power 0."""
     numbers = _begins(left), _begins(right)
     if (numbers[0] - numbers[1]).free_symbols:

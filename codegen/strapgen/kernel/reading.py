@@ -46,7 +46,7 @@ def expression(
     known = {**CONSTANTS, **symbols}
     allowed = FUNCTIONS if functions is None else functions
     try:
-        value = _value(_parsed(text), text.strip(), known, allowed)
+        value = _value(_parse(text), text.strip(), known, allowed)
         if value.has(sp.nan, sp.zoo, sp.oo):
             raise _UnreadableError("it divides by zero")
         return value
@@ -57,7 +57,7 @@ def expression(
         raise InputError(f"{what} is nested too deeply") from None
 
 
-def _parsed(text: str) -> ast.expr:
+def _parse(text: str) -> ast.expr:
     if len(text) > MOST_CHARACTERS:
         raise _UnreadableError(f"at most {MOST_CHARACTERS} characters are allowed")
     try:

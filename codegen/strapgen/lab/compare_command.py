@@ -112,7 +112,7 @@ def compare(
     from strapgen.lab.comparison_report import ComparisonResult
 
     kernels = [
-        _compared(
+        _compare(
             choice, [*names, *_of_files(requests, choice, run_differing)], reference, source, fixed, requests
         )
         for choice in choices
@@ -122,7 +122,7 @@ def compare(
     _fail_above(kernels, fail_above, f"further from {reference} than {fail_above} rad")
 
 
-def _compared(
+def _compare(
     choice: Choice,
     backends: Sequence[str | Backend],
     reference: str,
@@ -145,7 +145,7 @@ def _compared(
             samples=inputs.increments,
             reference=reference,
             truth=inputs.truth,
-            settings=counted(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
+            settings=with_counts(fixed.at_step(inputs.step).settings(choice.increments_per_step), counts),
         )
     return ComparedKernel(choice.kernel, f"{choice.kernel}: {inputs.title}", rows, inputs.step)
 
@@ -205,7 +205,7 @@ def _check_fixed(fixed: FixedOptions, backends: set[str]) -> None:
         )
 
 
-def counted(settings: Settings | None, files: Mapping[Path, Settings | None]) -> Settings | None:
+def with_counts(settings: Settings | None, files: Mapping[Path, Settings | None]) -> Settings | None:
     """Return settings with the gyro whose counts the files take: all back ends then run on its counts."""
     from strapgen.ir.fixed_settings import Settings
 

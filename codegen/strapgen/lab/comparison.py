@@ -202,9 +202,9 @@ def compare(
     require_finite(standard, states, np.arange(len(states), dtype=np.float64))
     matrices = attitude(standard, states)
     rows = (
-        _compared(name, load(name), d, states, matrices, truth)
+        _compare(name, load(name), d, states, matrices, truth)
         if isinstance(name, str)
-        else _compared(name.name, name, d, states, matrices, truth)
+        else _compare(name.name, name, d, states, matrices, truth)
         for name in backends
     )
     return Comparisons(replace(row, kernel=choice.kernel) for row in rows)
@@ -230,7 +230,7 @@ def _coning(choice: Choice) -> tuple[Array, Array]:
     return read(0, STEPS), profile.attitude(np.arange(1 + STEPS) * float(STEP))
 
 
-def _compared(
+def _compare(
     name: str,
     candidate: Backend,
     increments: Array,

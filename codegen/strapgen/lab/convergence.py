@@ -150,7 +150,7 @@ class LadderCase:
         return replace(self, motion=moved(self.motion, begin, end)) if is_file(self.motion) else self
 
 
-def measured(case: LadderCase) -> Convergence:
+def measure_case(case: LadderCase) -> Convergence:
     """Return the outcome of a case."""
     profile = any_motion(case.motion, case.duration, case.settings)
     with np.errstate(all="ignore"):  # a step that is too long for a method is part of the picture
@@ -163,7 +163,7 @@ def converge_all(
     """Measure several algorithms side by side, and yield the place of each with its outcome when it is there."""
     files = None if cluster is None else Bundle.of({case.motion for case in cases if is_file(case.motion)})
     numbered = {str(place): case for place, case in enumerate(cases)}
-    for name, outcome in side_by_side(measured, numbered, jobs, cluster, files):
+    for name, outcome in side_by_side(measure_case, numbered, jobs, cluster, files):
         yield int(name), outcome
 
 

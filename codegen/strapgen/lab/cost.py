@@ -259,7 +259,7 @@ def code_size(sources: Sources) -> int | None:
     if place is not None:
         with suppress(FileNotFoundError):  # another process has removed it meanwhile
             return int(disk_cache.read(place, _SIZE))
-    size = _measured_size(sources, words, counter)
+    size = _measure_size(sources, words, counter)
     if size is not None:
 
         def note(draft: Path) -> None:
@@ -269,7 +269,7 @@ def code_size(sources: Sources) -> int | None:
     return size
 
 
-def _measured_size(sources: Sources, words: list[str], counter: str) -> int | None:
+def _measure_size(sources: Sources, words: list[str], counter: str) -> int | None:
     """Return the size of compiled sources, measured by a program."""
     with drafts.temporary_folder() as folder:
         for name, text in sources.files.items():

@@ -199,7 +199,7 @@ def state_of(attitude_step: Step, sampled: Sequence[Powers], ring: Any, top: int
         for name, x in zip(state.elements, step_kernels.identity, strict=True)
     }
     values |= dict(zip(samples.elements, sampled, strict=True))
-    return _evaluated(kernel, values, ring, top)
+    return _evaluate(kernel, values, ring, top)
 
 
 def computed_matrix(attitude_step: Step, ring: Any, rate: Rate, top: int) -> list[Powers]:
@@ -217,10 +217,10 @@ def matrix_of(attitude_step: Step, elements: list[Powers], ring: Any, top: int) 
         return elements
     attitude = catalogue.companion(attitude_step.kernel, step_kernels.attitude)
     values = dict(zip(attitude.inputs[0].elements, elements, strict=True))
-    return _evaluated(attitude, values, ring, top)
+    return _evaluate(attitude, values, ring, top)
 
 
-def _evaluated(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> list[Powers]:
+def _evaluate(kernel: Kernel, values: dict[str, Any], ring: Any, top: int) -> list[Powers]:
     """Return the elements of the last output of a kernel."""
     return outputs(kernel, values, ring, top)[kernel.outputs[-1].signal.name]
 

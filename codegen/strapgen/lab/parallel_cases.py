@@ -95,8 +95,8 @@ def resume(
 ) -> Iterator[tuple[str, Any]]:
     """Run the cases whose results a file does not hold yet, and add each result to the file when its case ends."""
     path = Path(results)
-    with _opened(path) as file:
-        known = _known(file, path, dict(identity))
+    with _open(path) as file:
+        known = _read_results(file, path, dict(identity))
         yield from ((name, known[name]) for name in cases if name in known)
         missing = {name: case for name, case in cases.items() if name not in known}
         for name, result in side_by_side(work, missing, jobs, cluster, files):
@@ -106,7 +106,7 @@ def resume(
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[IO[bytes]]:
+def _open(path: Path) -> Iterator[IO[bytes]]:
     """Open a results file, which no other process may write at the same time."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +125,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
         yield file
 
 
-def _known(file: IO[bytes], path: Path, identity: dict[str, Any]) -> dict[str, Any]:
+def _read_results(file: IO[bytes], path: Path, identity: dict[str, Any]) -> dict[str, Any]:
     """Return the results of a file by case; begin a new file, and drop a line that is not complete."""
     if os.fstat(file.fileno()).st_size > _MOST_BYTES:
         raise InputError(f"{path} is over {_MOST_BYTES} bytes long; a results file is shorter")
@@ -152,8 +152,8 @@ def _check_header(line: bytes, path: Path, identity: dict[str, Any]) -> None:
     for key in {**identity, **there}:
         if there.get(key) != identity.get(key):
             raise InputError(
-                f"{path} holds another study: {key} is {_shown(there.get(key))} there and "
-                f"{_shown(identity.get(key))} here; another file is needed"
+                f"{path} holds another study: {key} is {_short(there.get(key))} there and "
+                f"{_short(identity.get(key))} here; another file is needed"
             )
 
 
@@ -187,7 +187,7 @@ def _append(file: IO[bytes], path: Path, line: bytes) -> None:
         raise InputError(f"{path} cannot be written ({error.strerror})") from None
 
 
-def _shown(value: Any) -> str:
+def _short(value: Any) -> str:
     """Return a value of an identity in at most a few words."""
     text = json.dumps(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
@@ -265,7 +265,7 @@ def on_cluster(
     files: Bundle | None = None,
 ) -> Iterator[tuple[str, Any]]:
     """Run cases on a cluster, and yield each result when its case ends."""
-    distributed = _distributed()
+    distributed = _dask()
     run = uuid.uuid4().hex  # results of an earlier run are not taken for those of this one
     lost = (OSError, TimeoutError, distributed.comm.CommClosedError, distributed.CancelledError)
     # Workers that this process starts have its own code.
@@ -301,7 +301,7 @@ def on_cluster(
             raise StrapgenError(f"{where} is gone; its results so far are not lost") from None
 
 
-def _distributed() -> Any:
+def _dask() -> Any:
     """Return the module of Dask."""
     try:
         import distributed
@@ -353,10 +353,10 @@ def _remote(work: Callable[[Any], Any], case: Any, digest: str, files: Bundle | 
             "a worker has another version of strapgen; the same one is needed on all machines"
         )
     with _one_at_a_time:
-        return work(case if files is None else case.moved(files.folder, _placed(files.contents)))
+        return work(case if files is None else case.moved(files.folder, _place(files.contents)))
 
 
-def _placed(contents: Mapping[str, bytes]) -> Path:
+def _place(contents: Mapping[str, bytes]) -> Path:
     """Return the folder that holds files in this process, as long as it lives."""
     digest = cache.digest([text for pair in sorted(contents.items()) for text in pair])
     if digest not in _folders:

@@ -220,10 +220,10 @@ def executed(
         raise CompilerError(
             f"{processor.emulator[0]}: {function} has not returned in {_CALL_PATIENCE} s"
         ) from None
-    return _counted(log, _addresses(processor, folder / "program.elf"), function)
+    return _count(log, _addresses(processor, folder / "program.elf"), function)
 
 
-def _counted(log: Path, places: dict[str, tuple[int, int]], function: str) -> int:
+def _count(log: Path, places: dict[str, tuple[int, int]], function: str) -> int:
     """Return how many instructions of a trace lie between the entry of a function and the next one of its caller."""
     (entry, _), (first, size), (refused, _) = places[function], places["start"], places["refuse"]
     count, inside, back = 0, False, False

@@ -168,13 +168,13 @@ def mean_square(runs: SteadyRuns) -> dict[str, Any]:
     states: Any = None
     for steps in _blocks(runs.steps, block):
         states = _ends(step, _windows(drawn.rows(steps * count), count, beside), states)
-    true = _undisturbed(algorithm, runs.backend, runs.errors.turn, runs.steps, block)
+    true = _error_free(algorithm, runs.backend, runs.errors.turn, runs.steps, block)
     angles = np.square(drift_between(step.matrices(states), true)).sum(axis=-1)
     return asdict(MeanSquare(runs.runs, float(angles.sum()), float(np.square(angles).sum())))
 
 
 @lru_cache(maxsize=4)
-def _undisturbed(algorithm: Any, backend_name: str, turn: float, steps: int, block: int) -> Array:
+def _error_free(algorithm: Any, backend_name: str, turn: float, steps: int, block: int) -> Array:
     """Return the attitude at the end of a run without errors as a matrix, the same for all parts of a study."""
     step = _runner(algorithm, backend_name)
     count, beside = algorithm.increments, algorithm.previous + algorithm.ahead

@@ -230,7 +230,7 @@ def largest_increment(
 
 
 @np.errstate(all="ignore")
-def largest_turn(
+def largest_node_rotation(
     motion: Motion,
     step: float | str | Fraction,
     duration: float | str | Fraction,
@@ -241,7 +241,7 @@ def largest_turn(
     Returned in rad.
     """
     h = checks.number("step", step, positive=True)
-    return _largest(_turns(motion, h, nodes), h, duration)
+    return _largest(_node_rotations(motion, h, nodes), h, duration)
 
 
 def _largest(part: Callable[[int, int], Array], h: Fraction, duration: float | str | Fraction) -> float:
@@ -266,14 +266,14 @@ def _increments(
     return StepWindows(read, samples, sum(beside), pulse)
 
 
-def _turns(motion: Motion, step: Fraction, nodes: Sequence[float]) -> Callable[[int, int], Array]:
+def _node_rotations(motion: Motion, step: Fraction, nodes: Sequence[float]) -> Callable[[int, int], Array]:
     """Return the rates at the nodes of the steps of a run, each times the step, part by part."""
     length = float(step)
 
     def read(first: int, count: int) -> Array:
         rates = motion.rate((np.arange(first, first + count)[:, None] + np.array(nodes)) * length)
-        turns: Array = rates * length
-        return turns
+        rotations: Array = rates * length
+        return rotations
 
     return read
 
@@ -287,7 +287,7 @@ def samples_of_steps(
         return _increments(motion, step, backend.increments, (backend.previous, backend.ahead), pulse)
     if pulse is not None:
         raise InputError(f"kernel {backend.kernel} takes rates; a pulse goes with increments")
-    return _turns(motion, step, backend.nodes)
+    return _node_rotations(motion, step, backend.nodes)
 
 
 def require_proper(backend: Backend, states: Any, time: Array) -> None:
@@ -433,7 +433,7 @@ def _in_digits(motion: Motion, backend: Backend) -> tuple[_Steps, _Truth]:
     """Return the increments of the steps of a back end, and the true attitude, of a motion."""
     if isinstance(motion, UsersMotion):
         return _of_functions(motion, backend)
-    row, truth = _integrated(motion) if isinstance(motion, RateMotion) else _closed(motion)
+    row, truth = _of_rate(motion) if isinstance(motion, RateMotion) else _of_catalogue(motion)
     samples = backend.increments
 
     def steps_of(length: Fraction, count: int) -> Iterator[list[Any]]:
@@ -444,7 +444,7 @@ def _in_digits(motion: Motion, backend: Backend) -> tuple[_Steps, _Truth]:
     return steps_of, truth
 
 
-def _closed(motion: Motion) -> tuple[_Row, _Truth]:
+def _of_catalogue(motion: Motion) -> tuple[_Row, _Truth]:
     """Return the increments and the attitude of a motion of the catalogue."""
     if motion.name not in MOTIONS:
         raise InputError(
@@ -461,7 +461,7 @@ def _closed(motion: Motion) -> tuple[_Row, _Truth]:
     return row, lambda time: list(truth([number(time)], *parameters))
 
 
-def _integrated(motion: RateMotion) -> tuple[_Row, _Truth]:
+def _of_rate(motion: RateMotion) -> tuple[_Row, _Truth]:
     """Return the increments and the attitude of a rate expression."""
     return motion.samples_in_digits, motion.attitude_in_digits
 

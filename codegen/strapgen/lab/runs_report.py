@@ -183,7 +183,10 @@ class RunResult(Result):
         largest = ", ".join(
             f"{axis} {value:.6g}" for axis, value in zip(AXES, np.degrees(run.drift_by_axis), strict=True)
         )
-        lines += ["", *(line for record in _printed(run, self.every) for line in _matrix_lines(run, record))]
+        lines += [
+            "",
+            *(line for record in _printed_records(run, self.every) for line in _matrix_lines(run, record)),
+        ]
         lines += [f"largest drift, deg: {largest}", f"mean drift, deg: {np.degrees(run.mean_drift):.6g}"]
         return "\n".join(lines)
 
@@ -225,7 +228,7 @@ def _error_rows(run: Run, records: Iterable[int]) -> list[tuple[float, ...]]:
     return [(run.time[k], *parts[k]) for k in records]
 
 
-def _printed(run: Run, every: int | None) -> list[int]:
+def _printed_records(run: Run, every: int | None) -> list[int]:
     """Return the records whose matrices are printed, the last one among them."""
     last = len(run.time) - 1
     return [last] if every is None else sorted({*range(0, len(run.time), every), last})

@@ -128,12 +128,12 @@ class SensorStudy:
         """Yield the errors of the attitude of some runs at a time, (runs, records, 3) in rad."""
         together = max(1, _TOGETHER // self._angle.size)
         for first in range(0, count, together):
-            rows = [self._measured(errors, run) for run in range(first, min(count, first + together))]
+            rows = [self._measure(errors, run) for run in range(first, min(count, first + together))]
             computed = self._attitudes(np.stack(rows))
             # The drift is positive where the computed frame lags.
             yield -drift_between(computed, self._reference)
 
-    def _measured(self, errors: InstrumentErrors, run: int) -> Array:
+    def _measure(self, errors: InstrumentErrors, run: int) -> Array:
         """Return the increments of a run; those from before it have the steady errors alone."""
         unit, before = MeasurementUnit(errors, self._interval, run), self._before
         row, _ = unit(self._angle[before:], self._velocity[before:])

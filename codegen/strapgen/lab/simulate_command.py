@@ -124,7 +124,7 @@ def _on_motion(
             from strapgen import catalogue
 
             nodes = [float(node) for node in catalogue.nodes(choice)]
-            return runs.largest_turn(profile, step, duration, nodes)
+            return runs.largest_node_rotation(profile, step, duration, nodes)
         return runs.largest_increment(profile, step, duration, samples, pulse, beside)
 
     backend = build(length, largest)

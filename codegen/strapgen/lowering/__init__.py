@@ -13,7 +13,7 @@ from dataclasses import replace
 from itertools import count
 
 from strapgen.ir.program import Assignment, Node, Program, Reference, Result
-from strapgen.kernel.kernel import Kernel, Stage, rationalized
+from strapgen.kernel.kernel import Kernel, Stage, rationalize
 from strapgen.lowering import canonical
 from strapgen.lowering.gate import gate
 from strapgen.lowering.passes import PASSES, cost, optimize
@@ -33,7 +33,7 @@ def lower(kernel: Kernel) -> Program:
     >>> program.operations["multiply"], program.operations["add"]
     (38, 30)
     """
-    rational = rationalized(kernel)
+    rational = rationalize(kernel)
     # With rounded constants, terms that should cancel would stay: such a transition is not expanded.
     core = canonical.extract_core(kernel) if rational is kernel else None
     kernel = rational
@@ -66,7 +66,7 @@ def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]
     transition = Result(core.transition, tuple(map(Reference, core.transition.elements)))
     reserved = {name for signal in kernel.inputs for name in signal.elements} | {a.name for a in after.body}
     for form in canonical.forms(core):
-        body = _renamed(form, reserved)
+        body = _rename(form, reserved)
         yield replace(after, inputs=kernel.inputs, body=(*body, *after.body), transition=transition)
 
 
@@ -85,7 +85,7 @@ def _behind(kernel: Kernel, core: canonical.Core) -> tuple[Stage, ...]:
     return tuple(needed)
 
 
-def _renamed(body: list[Assignment], reserved: set[str]) -> tuple[Assignment, ...]:
+def _rename(body: list[Assignment], reserved: set[str]) -> tuple[Assignment, ...]:
     """Append a number to each name in the body that the kernel uses for another quantity."""
     names = {a.name for a in body}
     new: dict[str, str] = {}

@@ -124,7 +124,7 @@ class _Writer:
             return Operation("sqrt", (self.node(base),))
         if not exponent.is_Integer:
             raise NotImplementedError(f"no operation for the power {exponent} of {base}")
-        return self._repeated(self._named(self.node(base)), int(exponent))
+        return self._power_by_squaring(self._named(self.node(base)), int(exponent))
 
     def _inverse(self, expression: sp.Expr) -> Node:
         """Write an arcsine or arccosine with atan2, which stays accurate near 1 and -1 and defined just beyond."""
@@ -136,13 +136,13 @@ class _Writer:
         other = Operation("multiply", roots)
         return Operation("atan2", (value, other) if expression.func is sp.asin else (other, value))
 
-    def _repeated(self, base: Node, exponent: int) -> Node:
+    def _power_by_squaring(self, base: Node, exponent: int) -> Node:
         """Return a whole power by repeated squaring."""
         if exponent == 1:
             return base
         if exponent % 2:
-            return Operation("multiply", (self._repeated(base, exponent - 1), base))
-        half = self._named(self._repeated(base, exponent // 2))
+            return Operation("multiply", (self._power_by_squaring(base, exponent - 1), base))
+        half = self._named(self._power_by_squaring(base, exponent // 2))
         return Operation("multiply", (half, half))
 
     def _named(self, node: Node) -> Node:

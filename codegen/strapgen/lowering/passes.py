@@ -49,11 +49,11 @@ _EXACT = ("add", "subtract", "multiply", "divide", "negate")
 
 def fold_constants(program: Program) -> Program:
     """Replace operations on constants by their exact values."""
-    return with_values(_scalings_moved(with_values(program, _folded)), _folded)
+    return with_values(_move_scalings(with_values(program, _fold)), _fold)
 
 
 @lru_cache(REMEMBERED)
-def _folded(node: Node) -> Node:
+def _fold(node: Node) -> Node:
     return rewritten(node, _on_constants)
 
 
@@ -101,7 +101,7 @@ def _scaled_product(node: Operation) -> Node:
 
 
 def scaling(node: Node) -> tuple[Fraction, Node | None]:
-    """Return a node as a number times another node; None stands for the latter if the node is a number."""
+    """Return a node as a factor and another node, which is None if the node is a number."""
     if isinstance(node, Constant):
         return node.value, None
     if isinstance(node, Operation):
@@ -113,7 +113,7 @@ def scaling(node: Node) -> tuple[Fraction, Node | None]:
     return Fraction(1), node
 
 
-def _scalings_moved(program: Program) -> Program:
+def _move_scalings(program: Program) -> Program:
     """Move the constant factor of a temporary into its uses if all of these multiply it by constants."""
     scaled = {}
     for assignment in program.body:
@@ -151,7 +151,7 @@ _EVEN = ("cos", "sinc")
 
 def absorb_negations(program: Program) -> Program:
     """Move signs up the trees until a sum or a constant absorbs them; a temporary hands its sign to its users."""
-    values = [_absorbed(assignment.value) for assignment in program.body]
+    values = [_absorb(assignment.value) for assignment in program.body]
     results = {
         node.name for result in program.results for node in result.nodes if isinstance(node, Reference)
     }
@@ -164,18 +164,18 @@ def absorb_negations(program: Program) -> Program:
 
 
 @lru_cache(REMEMBERED)
-def _absorbed(value: Node) -> Node:
+def _absorb(value: Node) -> Node:
     """Return a value with its signs moved up; the value itself if none moves."""
-    outcome = rewritten(value, _sign_moved)
+    outcome = rewritten(value, _move_sign)
     return value if outcome == value else outcome
 
 
 def _with_negated(value: Node, name: str) -> Node:
     """Return a value with the negative of a name in its place, and the signs moved up."""
     if name not in names_in(value):
-        return _absorbed(value)
+        return _absorb(value)
     return rewritten(
-        value, lambda node: Operation("negate", (node,)) if node == Reference(name) else _sign_moved(node)
+        value, lambda node: Operation("negate", (node,)) if node == Reference(name) else _move_sign(node)
     )
 
 
@@ -205,7 +205,7 @@ def _by_constant(node: Node) -> Node | None:
     return None
 
 
-def _negated(node: Node) -> Node:
+def _negate(node: Node) -> Node:
     if isinstance(node, Constant):
         return Constant(-node.value)
     if isinstance(node, Operation):
@@ -217,17 +217,17 @@ def _negated(node: Node) -> Node:
             for k, argument in enumerate(node.arguments):
                 if isinstance(argument, Operation) and argument.kind in ("subtract", "negate"):
                     arguments = list(node.arguments)
-                    arguments[k] = _negated(argument)
+                    arguments[k] = _negate(argument)
                     return Operation("multiply", tuple(arguments))
     return Operation("negate", (node,))
 
 
-def _sign_moved(node: Node) -> Node:
+def _move_sign(node: Node) -> Node:
     if not isinstance(node, Operation):
         return node
     inner = [_inside(argument) for argument in node.arguments]
     if node.kind == "negate":
-        return _negated(node.arguments[0])
+        return _negate(node.arguments[0])
     if not any(inner):
         return node
     if node.kind in ("add", "subtract"):
@@ -243,7 +243,7 @@ def _sign_moved(node: Node) -> Node:
     if node.kind in ("multiply", "divide"):
         arguments = tuple(i if i is not None else a for i, a in zip(inner, node.arguments, strict=True))
         result = Operation(node.kind, arguments)
-        return result if all(inner) else _negated(result)
+        return result if all(inner) else _negate(result)
     if node.kind == "sin" and inner[0] is not None:
         return Operation("negate", (Operation("sin", (inner[0],)),))
     if node.kind in _EVEN and inner[0] is not None:

@@ -159,7 +159,7 @@ class _Entry:
 
 def share_pairs(program: Program) -> Program:
     """Name the pairs of terms and of factors that occur more than once."""
-    inlined = _inlined(program)
+    inlined = _inline(program)
     names = shared_names(inlined)
     counts = _Counts()
     entries = [_Entry(assignment, counts) for assignment in inlined.body]
@@ -178,7 +178,7 @@ def share_pairs(program: Program) -> Program:
     return replace(inlined, body=body)
 
 
-def _inlined(program: Program) -> Program:
+def _inline(program: Program) -> Program:
     """Put temporaries that are used once back into the tree that uses them."""
     counts = uses(program)
     held = {name for result in program.results for node in result.nodes for name in names_in(node)}

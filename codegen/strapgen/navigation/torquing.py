@@ -91,7 +91,7 @@ class TorqueLoop:
         rows = evaluator("pulse-torque")(filtered, integrated, angle, *self.constants)
         return [[float(value) for value in row] for row in rows]
 
-    def _commanded(self, filtered: float, integrated: float, angle: float) -> list[float]:
+    def _control(self, filtered: float, integrated: float, angle: float) -> list[float]:
         """Return the states after a cycle, and the command."""
         return [a * filtered + b * integrated + c * angle for a, b, c in self.law]
 
@@ -123,7 +123,7 @@ class TorqueLoop:
         scale = self.quantum_arcsec
         net = (rate - self._command(state)) * scale * self.cycle_hz
         angle, speed = self.plant(state[0] * scale, state[1] * scale * self.cycle_hz, net)
-        filtered, integrated, command = self._commanded(state[2], state[3], state[0])
+        filtered, integrated, command = self._control(state[2], state[3], state[0])
         moved = [angle / scale, speed / scale * self.cycle, filtered, integrated, command, *state[4:-1]]
         return np.array(moved, float)
 
@@ -169,7 +169,7 @@ class TorqueLoop:
         for k in range(cycles):
             seen = angle / self.quantum_arcsec
             read = float(round(seen)) if quantised else seen
-            filtered, integrated, command = self._commanded(filtered, integrated, read)
+            filtered, integrated, command = self._control(filtered, integrated, read)
             if quantised:
                 command = float(max(-self.largest_pulses, min(self.largest_pulses, round(command))))
             angles[k], commands[k] = angle, command

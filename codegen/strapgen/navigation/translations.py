@@ -98,7 +98,7 @@ def translate(
     changes = change(angles, windows(row, samples, previous + ahead))
     if not all(np.isfinite(part).all() for part in (states, *changes)):
         raise InputError("velocity or position is not finite: the increments are too large for the method")
-    velocity, position = _summed(states, changes, float(h), np.array(gravity, float))
+    velocity, position = _sum(states, changes, float(h), np.array(gravity, float))
     time = np.arange(steps + 1, dtype=np.float64) * float(h)
     velocities, positions = truth or force.translation(motion, interval, steps * samples)
     true_velocity, true_position = velocities[::samples], positions[::samples]
@@ -107,7 +107,7 @@ def translate(
     return Translation(time, velocity, position, true_velocity, true_position)
 
 
-def _summed(
+def _sum(
     states: NDArray[np.generic], changes: tuple[Array, Array], step: float, gravity: Array
 ) -> tuple[Array, Array]:
     """Return velocity and position after every step, by the kernel of the attitude's algorithm, in double."""

@@ -24,7 +24,7 @@ from strapgen.ir.program import Program
 from strapgen.ir.sources import Sources
 from strapgen.kernel.kernel import Kernel
 from strapgen.lab.comparison import Comparisons, compare
-from strapgen.lab.convergence import Convergence, LadderCase, measured
+from strapgen.lab.convergence import Convergence, LadderCase, measure_case
 from strapgen.lab.motions.motions import GENERAL, Motion
 from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.parallel_cases import side_by_side
@@ -145,12 +145,12 @@ def _runs(
             step, steps, choice.increments_per_step, choice.previous, choice.ahead
         )
         truth = profile.attitude(np.arange(1 + steps) * float(step))
-        rows, refused = _compared(choice, backends, increments, truth, formats)
-    ladder = measured(LadderCase(choice, "exact", "coning", GENERAL, LADDER, LADDER_DURATION))
+        rows, refused = _compare(choice, backends, increments, truth, formats)
+    ladder = measure_case(LadderCase(choice, "exact", "coning", GENERAL, LADDER, LADDER_DURATION))
     return StepRuns(schedule, stepper, profile, run, rows, refused, formats, ladder)
 
 
-def _compared(
+def _compare(
     choice: Choice, backends: Sequence[str], increments: Array, truth: Array, settings: Settings
 ) -> tuple[Comparisons, dict[str, str]]:
     """Compare back ends with exact arithmetic; where one of them refuses the run, each alone, with its refusal."""
@@ -317,11 +317,11 @@ def dossiers(
 ) -> Iterator[AlgorithmDossier]:
     """Yield the dossiers of algorithms, whose cases are the parameters of `dossier`, as they are ready."""
     numbered = {str(place): case for place, case in enumerate(cases)}
-    for _, known in side_by_side(_gathered, numbered, jobs):
+    for _, known in side_by_side(_gather, numbered, jobs):
         yield known
 
 
-def _gathered(case: tuple[Any, ...]) -> AlgorithmDossier:
+def _gather(case: tuple[Any, ...]) -> AlgorithmDossier:
     return dossier(*case)
 
 

@@ -170,7 +170,7 @@ class _Reader:
             mark = {"dot": "˙", "bar": "¯", "hat": "^"}[name]
             yield f'<mover accent="true">{self._argument()}<mo>{mark}</mo></mover>'
         elif name in _STYLES:
-            yield self._styled(_STYLES[name])
+            yield self._style(_STYLES[name])
         elif name == "text":
             yield f"<mtext>{html.escape(self._raw())}</mtext>"
         elif name == "operatorname":
@@ -188,7 +188,7 @@ class _Reader:
         elif name != "\\":
             yield f"<mi>{_IDENTIFIERS.get(name, html.escape(name))}</mi>"
 
-    def _styled(self, style: str) -> str:
+    def _style(self, style: str) -> str:
         """Return letters in a style; underscores of words become spaces."""
         text = self._raw() if self._peek() == "{" else self._next()
         text = _IDENTIFIERS.get(text.removeprefix("\\"), text).replace("_", " ")

@@ -156,7 +156,7 @@ def labels_at_the_right(axes: Any, labels: Iterable[tuple[float, str, Any]]) -> 
 def labels_beside_points(
     axes: Any, points: Mapping[str, tuple[float, float]], colours: Mapping[str, Any]
 ) -> None:
-    """Write labels beside points in data, each where it covers no other label and leaves the axes least."""
+    """Write labels beside points in data, each where it covers no other label and stays inside the axes."""
     boxes: list[Any] = []
     frame = axes.get_window_extent()
     for text, point in points.items():

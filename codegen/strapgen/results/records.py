@@ -151,7 +151,7 @@ def plain(value: Any) -> Any:
 
 def keyed_table(rows: Sequence[Any]) -> TextTable:
     """Return records, or objects of JSON, as a table: a row for each, a column for each key, numbers in full."""
-    objects = [row if isinstance(row, Mapping) else _parted(row) for row in rows]
+    objects = [row if isinstance(row, Mapping) else _split(row) for row in rows]
     names = list(dict.fromkeys(name for row in objects for name in row))
     values = [[_cell(row.get(name)) for name in names] for row in objects]
     columns = []
@@ -161,7 +161,7 @@ def keyed_table(rows: Sequence[Any]) -> TextTable:
     return TextTable(columns, values)
 
 
-def _parted(record: Any) -> dict[str, Any]:
+def _split(record: Any) -> dict[str, Any]:
     """Return the data of a record with the parts of what is split beside the rest."""
     split = [one.key or name for name, one in entries(type(record)).items() if one.split]
     data: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from strapgen.results.table import TextTable
 
 
 class Result(Record):
-    """What a command answers: a dataclass whose fields are the JSON, and whose rows are the tables.
+    """The result of a command: a dataclass whose fields are the JSON, and whose rows are the tables.
 
     A subclass is registered by its folder under the name that its JSON and `strapgen schema` have.
     """

@@ -34,7 +34,7 @@ __all__ = [
     "backend",
     "build",
     "evaluator",
-    "fitted",
+    "fit_settings",
     "of_sources",
     "sources_to_build",
 ]
@@ -75,7 +75,8 @@ class Backend:
     dtype : dtype
         Type of its states.
     takes : str
-        Name of the step's second input: "increments", or "turns" where a step takes rates at nodes times its length.
+        Name of the step's second input: "increments", or "node_rotations" where a step takes rates at nodes times its
+        length.
     increments : int
         Number of increments of a step.
     previous, ahead : int
@@ -185,7 +186,7 @@ class Backend:
         return np.asarray(of_sources(self._parts.sources(self.attitude, NUMPY))(states))
 
     def rounding_bound(self, steps: int, rounded_inputs: bool = False) -> float | None:
-        """Return a certified bound of what rounding does to a run without orthonormalization.
+        """Return a certified bound of the rounding error of a run without orthonormalization.
 
         Parameters
         ----------
@@ -268,7 +269,7 @@ class Backend:
             Angle increments in rad.
         """
         rows = self._rows(np.asarray(increments, self.dtype)[None])
-        loop = self._begun(self.identity[None])
+        loop = self._begin(self.identity[None])
         return lambda: self.evaluator.loop(rows, loop)
 
     def need_increments(self) -> None:
@@ -383,7 +384,7 @@ class Backend:
         if not runs:
             return np.empty(shape, self.dtype)
         rows = self._rows(d.reshape(runs, steps, self.samples, 3))
-        begun = self._begun(start.reshape(runs, *self.state_shape))
+        begun = self._begin(start.reshape(runs, *self.state_shape))
         history, _ = self.evaluator.loop(rows, replace(begun, **schedule, jobs=jobs))
         return self._states(history).reshape(shape)
 
@@ -422,7 +423,7 @@ class Backend:
         schedule = self._schedule(record_every, orthonormalize_every) | {"record_every": 1}
         history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
         history[0] = start = self._start(initial)
-        loop = self._begun(np.broadcast_to(start, self.state_shape)[None])
+        loop = self._begin(np.broadcast_to(start, self.state_shape)[None])
         for first, count, restore_every in run_parts(steps, orthonormalize_every or 0):
             increments = checks.real_array("increments", part(first, count), (self.samples, 3), self.dtype)
             loop = replace(loop, **schedule | {"first": first, "restore_every": restore_every})
@@ -447,7 +448,7 @@ class Backend:
         start = self.identity if initial is None else initial
         return checks.real_array("initial", start, self.state_shape, self.dtype)
 
-    def _begun(self, states: Array) -> Loop:
+    def _begin(self, states: Array) -> Loop:
         """Return what runs begin with, from states, (runs, state shape)."""
         return Loop(
             self.evaluator.stored(0, states.reshape(len(states), self.identity.size)),
@@ -465,7 +466,7 @@ class Backend:
         return {"record_every": record_every, "restore_every": orthonormalize_every, "restore": restore}
 
 
-def fitted(backend: str, settings: Settings | None) -> Settings | None:
+def fit_settings(backend: str, settings: Settings | None) -> Settings | None:
     """Return the settings that a back end runs with, in its own word; None in floating point."""
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     if not entry.fixed:
@@ -520,7 +521,7 @@ def evaluator(kernel: AnyAlgorithm, backend: str = "numpy", settings: Settings |
     if isinstance(name, str):
         checks.choice("kernel", name, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
     choice = catalogue.choose(name)
-    return of_sources(sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings)))
+    return of_sources(sources_of_choice(choice, BACKENDS[backend].target, fit_settings(backend, settings)))
 
 
 def backend(
@@ -579,17 +580,17 @@ def backend(
     choice = catalogue.choose_step(name, method, increments, previous=previous, ahead=ahead)
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
-    step = sources_of_choice(choice, BACKENDS[backend].target, fitted(backend, settings))
+    step = sources_of_choice(choice, BACKENDS[backend].target, fit_settings(backend, settings))
     return Backend(StepSources(step, choice, orthonormalization))
 
 
 def sources_to_build(choice: Choice, backend: str, settings: Settings | None = None) -> list[Sources]:
-    """Return what a back end of an attitude step builds: the step, and the kernel that orthonormalizes its state.
+    """Return the sources that a back end of an attitude step builds: the step, and its orthonormalization.
 
     `strapgen.compile_together` compiles those of many steps in one call of the compiler.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
-    step = StepSources(sources_of_choice(choice, entry.target, fitted(backend, settings)), choice)
+    step = StepSources(sources_of_choice(choice, entry.target, fit_settings(backend, settings)), choice)
     beside = step.step_kernels.orthonormalize
     return [step.step, *([] if beside is None else [step.sources(beside, entry.target)])]
 

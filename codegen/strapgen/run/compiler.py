@@ -99,7 +99,7 @@ class Compiler:
         return [OPTIMIZATION[self.language], *self.flags]
 
     def identity(self, flags: Sequence[str] | None = None) -> str:
-        """Return what a build depends on beside its sources: this compiler, its flags, the machine and Python."""
+        """Return the other inputs of a build beside its sources: compiler, flags, machine and Python."""
         import _cffi_backend
 
         path, *options = self.command()
@@ -148,7 +148,7 @@ def load(sources: Sources) -> Any:
     if key not in _loaded:
         with timed("build", f"{sources.kernel} for {sources.target}"):
             if _compiler_of(sources):
-                _loaded[key] = _compiled(sources)
+                _loaded[key] = _compile_module(sources)
             elif language == "Python":
                 _loaded[key] = _import_text(sources)
             else:
@@ -160,7 +160,7 @@ def load(sources: Sources) -> Any:
 
 
 def compile_together(many: Iterable[Sources]) -> None:
-    """Compile what is not in the cache yet into as few modules as names allow, for `load` to find.
+    """Compile sources that are not in the cache into as few modules as names allow, for `load`.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def _import_text(sources: Sources) -> ModuleType:
     return module
 
 
-def _compiled(sources: Sources) -> Any:
+def _compile_module(sources: Sources) -> Any:
     key = build_key([sources])
 
     def module() -> Any:
@@ -371,7 +371,7 @@ def versions() -> dict[str, str]:
 
 
 def _compiler() -> str:
-    """Return what the compiler says of itself."""
+    """Return the version message of the compiler."""
     try:
         path = C.path()
     except CompilerError:

@@ -24,7 +24,7 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True)
 class Loop:
-    """What a loop over steps takes beside the samples, in the numbers that the code computes with."""
+    """Start, schedule and kernels of a loop over steps, in the numbers of the code."""
 
     state: Array  # at the start, (runs, elements)
     feedback: Array  # error feedback of the steps before, (runs, number of words)

@@ -1,4 +1,4 @@
-"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into what each step takes."""
+"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into those of each step."""
 
 from __future__ import annotations
 
@@ -145,12 +145,12 @@ class StepWindows:
         """Return the increments of the steps after those of the call before, (steps, beside + count, 3)."""
         begin = first * self._count + len(self._tail)
         row = np.asarray(self._read(begin, (first + steps) * self._count + self._beside))
-        row = np.concatenate([self._tail, row if self._pulse is None else self._quantized(row, self._pulse)])
+        row = np.concatenate([self._tail, row if self._pulse is None else self._quantize(row, self._pulse)])
         self._tail = row[len(row) - self._beside :].copy()
         return windows(row, self._count, self._beside)
 
     @np.errstate(all="ignore")  # angles that overflow are refused, in one line
-    def _quantized(self, row: NDArray[np.float64], pulse: float) -> NDArray[np.float64]:
+    def _quantize(self, row: NDArray[np.float64], pulse: float) -> NDArray[np.float64]:
         angles = np.cumsum(np.concatenate([self._angle, row]), axis=0)
         self._angle = angles[-1:]
         counts = np.rint(angles[1:] / pulse)

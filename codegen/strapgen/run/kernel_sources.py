@@ -1,4 +1,4 @@
-"""What a back end runs: the generated text of a kernel or, where it is interpreted, its program; all as plain data."""
+"""Input of back ends as plain data: the generated text of a kernel, or its program where it is interpreted."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _ProgramSources(Sources):
 
 
 def sources_of_program(program: Program, target: str, settings: Settings | None = None) -> Sources:
-    """Return what a back end runs of a program: generated text where `target` is one, else the program itself."""
+    """Return generated text of a program if `target` is a target, else the program itself, for a back end."""
     if target in TARGETS:
         return pipeline.generate(program, target, settings)
     return _ProgramSources.of(
@@ -34,7 +34,7 @@ def sources_of_program(program: Program, target: str, settings: Settings | None 
 
 
 def sources_of_choice(choice: Choice, target: str, settings: Settings | None = None) -> Sources:
-    """Return what a back end runs of a chosen kernel, from the cache, see `sources_of_program`."""
+    """Return the input of a back end for a chosen kernel, from the cache, see `sources_of_program`."""
     if target in TARGETS:
         return pipeline.compile(choice, target, settings)
     return sources_of_program(pipeline.program(choice), target)
@@ -64,7 +64,7 @@ class StepSources:
 
     @property
     def step_kernels(self) -> AttitudeStep:
-        """Names of the step's kernels, and what else its sources tell of an attitude step."""
+        """Names of the step's kernels, and the other properties of an attitude step."""
         if self.step.attitude_step is None:
             raise InputError(f"kernel {self.step.kernel} is no attitude step; back ends are built from steps")
         return self.step.attitude_step
@@ -89,10 +89,10 @@ class StepSources:
         if isinstance(known, str):
             raise InputError(known)
         if known is None:
-            known = self.beside[kernel, target] = self._generated(kernel, target)
+            known = self.beside[kernel, target] = self._generate(kernel, target)
         return known
 
-    def _generated(self, kernel: str, target: str) -> Sources:
+    def _generate(self, kernel: str, target: str) -> Sources:
         fixed = self.step.fixed if target == self.step.target else None
         settings = fixed.companion_settings if fixed else None
         if self.choice is not None:
@@ -118,7 +118,7 @@ class StepSources:
 
 
 class Request(NamedTuple):
-    """What one call of ``strapgen generate`` generates: the arguments of `pipeline.compile`."""
+    """The arguments of `pipeline.compile` for one call of ``strapgen generate``."""
 
     choice: Choice
     target: str

@@ -238,7 +238,7 @@ class _BlockedScan:
         runs, steps = increments.shape[:2]
         depth, blocks, width = out.shape[1:]
         exact = steps == segments * blocks * depth
-        padded = increments if exact else _padded(increments, length, segments, blocks * depth)
+        padded = increments if exact else _pad(increments, length, segments, blocks * depth)
         by_block = padded.reshape(width, blocks, depth, -1).transpose(3, 1, 0, 2)
         columns = out.reshape(len(out), depth, -1).transpose(0, 2, 1)
         first = 0
@@ -333,7 +333,7 @@ def _tiles(blocks: int, width: int, most: int) -> Iterator[tuple[slice, slice]]:
             yield slice(block, block + 1), slice(first, first + most)
 
 
-def _padded(increments: Array, length: int, segments: int, places: int) -> Array:
+def _pad(increments: Array, length: int, segments: int, places: int) -> Array:
     """Return the increments of segments, each with zeros up to so many places, (runs, segments, places, numbers)."""
     runs, steps = increments.shape[:2]
     rows = increments.reshape(runs, steps, -1)
@@ -398,7 +398,7 @@ class ArrayProgram:
             return
         outputs = [_output(x, tape) for x in results.flat]
         self.temporaries = _allocate([*values, outputs], tape)
-        self._operations = _compiled(tape, [*map(len, values), len(outputs), self.temporaries])
+        self._operations = _compile(tape, [*map(len, values), len(outputs), self.temporaries])
 
     def __call__(self, inputs: Sequence[Array], out: Array, work: Array) -> None:
         """Evaluate on arrays (elements, ...) that broadcast to the output, which shares no memory with them."""
@@ -448,7 +448,7 @@ def _allocate(signals: list[list[_Value]], tape: list[_Value]) -> int:
     return count
 
 
-def _compiled(tape: list[_Value], counts: list[int]) -> Callable[..., None]:
+def _compile(tape: list[_Value], counts: list[int]) -> Callable[..., None]:
     """Return a function of the inputs, the output and the work arrays, of which there are so many each.
 
     It is one line of Python for each operation: a loop over them would take as long as numpy does for short arrays.

@@ -130,11 +130,11 @@ class _Process:
         return [part.reshape(shape, order="F") for part, shape in zip(parts, shapes, strict=True)]
 
     def _path(self, sources: Sequence[Sources]) -> tuple[list[str], list[str]]:
-        """Return the folders that leave the path of Octave, and those that come, so that it has these very sources.
+        """Return the folders to remove from the path of Octave and those to add, so that it finds these sources.
 
         A change costs Octave many times what a call does: a folder stays until another has a function of the same name.
         """
-        folders = list(map(self._written, sources))
+        folders = list(map(self._write, sources))
         places = {file: folder for one, folder in zip(sources, folders, strict=True) for file in one.files}
         left = {self._places[file] for file in places.keys() & self._places.keys()} - {*folders}
         self._places = {file: place for file, place in self._places.items() if place not in left}
@@ -142,7 +142,7 @@ class _Process:
         self._places |= places
         return sorted(left), added
 
-    def _written(self, sources: Sources) -> str:
+    def _write(self, sources: Sources) -> str:
         """Return the folder of some sources, written if it is not there."""
         name = cache.digest([part for item in sources.files.items() for part in item])
         folder = self._folder / name

@@ -29,7 +29,7 @@ def begin_worker() -> None:
 
 
 def end_with_parent() -> None:
-    """End this process when the one that started it has ended; in a process that nobody started, do nothing."""
+    """End this process when its parent process has ended; do nothing in a process without a parent."""
 
     def wait(sentinel: int) -> None:
         connection.wait([sentinel])

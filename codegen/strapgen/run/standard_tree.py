@@ -102,7 +102,7 @@ def write(folder: Path, files: dict[str, str]) -> list[Path]:
 
 
 def strangers(folder: Path, files: dict[str, str]) -> list[Path]:
-    """Return the files in a folder that are no part of the tree, and that `write` leaves, as they are not its own."""
+    """Return the files in a folder that do not belong to the tree and that `write` does not remove."""
     return [path for path in _unexpected(folder, files) if not _is_leftover(path, folder, files)]
 
 

@@ -129,14 +129,14 @@ def entry(kind: str, key: str, fill: Callable[[Path], None], what: str = "") -> 
             from_cache(what)
         return there
     for _ in range(_TRIALS):  # another process, whose clock may be wrong, can remove it again
-        place = _filled(kind, key, fill)
+        place = _fill(kind, key, fill)
         if _is_whole(place):
             _prune(place.parent)
             return place
     raise InputError(f"cache entry {place} cannot be made; remove it")
 
 
-def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
+def _fill(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
     """Fill an entry beside its place, and rename it there."""
     advice = "; set STRAPGEN_CACHE_DIR to one that can"
     try:
@@ -158,7 +158,7 @@ def _filled(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
 
 
 def persistently(work: Callable[[], Result]) -> Result:
-    """Return what some work with entries returns; begin it again if another process removes one meanwhile.
+    """Return the result of work with entries; repeat it if another process removes one meanwhile.
 
     A clock that was set wrong makes entries look as if nobody had used them for long.
     """
@@ -262,7 +262,7 @@ def _hashes(folder: Path) -> dict[str, str]:
 
 
 def _is_whole(place: Path) -> bool:
-    """Return whether an entry is there, the user's alone and undamaged; one that is others' is told of."""
+    """Return whether an entry exists, undamaged and owned by the user; warn of one with another owner."""
     try:
         with ownership.private_folder(place, _PRIVATE) as folder:
             hashes = {name: digest([folder.read(name)]) for name in folder.names() if name != _MANIFEST}
@@ -331,7 +331,7 @@ def cached(
             parts = [str(getattr(argument, "identity", argument)) for argument in bound.args]
             parts.append(depends(*bound.args[1:]))
             what = label.format(*bound.args)
-            data = _remembered(kind, parts, what, lambda: stage(*args, **kwargs), copies)
+            data = _load(kind, parts, what, lambda: stage(*args, **kwargs), copies)
             result: R = pickle.loads(data) if copies else data
             return result
 
@@ -340,7 +340,7 @@ def cached(
     return decorate
 
 
-def _remembered(kind: str, parts: list[str], what: str, work: Callable[[], Any], as_bytes: bool) -> Any:
+def _load(kind: str, parts: list[str], what: str, work: Callable[[], Any], as_bytes: bool) -> Any:
     """Return a result, or its pickle, which a process checks and reads once; the log has every use."""
     place = root(), kind, generator_digest(), *parts
     result = _results.pop(place, None)

@@ -38,7 +38,7 @@ def draft_folder(parent: Path, prefix: str) -> Iterator[Path]:
     for _ in range(_TRIALS):
         place = parent / f"{prefix}{secrets.token_hex(4)}"
         place.mkdir(mode=0o700)
-        descriptor = _locked(place)
+        descriptor = _lock(place)
         if descriptor is not None:  # else another process took it for a forgotten one, before it was locked
             break
         shutil.rmtree(place, ignore_errors=True)
@@ -66,7 +66,7 @@ def forgotten(parent: Path, prefix: str) -> Iterator[Path]:
             is_mine = not hasattr(os, "geteuid") or status.st_uid == os.geteuid()
             if not stat.S_ISDIR(status.st_mode) or not is_mine:
                 continue
-            descriptor = _locked(place)
+            descriptor = _lock(place)
             if descriptor is None or (descriptor < 0 and 0 <= time.time() - status.st_mtime < _FORGOTTEN):
                 continue
             try:
@@ -91,7 +91,7 @@ def temporary_folder() -> Iterator[Path]:
         yield place
 
 
-def _locked(place: Path) -> int | None:
+def _lock(place: Path) -> int | None:
     """Return a descriptor that locks a folder, -1 where there are no locks, None if another process has it."""
     if fcntl is None:
         return -1

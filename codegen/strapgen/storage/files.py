@@ -115,7 +115,7 @@ def _place(nominal: Path) -> Path:
 
 
 def _home(place: Path, folder: Path) -> Path:
-    """Return the folder for the hidden one: that of all files, unless a file cannot be renamed from there."""
+    """Return the parent of the hidden folder: the common folder, unless a file cannot be renamed from there."""
     inside = place.is_relative_to(folder) and os.access(folder, os.W_OK)
     return folder if inside and folder.stat().st_dev == place.parent.stat().st_dev else place.parent
 

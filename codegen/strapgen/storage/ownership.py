@@ -1,4 +1,4 @@
-"""Opens folders and files that nobody but the user can change, and refuses others.
+"""Opens folders and files that only the user can change, and refuses others.
 
 What the cache holds is executed. A folder is opened from the root of the file system downwards, each part in the part
 before it, and every part is checked on its descriptor: once a part has passed, nobody but the user and the

@@ -212,12 +212,12 @@ class StatementPrinter:
         return name
 
     def _declared(self, kind: str, name: str, text: str, note: str = "", constant: bool = True) -> str:
-        """Return a declaration, its value on a line of its own where the first line would be too long."""
+        """Return a declaration, with its value on the next line if the first line would be too long."""
         indent, start = " " * 8, self.start(kind, name, constant)
         statement = fill_expression(f"{start} {text};", indent, 92)
         if len(statement.partition("\n")[0]) > 92:
             statement = f"{start}\n" + fill_expression(f"{indent}{text};", indent, 96)
-        return _noted(statement, note) if note else statement
+        return _with_comment(statement, note) if note else statement
 
     def statements(self, value: Value) -> list[str]:
         """Return the statements that compute a value."""
@@ -237,7 +237,7 @@ class StatementPrinter:
                 lines.append(self._declared(kind, name, self.narrowed(first, value), note, constant=False))
                 for other in others:
                     lines.append(_branch("if", self.scaled(other), ">", self.as_wide(name)))
-                    lines.append(_assigned(name, self.narrowed(other, value)))
+                    lines.append(_assign(name, self.narrowed(other, value)))
                     lines.append("}")
             case IntegerOperation("select", arguments):
                 lines += self._selection(value, kind, arguments, note)
@@ -252,13 +252,13 @@ class StatementPrinter:
 
     def _selection(self, value: Value, kind: str, arguments: Sequence[Scaled], note: str) -> list[str]:
         """Return a chain of conditions, the first that holds before all others."""
-        lines = [_noted(self.unset(kind, value.name), note)]
+        lines = [_with_comment(self.unset(kind, value.name), note)]
         for number, (left, right, result) in enumerate(cases_of(arguments)):
             word = "if" if not number else "} else if"
             lines.append(_branch(word, self.scaled(left), ">=", self.scaled(right)))
-            lines.append(_assigned(value.name, self.narrowed(result, value)))
+            lines.append(_assign(value.name, self.narrowed(result, value)))
         lines.append("} else {")
-        lines.append(_assigned(value.name, self.narrowed(arguments[-1], value)))
+        lines.append(_assign(value.name, self.narrowed(arguments[-1], value)))
         return [*lines, "}"]
 
     def _guard(self, name: str, value: Value) -> list[str]:
@@ -287,13 +287,13 @@ class StatementPrinter:
 
     def _sum(self, value: Value, definition: IntegerSum, kind: str, note: str) -> list[str]:
         name, wide = value.name, self.word.wide
-        fine = self._joined([self.term(term) for term in definition.fine])
+        fine = self._join([self.term(term) for term in definition.fine])
         if not definition.shift:
             terms = (*definition.coarse, *definition.fine)
             if definition.in_words and all(map(self._is_word, terms)):
-                text = self._joined([self.word_term(term) for term in terms])
+                text = self._join([self.word_term(term) for term in terms])
                 return [self._declared(kind, name, text or "0", note)]
-            return self._result(value, kind, self._joined([self.term(term) for term in terms]) or "0", note)
+            return self._result(value, kind, self._join([self.term(term) for term in terms]) or "0", note)
         feedback, lines, shift = definition.residual, [], definition.shift
         if feedback is None:
             half = f" + {self.constant(1 << (definition.shift - 1), wide=True)}" if self.nearest else ""
@@ -316,13 +316,13 @@ class StatementPrinter:
         if definition.in_words and all(map(self._is_word, definition.coarse)):
             words = [self.word_term(term) for term in definition.coarse]
             rounded = f"+{self._call('fit', total, str(shift))}"
-            text = self._joined([*words[:1], rounded, *words[1:]])
+            text = self._join([*words[:1], rounded, *words[1:]])
             return [*lines, self._declared(kind, name, text, note)]
         coarse = [self.term(term) for term in definition.coarse]
         if not coarse and not value.range_checked and not value.saturated:
             return [*lines, self._declared(kind, name, self.narrow(total, value, shift), note)]
         rounded = f"+{self._shifted(total, shift)}"
-        return lines + self._result(value, kind, self._joined([*coarse[:1], rounded, *coarse[1:]]), note)
+        return lines + self._result(value, kind, self._join([*coarse[:1], rounded, *coarse[1:]]), note)
 
     def _result(self, value: Value, kind: str, text: str, note: str) -> list[str]:
         """Return the statements that store a sum; a word with a range check is checked before it is narrowed."""
@@ -355,7 +355,7 @@ class StatementPrinter:
         return sign + (f"{name} * {self.constant(1 << term.shift)}" if term.shift else name)
 
     @staticmethod
-    def _joined(terms: list[str]) -> str:
+    def _join(terms: list[str]) -> str:
         """Return signed terms as a sum."""
         text = ""
         for term in terms:
@@ -395,7 +395,7 @@ class StatementPrinter:
             + (f" * {self.constant(1 << power, wide=True)}" if power else "")
             for digit, power in signed_digits(abs(term.factor))
         ]
-        return f"({self._joined(terms)}){_exactly(term)}"
+        return f"({self._join(terms)}){_exactly(term)}"
 
     def _scaled_text(self, text: str, shift: int) -> str:
         """Return an expression times a power of two."""
@@ -460,12 +460,12 @@ def _branch(word: str, left: str, sign: str, right: str) -> str:
     return text if len(text) <= 95 else f"{word} ({left}\n        {sign} {right}) {{"
 
 
-def _assigned(name: str, text: str) -> str:
+def _assign(name: str, text: str) -> str:
     """Return an assignment inside a block."""
     return fill_expression(f"    {name} = {text};", " " * 12, 95)
 
 
-def _noted(statement: str, note: str) -> str:
+def _with_comment(statement: str, note: str) -> str:
     """Return a statement with a comment behind it, or on the next line where there is no room."""
     beside = len(statement.rpartition("\n")[2]) + len(note) + 7 <= 95
     return f"{statement} /* {note} */" if beside else f"{statement}\n        /* {note} */"

@@ -9,7 +9,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 
-from strapgen.ir.fixed_settings import TURNING, Settings
+from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings
 from strapgen.ir.formats import Format, above, below, places_above
 from strapgen.ir.integer_program import FixedProgram, Value
 from strapgen.ir.interfaces import (
@@ -80,7 +80,7 @@ def options(settings: Settings, inputs: Iterable[Signal] = (), *, keep_stated: b
     if keep_stated and settings.stated:
         largest = settings.stated
         words.append(largest)
-    elif any(signal.name in TURNING for signal in inputs):
+    elif any(signal.name in ROTATION_INPUTS for signal in inputs):
         largest = settings.stated or f"--max-angle-rad {settings.largest_angle}"
         words.append(largest)
     if settings.sensor is not None and settings.sensor.stated not in largest:
@@ -117,7 +117,7 @@ def _accumulation_text(accumulation: RoundingAccumulation, program: Program, sta
 
 
 def upkeep_text(program: Program, interface: Interface | None = None, target: str = "c") -> str:
-    """Return advice on normalizing the state of a step, before and after an error code; "" for another kernel."""
+    """Return the instructions on normalizing the state of a step; "" for another kernel."""
     if program.attitude_step is None or program.attitude_step.orthonormalize is None:
         return ""
     kernel = program.attitude_step.orthonormalize
@@ -302,9 +302,9 @@ def _angle(value: float) -> str:
 def with_names(bounds: RoundingBounds, program: Program, named: Program) -> RoundingBounds:
     """Return the bounds of a program with the names that are printed."""
     # A value on the way may have the name of an input or of an output.
-    inputs = _renamed([s.name for s in program.inputs], [s.name for s in named.inputs])
-    values = _renamed([a.name for a in program.body], [a.name for a in named.body])
-    outputs = _renamed([r.signal.name for r in program.outputs], [r.signal.name for r in named.outputs])
+    inputs = _rename([s.name for s in program.inputs], [s.name for s in named.inputs])
+    values = _rename([a.name for a in program.body], [a.name for a in named.body])
+    outputs = _rename([r.signal.name for r in program.outputs], [r.signal.name for r in named.outputs])
 
     def renamed(condition: Condition, names: dict[str, str]) -> Condition:
         words, space, name = condition.value.rpartition(" ")
@@ -318,7 +318,7 @@ def with_names(bounds: RoundingBounds, program: Program, named: Program) -> Roun
     )
 
 
-def _renamed(names: list[str], printed: list[str]) -> dict[str, str]:
+def _rename(names: list[str], printed: list[str]) -> dict[str, str]:
     return dict(zip(names, printed, strict=True))
 
 

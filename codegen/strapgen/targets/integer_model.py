@@ -63,7 +63,7 @@ def _statements(value: Value, fixed: FixedProgram, other: Mapping[str, str]) -> 
 
 def _expression(operation: IntegerOperation) -> str:
     """Return a quotient, a root, a maximum or a selection as an expression."""
-    first, *others = arguments = [_scaled(argument) for argument in operation.arguments]
+    first, *others = arguments = [_scale(argument) for argument in operation.arguments]
     match operation.kind:
         case "divide":
             return f"_quotient({', '.join(arguments)})"
@@ -93,28 +93,28 @@ def _sum(value: Value, definition: IntegerSum, fixed: FixedProgram, label: str) 
         lines.append(f'{name}_kept = _total("{label}", {value.peak}, {", ".join(fine)}) >> {definition.drop}')
         fine = [f"{name}_kept"]
     if feedback is not None:
-        fine.append(_shifted(feedback.name, feedback.shift))
+        fine.append(_shift(feedback.name, feedback.shift))
     elif fixed.interface.settings.rounding == "nearest":
         fine.append(str(1 << (definition.shift - 1)))
     lines.append(f'{name}_sum = _total("{label}", {value.peak}, {", ".join(fine)})')
     if feedback is not None:
         mask = (1 << fixed.word) - 1
-        lines.append(f"{_fresh(feedback.name)} = {_shifted(f'{name}_sum', -feedback.shift)} & {mask}")
-    rounded = _shifted(f"{name}_sum", -definition.shift)
+        lines.append(f"{_fresh(feedback.name)} = {_shift(f'{name}_sum', -feedback.shift)} & {mask}")
+    rounded = _shift(f"{name}_sum", -definition.shift)
     lines.append(f'{name} = _total("{label}", {value.peak}, {", ".join([rounded, *coarse])})')
     return lines
 
 
-def _shifted(text: str, shift: int) -> str:
+def _shift(text: str, shift: int) -> str:
     if not shift:
         return text
     return f"({text} << {shift})" if shift > 0 else f"({text} >> {-shift})"
 
 
-def _scaled(scaled: Scaled) -> str:
+def _scale(scaled: Scaled) -> str:
     if isinstance(scaled.value, int):
         return str(scaled.value << scaled.shift if scaled.shift > 0 else scaled.value)
-    return _shifted(scaled.value, scaled.shift)
+    return _shift(scaled.value, scaled.shift)
 
 
 def _term(term: Term) -> str:
@@ -124,4 +124,4 @@ def _term(term: Term) -> str:
     text = " * ".join([*term.names, *factor])
     if term.factor < 0:
         text = f"-{text}"
-    return _shifted(f"({text})" if not text.isidentifier() else text, term.shift)
+    return _shift(f"({text})" if not text.isidentifier() else text, term.shift)

@@ -112,7 +112,7 @@ def _code(program: Program, printer: _MatlabPrinter) -> dict[str, object]:
 
 def _signature(name: str, outputs: Sequence[str], inputs: Sequence[str]) -> str:
     returned = outputs[0] if len(outputs) == 1 else f"[{', '.join(outputs)}]"
-    return _continued(fill_arguments(f"{returned} = {name}({', '.join(inputs)})", " " * 4, 86))
+    return _continue_lines(fill_arguments(f"{returned} = {name}({', '.join(inputs)})", " " * 4, 86))
 
 
 def _loads(program: Program, used: Container[str]) -> Iterable[str]:
@@ -151,10 +151,10 @@ def _array(elements: list[str], shape: tuple[int, ...]) -> str:
 
 
 def _statement(name: str, value: str, indent: int = 8) -> str:
-    return _continued(fill_expression(f"{name} = {value};", " " * indent, 92))
+    return _continue_lines(fill_expression(f"{name} = {value};", " " * indent, 92))
 
 
-def _continued(text: str) -> str:
+def _continue_lines(text: str) -> str:
     """Return a statement that goes on in the next line with the mark that says so."""
     return text.replace("\n", " ...\n")
 

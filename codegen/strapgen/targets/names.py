@@ -143,16 +143,16 @@ _SHORT = {
 }
 
 
-def _replaced(name: str, word: str, other: str) -> str:
+def _replace(name: str, word: str, other: str) -> str:
     """Return a name with another word in place of each that is the same."""
     return re.sub(rf"(?<![a-z]){word}(?![a-z])", other, name)
 
 
-def _marked(name: str) -> str:
+def _mark(name: str) -> str:
     """Mark the short words of a name that is long enough with long words in their place."""
     longest = marked = name
     for word, short in _SHORT.items():
-        longest, marked = _replaced(longest, short, word), _replaced(marked, short, f"{short}_Kernel")
+        longest, marked = _replace(longest, short, word), _replace(marked, short, f"{short}_Kernel")
     return marked if len(longest) > _MOST else name
 
 
@@ -166,10 +166,10 @@ def external(name: str, ending: str = "") -> str:
     >>> external("dcm_orth_optimal"), external("mrp_norm")
     ('dcm_orth_Kernel_optimal', 'mrp_norm')
     """
-    name = _marked(name)
+    name = _mark(name)
     for word, short in _SHORT.items():
         if len(name) > _MOST:
-            name = _replaced(name, word, short)
+            name = _replace(name, word, short)
     name += ending
     free = _c_allows(name) and name not in LIBRARY and not name.endswith("_t")
     return name if free else f"{name}_Kernel"  # a capital letter stands in no other kernel's name
@@ -252,13 +252,13 @@ def printed(
     names = keys(program, frozenset(joined))
     marks = {key: f"{_MARK}{number}{_MARK}" for number, key in enumerate(names)}
     marked = text(renamed(program, marks, joined), {})
-    chosen = _chosen(marks, language, language.scopes(marked.values()))
+    chosen = _choose(marks, language, language.scopes(marked.values()))
     result = renamed(program, chosen, joined)
     return result, text(result, {new: key.name for key, new in chosen.items() if new != key.name})
 
 
-def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]) -> dict[Key, str]:
-    """Return a name for every mark: the kernel's where it is free, otherwise a similar one."""
+def _choose(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]) -> dict[Key, str]:
+    """Return a name for every mark: that of the kernel if it is free, otherwise a similar one."""
     reserved = [{name for name in scope if _MARK not in name} for scope in scopes]
     places: dict[str, list[tuple[str, set[str]]]] = {mark: [] for mark in marks.values()}
     for scope, names in zip(scopes, reserved, strict=True):
@@ -277,19 +277,19 @@ def _chosen(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]
         chosen[key] = name
         return True
 
-    waiting = [key for key in marks if not settle(key, _abbreviated(key, language.most))]
+    waiting = [key for key in marks if not settle(key, _abbreviate(key, language.most))]
     for key in waiting:
         next(name for name in _alike(key) if settle(key, name))
     return chosen
 
 
-def _abbreviated(key: Key, most: int | None) -> str:
+def _abbreviate(key: Key, most: int | None) -> str:
     """Return the name of a value with abbreviated words, as many as it takes."""
     name = key.name
     for word, short in _PARTS.items():
         if most is None or key.kind != "value" or len(name) <= most:
             break
-        name = _replaced(name, word, short)
+        name = _replace(name, word, short)
     return name
 
 

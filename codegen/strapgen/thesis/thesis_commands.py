@@ -62,10 +62,10 @@ def tables(
         return _predict(output)
     from strapgen.thesis.tables_report import ThesisTablesResult
 
-    output.show(ThesisTablesResult(_simulated(backend or runnable(), table, orthonormalize, fixed)))
+    output.show(ThesisTablesResult(_simulate(backend or runnable(), table, orthonormalize, fixed)))
 
 
-def _simulated(
+def _simulate(
     names: tuple[str, ...], table: int | None, orthonormalize: Positive, fixed: FixedOptions
 ) -> list[TableEntry]:
     """Return the entries of the tables, or of one of them, on some back ends."""

@@ -89,7 +89,7 @@ def init(
     files: dict[str, str] = {}
     if brief is None:
         stated = {"sample_hz": sample_hz, "max_rate_deg_s": max_rate_deg_s, "target": target, "word": word}
-        keys = _answered(stated, out)
+        keys = _ask(stated, out)
     else:
         keys, files = _of_brief(brief)
         keys["out"] = _answer("Folder for the code", out, "firmware")
@@ -110,7 +110,7 @@ def _answer(question: str, stated: Any, default: Any) -> str:
     return str(default)
 
 
-def _answered(stated: dict[str, Any], out: Path | None) -> dict[str, Any]:
+def _ask(stated: dict[str, Any], out: Path | None) -> dict[str, Any]:
     from strapgen.targets import TARGETS
 
     keys: dict[str, Any] = {"algorithm": "euler", "method": "rk4", "increments": "2"}
@@ -138,13 +138,13 @@ def _of_brief(file: Path) -> tuple[dict[str, Any], dict[str, str]]:
     from strapgen.design.selection.candidates import contenders
     from strapgen.design.selection.judgement import in_order, judgements
     from strapgen.design.selection.selection_report import COEFFICIENTS, REPORT, firmware_files
-    from strapgen.design.selection.simulated import algorithm_named, confirmed
+    from strapgen.design.selection.simulated import algorithm_named, confirm
     from strapgen.run.standard_tree import command_of
 
     brief = read_brief(file)
     several = contenders(brief, None)
     rows = track(judgements(file, several, None, None, None), "judging", len(several))
-    ordered = confirmed(brief, file, in_order(one for row in rows for one in row))
+    ordered = confirm(brief, file, in_order(one for row in rows for one in row))
     if not ordered or not ordered[0].meets:
         raise InputError(f"{file}: no algorithm meets the brief; strapgen design {file} shows why")
     best = ordered[0]

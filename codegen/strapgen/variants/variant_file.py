@@ -24,7 +24,7 @@ from strapgen.results.records import UNITS
 #: The file of a folder, and the one whose table tool.strapgen is the same.
 NAME, PYPROJECT = "strapgen.toml", "pyproject.toml"
 #: Parameters of ``strapgen generate`` that say what it does with files that are there.
-_NOT_OF_A_VARIANT = ("all_", "check", "force", "format", "variant")
+_NOT_OF_A_VARIANT = ("all_", "file", "check", "force", "format", "variant")
 #: Keys that may have a list, of which each has its code; the names that a variant may have.
 _SEVERAL = ("target", "word")
 _VARIANT_NAME = r"[A-Za-z][A-Za-z0-9_-]*"

@@ -14,7 +14,7 @@ import sympy as sp
 import strapgen
 from strapgen import catalogue, derive
 from strapgen.catalogue import ALGORITHMS, INTEGRATORS, MOST_INCREMENTS
-from strapgen.catalogue.methods.method import increments_signal, label, labels, turns_signal
+from strapgen.catalogue.methods.method import increments_signal, label, labels, node_rotations_signal
 from strapgen.catalogue.methods.tableaux import TABLEAUX, Tableau, read
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.design.commit_late.late_filters import LateFilters
@@ -96,12 +96,12 @@ def test_nodes_of_every_method_have_names_of_their_own(name):
     assert len(elements) == len(set(elements))
     assert all(element.isidentifier() for element in elements)
     samples = kernel.inputs[1]
-    assert (samples.name, samples.unit) == ("turns", "rad")
+    assert (samples.name, samples.unit) == ("node_rotations", "rad")
     assert all(re.fullmatch(r"turn_(minus_)?\d+(_\d+)?_[xyz]", element) for element in samples.elements)
 
 
 def test_a_signal_of_rates_lists_its_nodes():
-    signal = turns_signal([Fraction(0), sp.sqrt(2) / 2])
+    signal = node_rotations_signal([Fraction(0), sp.sqrt(2) / 2])
     assert signal.elements[::3] == ("turn_0_x", "turn_0_7071_x")
     assert signal.meaning.endswith("at nodes 0, sqrt(2)/2 of the step")
 
@@ -199,7 +199,7 @@ def test_a_step_by_a_tableau_of_a_file_says_the_command_that_makes_it(tmp_path):
     assert kernel.source.endswith(HEUN.split('"')[3])
 
 
-def test_titles_count_what_is_given():
+def test_titles_count_the_given_samples():
     def given(*chosen: object, **rest: object) -> str:
         return derive("euler", *chosen, **rest).title.split(" from ")[1]
 

@@ -365,7 +365,7 @@ def test_the_velocity_is_that_of_the_equation(form, rng):
 
 
 @pytest.mark.parametrize("what", ["acceleration", "velocity-1", "velocity-2"])
-def test_euler_parameters_give_what_the_matrix_gives(what):
+def test_euler_parameters_agree_with_the_matrix(what):
     # As polynomials, on the unit sphere: the matrix of a quaternion is that of dcm-from-euler.
     by_matrix, by_parameters = derive(f"dcm-{what}"), derive(f"euler-{what}")
     names = [name for signal in by_parameters.inputs for name in signal.elements]

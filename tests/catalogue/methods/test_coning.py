@@ -73,7 +73,7 @@ def test_pairs_are_ordered_by_the_newer_sample_the_newest_pair_last(samples, pre
 
 
 @pytest.mark.parametrize("samples", range(2, MOST_INCREMENTS + 1))
-def test_compressed_coefficients_leave_what_the_literature_says(samples):
+def test_compressed_coefficients_have_published_residual(samples):
     # N N! / (2^(N+1) (1 3 ... (2N+1))) alpha^2 lambda^(2N+1) in a slow cycle.
     found = design(samples).residual().leading
     odd = math.prod(range(1, 2 * samples + 2, 2))

@@ -254,7 +254,7 @@ def test_a_series_that_leaves_out_part_of_the_rate_is_refused():
     assert choose("euler", "taylor20", 8, previous=12).method == "taylor20"
 
 
-def test_what_it_would_leave_out_is_of_first_order():
+def test_omitted_powers_are_of_first_order():
     # Five samples: without the fourth power of time, about the middle of the step, it would not turn by their sum.
     fit, half = rate_fit.from_increments(5), sp.Rational(1, 2)
     angles = [

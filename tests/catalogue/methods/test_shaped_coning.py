@@ -31,7 +31,7 @@ def text() -> str:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", SHAPES)
-def test_built_in_coefficients_are_what_they_are_said_to_be(name):
+def test_built_in_coefficients_have_their_stated_properties(name):
     shaped_coning.verify(SHAPES[name])
     assert shaped_coning.SHAPE_TITLES[name] == SHAPES[name].title
 

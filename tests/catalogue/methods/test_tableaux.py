@@ -130,7 +130,7 @@ def test_irrational_nodes_are_exact():
     assert roots == {(r + 1) / 2 for r in sp.roots((x**2 - 1) * sp.legendre(4, x).diff(x))}
 
 
-def test_what_is_generated_depends_on_the_files():
+def test_generated_code_depends_on_the_files():
     assert set(FOLDER.iterdir()) <= set(resources.package_files())
 
 
@@ -247,7 +247,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("said", WRONG)
-def test_what_is_wrong_is_told_in_one_line(said, written):
+def test_errors_are_reported_in_one_line(said, written):
     with pytest.raises(InputError) as caught:
         read(written(**WRONG[said]))
     message = str(caught.value)

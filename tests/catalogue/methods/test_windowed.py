@@ -121,7 +121,7 @@ def test_the_series_leaves_out_no_more_than_is_stated(algorithm, scale):
 
 
 @pytest.mark.long
-def test_bounds_have_what_the_series_leaves_out():
+def test_bounds_include_the_truncation_error():
     program = lower(derive("euler", "window-3-3"))
     near, far = (
         max(rounding_bounds(program, settings=Settings(largest_angle=Fraction(1, part))).errors["next"])

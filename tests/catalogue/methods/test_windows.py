@@ -196,7 +196,7 @@ def test_conditions_that_determine_nothing_are_refused():
         )
 
 
-def test_what_is_generated_depends_on_the_files():
+def test_generated_code_depends_on_the_files():
     assert set(FOLDER.iterdir()) <= set(resources.package_files())
 
 

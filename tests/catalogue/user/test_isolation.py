@@ -28,7 +28,7 @@ def folders(tmp_path: Path) -> list[str]:
     return files
 
 
-def test_dataclasses_and_what_else_asks_for_the_module_work(tmp_path):
+def test_dataclasses_find_their_module(tmp_path):
     beginning = "from __future__ import annotations\nfrom dataclasses import dataclass\nimport sys, typing\n"
     beginning += (
         "@dataclass\nclass Settings:\n    word: str = 'of a dataclass'\n    count: typing.ClassVar[int] = 3\n"
@@ -47,7 +47,7 @@ def test_each_file_gets_the_helper_beside_it(folders, order):
 
 
 @pytest.mark.long
-def test_what_is_imported_late_is_found_too(tmp_path):
+def test_late_imports_are_recorded(tmp_path):
     for word in ("first", "second"):
         path = written(tmp_path / word / "own.py", inside="from parts.late import WORD")
         (tmp_path / word / "parts").mkdir()

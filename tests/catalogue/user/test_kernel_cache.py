@@ -162,12 +162,12 @@ WORKER = (
         *("worker", "database", "library"),
     ],
 )
-def test_what_depends_on_more_than_files_is_derived_every_time(derives, file, helper):
+def test_kernels_that_depend_on_more_than_files_are_not_cached(derives, file, helper):
     beside(file, helper=helper)
     assert [derives(file)[0], derives(file)[0]] == [True, True]
 
 
-def test_a_kernel_with_a_class_of_its_own_is_derived_every_time(derives, file):
+def test_kernel_with_user_class_is_not_cached(derives, file):
     beside(file, helper="WORD = 'one'\n")
     text = Path(file).read_text().replace("def algorithm", "class Note(str):\n    pass\n\ndef algorithm")
     Path(file).write_text(text.replace("str(WORD)", "Note(WORD)"))
@@ -188,7 +188,7 @@ def test_an_algorithm_that_is_made_of_another_one_follows_it(derives, file, tmp_
     assert derives(file) == (True, "changed and outer")
 
 
-def test_what_fails_is_not_kept(derives, file):
+def test_failed_derivations_are_not_cached(derives, file):
     beside(file, base="WORD = '\\n'\n")
     for _ in range(2):
         with pytest.raises(InputError, match="its title is no text of one line"):

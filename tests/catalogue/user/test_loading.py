@@ -132,7 +132,7 @@ def test_names_of_the_catalogue_are_not_hidden_by_entry_points(monkeypatch):
 
 
 @pytest.mark.long
-def test_what_a_file_says_now_counts(folder):
+def test_changed_file_is_derived_anew(folder):
     assert strapgen.backend("picard.py").propagate(np.full((1, 2, 3), 0.1))[-1][3] < 1
     text = (folder / "picard.py").read_text()
     (folder / "picard.py").write_text(text.replace("1 - square / 2]", "1]"))
@@ -278,12 +278,18 @@ WRONG = {
     "nodes of increments": (
         ",) * 9)",
         ",) * 9, nodes=(0,))",
-        "takes increments and has nodes; nodes go with turns",
+        "takes increments and has nodes; nodes go with node_rotations",
     ),
-    "no nodes": ('Signal("increments"', 'Signal("turns"', "its attitude_step needs as many different nodes"),
+    "no nodes": (
+        'Signal("increments"',
+        'Signal("node_rotations"',
+        "its attitude_step needs as many different nodes",
+    ),
     "a decimal node": (
         FROM_INCREMENTS,
-        FROM_INCREMENTS.replace('"increments"', '"turns"').replace(",) * 9)", ",) * 9, nodes=(0.5,))"),
+        FROM_INCREMENTS.replace('"increments"', '"node_rotations"').replace(
+            ",) * 9)", ",) * 9, nodes=(0.5,))"
+        ),
         "its nodes are (0.5,); whole numbers and fractions.Fraction are needed",
     ),
     "output": (
@@ -327,6 +333,18 @@ WRONG = {
 }
 
 
+def test_old_name_of_node_rotations_warns(tmp_path):
+    text = (Path(__file__).parents[3] / "examples" / "rates_at_nodes.py").read_text()
+    (tmp_path / "mine.py").write_text(
+        text.replace(
+            "node_rotations_signal(NODES)", 'replace(node_rotations_signal(NODES), name="turns")'
+        ).replace("from fractions", "from dataclasses import replace\nfrom fractions")
+    )
+    with pytest.warns(DeprecationWarning, match="input turns of kernel .* is now node_rotations"):
+        kernel = strapgen.derive(str(tmp_path / "mine.py"))
+    assert kernel.inputs[1].name == "turns" and kernel.attitude_step.nodes
+
+
 def test_the_step_of_the_refusals_is_right(tmp_path):
     (tmp_path / "mine.py").write_text(STEP)
     assert strapgen.derive(str(tmp_path / "mine.py")).name == "mine"
@@ -334,7 +352,7 @@ def test_the_step_of_the_refusals_is_right(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", WRONG)
-def test_what_cannot_be_used_is_refused_in_one_line(case, tmp_path, monkeypatch, capsys):
+def test_invalid_input_is_refused_in_one_line(case, tmp_path, monkeypatch, capsys):
     old, new, said = WRONG[case]
     assert STEP.count(old) == 1
     monkeypatch.chdir(tmp_path)
@@ -462,7 +480,7 @@ def test_a_program_is_the_same_polynomial_as_a_user_s_kernel(here):
     assert [ring(element) for element in result["next"]] == kernel.polynomials()["next"]
 
 
-def test_what_lies_beside_a_file_can_be_imported_and_what_it_prints_is_no_output(tmp_path, capsys):
+def test_neighbour_modules_import_and_their_prints_are_no_output(tmp_path, capsys):
     (tmp_path / "coefficients.py").write_text("FACTOR = 2\n")
     text = STEP.replace(
         "import sympy as sp", "import sympy as sp\nfrom coefficients import FACTOR\nprint('hello')"

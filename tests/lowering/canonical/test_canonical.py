@@ -142,7 +142,7 @@ def test_a_transition_depends_on_nothing_but_the_increments():
 
 
 @EVERY
-def test_values_are_named_after_what_they_are(choice):
+def test_values_have_descriptive_names(choice):
     # Only partial sums and factors that a pass shares have no meaning: few in a matrix, none in a quaternion.
     temporaries = [a.name for a in program(choice).body if is_temporary(a.name)]
     assert len(temporaries) <= (3 if choice.name == "dcm" else 0)
@@ -324,7 +324,7 @@ def test_the_program_does_not_depend_on_how_the_step_was_written():
         "three skew matrices",
     ],
 )
-def test_what_turns_with_its_inputs_has_canonical_forms_that_are_exact(kernel):
+def test_covariant_transitions_have_exact_canonical_forms(kernel):
     core = canonical.extract_core(kernel)
     assert canonical.forms(core)
     expected = kernel.polynomials()
@@ -416,7 +416,7 @@ def test_a_transition_that_is_always_the_same():
     assert polynomials(lower(kernel)) == kernel.polynomials()
 
 
-def test_a_linear_stage_may_call_its_elements_what_it_likes():
+def test_linear_stage_may_have_any_element_names():
     def transition(build: KernelBuilder, d: list[sp.Matrix]) -> list:
         w = build.stage(Signal("turn", (3,), ("roll", "pitch", "yaw")), d[0] / 2)
         return [*w, 1 - dot(w, w) / 2]

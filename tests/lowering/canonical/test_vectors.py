@@ -220,13 +220,13 @@ def test_a_copy_goes_its_own_way():
     assert other.copy().vectors == other.vectors
 
 
-def test_what_has_a_name_in_the_field_gets_it():
+def test_vectors_get_their_standard_names():
     made = pool(2, {form(1, 1): ("sigma", "the whole step")})
     assert made.define(form(2, 2)) == ("sigma", 2)
     assert made.vectors["sigma"].meaning == "the whole step"
 
 
-def test_a_multiple_of_what_has_a_name_says_so():
+def test_multiple_of_a_named_vector_is_recognized():
     made = pool(2, {form(3, -1): ("turn_0", "rate at the start")})
     assert made.define(form(3, -1)) == ("turn_0_scaled", 3)
     assert made.vectors["turn_0_scaled"].meaning == "rate at the start, times 1/3"

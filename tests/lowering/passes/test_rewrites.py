@@ -284,7 +284,7 @@ def test_results_keep_signs_and_scalings(run, text, results, transition, parse):
         ("part = x * x; other = x + 1; y = z * z", "part", "part = x * x; y = z * z"),
     ],
 )
-def test_what_no_result_needs_is_dropped(before, transition, after, parse, show):
+def test_unused_values_are_dropped(before, transition, after, parse, show):
     assert show(remove_unused(parse(before, "y", transition))) == after
 
 
@@ -419,7 +419,7 @@ def test_opposite_pairs_are_one_difference(parse, show):
         "y = a * a * a * a",  # within one product nothing is paired twice
     ],
 )
-def test_where_no_pair_stands_twice_the_program_stays_the_same(parse, text):
+def test_program_without_repeated_pairs_is_unchanged(parse, text):
     program = parse(text)
     assert share_pairs(program) is program
 

@@ -167,7 +167,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
     try:
         result = _rational(attitude_step.domain, kernel, {**identity, **turned}, attitude)
     except _NotRationalError:
-        result = _simplified(kernel, {**identity, **turned}, attitude)
+        result = _simplify(kernel, {**identity, **turned}, attitude)
     scalar = next((k for k, x in enumerate(step_kernels.identity) if x), 0)
     return ConstantRate(kernel.name, *result.part(scalar), attitude_step.lowest)
 
@@ -226,7 +226,7 @@ def _rational(
     )
 
 
-def _simplified(kernel: Kernel, values: dict[str, Any], attitude: Kernel | None) -> _StepResult:
+def _simplify(kernel: Kernel, values: dict[str, Any], attitude: Kernel | None) -> _StepResult:
     """Return the result of a step that uses functions of the angle, simplified by SymPy."""
 
     def evaluated(each: Kernel, inputs: dict[str, Any]) -> list[sp.Expr]:

@@ -332,7 +332,7 @@ def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
     names = [str(symbol) for symbol in ring.symbols]
     extended, y, half, *_ = sp.ring(["y", "half_over_S", *names], ring.domain)
 
-    def lifted(element: Powers) -> Powers:
+    def lift(element: Powers) -> Powers:
         # Division of log(M R') by h lowers each power by one. Below the first power of the error rate only rounding
         # is left.
         parts = {
@@ -342,7 +342,7 @@ def _eigenvalue(error: ErrorRate, top: int) -> dict[int, tuple[sp.Expr, sp.Expr]
         }
         return Powers(extended, parts, top)
 
-    m = [[lifted(element) for element in row] for row in error.raw]
+    m = [[lift(element) for element in row] for row in error.raw]
     trace = m[0][0] + m[1][1] + m[2][2]
     minors = sum(
         (m[i][i] * m[j][j] - m[i][j] * m[j][i] for i, j in ((0, 1), (0, 2), (1, 2))),
@@ -390,19 +390,19 @@ def _drift_about_an_axis(error: ErrorRate) -> RunDrift:
     """Return the drift of a motion about a fixed axis, which is the integral of the error rate."""
     secular, bounded, growth = {}, {}, {}
     for power, matrix in error.matrices.items():
-        mean, swing = _integrated(_drift(matrix), error)
+        mean, swing = _integrate(_drift(matrix), error)
         if any(mean):
             secular[power] = mean
         if any(swing):
             bounded[power] = swing
         across = (matrix[0, 0] + matrix[2, 2]) / 2
-        (gained,), _ = _integrated(sp.Matrix([across]), error)
+        (gained,), _ = _integrate(sp.Matrix([across]), error)
         if gained:
             growth[power] = gained
     return RunDrift(error.kernel, error.motion, secular, bounded, growth)
 
 
-def _integrated(rates: sp.Matrix, error: ErrorRate) -> tuple[sp.Matrix, sp.Matrix]:
+def _integrate(rates: sp.Matrix, error: ErrorRate) -> tuple[sp.Matrix, sp.Matrix]:
     """Return the mean of rates, for a polynomial zero, and the integral from time 0 of the rest."""
     if error.motion == "polynomial":
         return sp.zeros(*rates.shape), rates.applyfunc(lambda x: sp.Poly(x, TIME).integrate().as_expr())
@@ -423,7 +423,7 @@ def antiderivative(matrix: sp.Matrix, error: ErrorRate) -> sp.Matrix:
     if error.motion == "polynomial":
         variables = (TIME, *parameters(error.motion))
         return matrix.applyfunc(lambda x: sp.Poly(x, *variables).integrate(TIME).as_expr())
-    mean, swing = _integrated(matrix, error)
+    mean, swing = _integrate(matrix, error)
     return mean.reshape(*matrix.shape) * TIME + swing.reshape(*matrix.shape)
 
 

@@ -43,19 +43,19 @@ def invariants(
     if domain == sp.QQ:
         decomposition = frame.matrix(list(matrix))
         return Invariants(
-            _scaled(_rounded(decomposition.vector, shown), Fraction(-1)),
-            _rounded(decomposition.symmetric, shown),
+            _scale(_round(decomposition.vector, shown), Fraction(-1)),
+            _round(decomposition.symmetric, shown),
         )
     drift: Coefficients = {}
     symmetric: Coefficients = {}
     for share, elements in _shares(frame, matrix):
         decomposition = frame.matrix(elements)
-        _add(drift, _scaled(decomposition.vector, -share))
-        _add(symmetric, _scaled(decomposition.symmetric, share))
+        _add(drift, _scale(decomposition.vector, -share))
+        _add(symmetric, _scale(decomposition.symmetric, share))
     return Invariants(_without_zeros(drift), _without_zeros(symmetric))
 
 
-def _rounded(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) -> Coefficients:
+def _round(coefficients: Coefficients, shown: Callable[[Fraction], Fraction]) -> Coefficients:
     rounded = {
         c: {m: shown(x) for m, x in polynomial.items() if shown(x)} for c, polynomial in coefficients.items()
     }
@@ -114,7 +114,7 @@ def _add(total: Coefficients, more: Coefficients) -> None:
             sums[monomial] = sums[monomial] + number if monomial in sums else number
 
 
-def _scaled(coefficients: Coefficients, factor: Any) -> Coefficients:
+def _scale(coefficients: Coefficients, factor: Any) -> Coefficients:
     return {
         c: {
             m: x * factor if isinstance(factor, Fraction) else exact(x) * factor
@@ -126,7 +126,7 @@ def _scaled(coefficients: Coefficients, factor: Any) -> Coefficients:
 
 def matrix(parts: Invariants, vectors: Sequence[Sequence[Any]]) -> list[Any]:
     """Return the error matrix row by row for vectors of numbers, symbols or polynomials."""
-    return Decomposition(None, _scaled(parts.drift, Fraction(-1)), parts.symmetric).evaluate(
+    return Decomposition(None, _scale(parts.drift, Fraction(-1)), parts.symmetric).evaluate(
         [list(vector) for vector in vectors]
     )
 
@@ -142,7 +142,7 @@ def scalar_invariants(frame: Frame, element: Any) -> Polynomial:
     total: Coefficients = {}
     for share, (rational,) in _shares(frame, [element]):
         part = frame.quaternion([frame.ring.zero] * 3, rational).scalar or {}
-        _add(total, _scaled({(): part}, share))
+        _add(total, _scale({(): part}, share))
     return _without_zeros(total).get((), {})
 
 
@@ -156,7 +156,7 @@ def vector_invariants(frame: Frame, elements: Sequence[Any]) -> Coefficients:
         return frame.quaternion(list(elements), frame.ring.zero).vector
     total: Coefficients = {}
     for share, rationals in _shares(frame, elements):
-        _add(total, _scaled(frame.quaternion(rationals, frame.ring.zero).vector, share))
+        _add(total, _scale(frame.quaternion(rationals, frame.ring.zero).vector, share))
     return _without_zeros(total)
 
 

@@ -130,7 +130,7 @@ def at_time(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     return MotionRate(
         ring,
         rate,
-        lambda element: _factored(reduced(element)).subs(back),
+        lambda element: _factor(reduced(element)).subs(back),
         reduced,
         lambda element: sp.expand(element.as_expr().subs(back)),
         changes,
@@ -146,7 +146,7 @@ def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
     for _ in range(count):
         rate.append([ring.from_expr(sp.expand(element.subs(TIME, 0))) for element in vector])
         vector = vector.diff(TIME)
-    return MotionRate(ring, rate, _factored, _unchanged, lambda element: sp.expand(element.as_expr()), {})
+    return MotionRate(ring, rate, _factor, _identity, lambda element: sp.expand(element.as_expr()), {})
 
 
 def _polynomial(count: int, domain: Any) -> MotionRate:
@@ -171,18 +171,18 @@ def _polynomial(count: int, domain: Any) -> MotionRate:
     return MotionRate(
         ring,
         [[ring.zero, one, ring.zero] for one in r],
-        lambda element: _factored(element).subs(meant),
-        _unchanged,
+        lambda element: _factor(element).subs(meant),
+        _identity,
         expanded,
         dict(zip(r, [*r[1:], ring.zero], strict=True)),
     )
 
 
-def _unchanged(element: Any) -> Any:
+def _identity(element: Any) -> Any:
     return element
 
 
-def _factored(element: Any) -> sp.Expr:
+def _factor(element: Any) -> sp.Expr:
     """Return a ring element as an expression, factored if its numbers are short fractions."""
     expression = element.as_expr()
     return sp.factor(expression) if is_plain(expression) else expression

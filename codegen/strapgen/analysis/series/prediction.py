@@ -84,7 +84,7 @@ def predict(
 
 def transfers_of(rates: ErrorRate, motion: Motion) -> Callable[[Fraction], Transfer]:
     """Return the growth of the error by an error rate, for steps of any length, as `follow` takes it."""
-    compiled = _compiled(rates)
+    compiled = _compile(rates)
 
     def transfer(h: Fraction) -> Transfer:
         settings = [mpmath.mpf(value) for value in motion.parameters.values()]
@@ -176,7 +176,7 @@ def parts_of() -> Callable[[Sequence[Any], Sequence[Any]], tuple[list[Any], list
     return split
 
 
-def _compiled(rates: ErrorRate) -> dict[int, Callable[..., Matrix]]:
+def _compile(rates: ErrorRate) -> dict[int, Callable[..., Matrix]]:
     """Return the error rate, or about a fixed axis its integral, as functions of the motion's parameters and time."""
     symbols = [*parameters(rates.motion), TIME]
     matrices = rates.matrices

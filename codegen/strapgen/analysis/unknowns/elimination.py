@@ -51,7 +51,7 @@ class Equation:
         return f"{self.label}: {self.value} = 0"
 
 
-def _shown(expressions: Sequence[sp.Expr]) -> list[str]:
+def _repr(expressions: Sequence[sp.Expr]) -> list[str]:
     return list(map(shown, expressions))
 
 
@@ -75,8 +75,8 @@ class Family:
 
     values: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
     free: tuple[sp.Symbol, ...] = field(metadata=entry(key="parameters", kind=list[str]))
-    nonzero: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_shown, kind=list[str]))
-    equations: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_shown, kind=list[str]))
+    nonzero: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_repr, kind=list[str]))
+    equations: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_repr, kind=list[str]))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -237,12 +237,12 @@ def solve(equations: Sequence[Equation], unknowns: Sequence[sp.Symbol]) -> Polyn
     state = rng.getstate()
     rng.seed(1)
     try:
-        return _solved(_CaseSearch(equations, unknowns))
+        return _solve_by_order(_CaseSearch(equations, unknowns))
     finally:
         rng.setstate(state)
 
 
-def _solved(search: _CaseSearch) -> PolynomialSolution:
+def _solve_by_order(search: _CaseSearch) -> PolynomialSolution:
     """Return the solution of a system, order by order."""
     unknowns, equations = search.unknowns, search.equations
     cases, solvable = [_Case(())], None
@@ -295,7 +295,7 @@ class _CaseSearch:
             if self.looked_at > MOST_CASES:
                 raise InputError(f"the conditions fall into more than {MOST_CASES} cases, which is the limit")
             try:
-                case = self.simplified(waiting.pop())
+                case = self.simplify(waiting.pop())
                 following = self.split(case) if case.equations else []
                 if not following:
                     self.require_real(case)
@@ -337,7 +337,7 @@ class _CaseSearch:
                 return [*rest, polynomial.exquo(common).monic()]
         return [factor.monic() for factor, _ in polynomial.factor_list()[1]]
 
-    def simplified(self, case: _Case) -> _Case:
+    def simplify(self, case: _Case) -> _Case:
         """Return a case without what is known not to be zero, and without equations that hold."""
         shortest: dict[Any, tuple[str, Any]] = {}
         for label, polynomial in case.equations:

@@ -93,7 +93,7 @@ def sculling(
     >>> sculling(derive("sculling-fast-2")).expression("continuous").has(systems.T_M)
     True
     """
-    if not _takes_velocities(systems.checked(kernel)):
+    if not _takes_velocities(systems.require_kernel(kernel)):
         if kernel.recursion is not None and kernel.attitude_step is None:
             raise InputError(f"kernel {kernel.name} takes no velocity increments; sculling-fast-1 or -2 does")
         return _dual(drift(kernel, nodes=nodes, previous=previous, ahead=ahead))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import sympy as sp
 
 from strapgen.analysis.vibration.systems import CHANNELS, T_L, T_M, F, System, T
-from strapgen.analysis.vibration.waves import Number, Shift, Wave, combined, resolvent
+from strapgen.analysis.vibration.waves import Number, Shift, Wave, combine, resolvent
 from strapgen.ir.exceptions import InputError
 
 #: Two channels, in the order of `CHANNELS`.
@@ -90,7 +90,7 @@ def _motions(
     channels = list(dict.fromkeys(channel for waves in system.samples.values() for channel in waves))
     driven = {
         name: {
-            channel: combined(
+            channel: combine(
                 system.cycle,
                 [
                     (c, system.samples[sample][channel])
@@ -110,7 +110,7 @@ def _motions(
             for power, adjugate in enumerate(powers):
                 shift = tuple((power - zeros) * length for length in system.cycle)
                 row = [(adjugate[i][k], driven[other][channel]) for k, other in enumerate(states)]
-                total = total + combined(system.cycle, row).shifted(shift)
+                total = total + combine(system.cycle, row).shifted(shift)
             for _ in range(ones):
                 total = total.summed()
             waves[channel] = total
@@ -121,7 +121,7 @@ def _motions(
     for i, name in enumerate(states):  # a constant part must not change within a slow cycle
         for channel in channels:
             held = [(matrix[i][k], motions[other].constant.get(channel)) for k, other in enumerate(states)]
-            moved = combined(system.cycle, [(c, wave) for c, wave in held if wave is not None])
+            moved = combine(system.cycle, [(c, wave) for c, wave in held if wave is not None])
             constant_after = motions[name].constant.get(channel) or Wave(system.cycle, {})
             if (moved + constant_after.scaled(-one)).terms:
                 raise InputError(
@@ -186,10 +186,10 @@ def _form(system: System, wave: Wave, time: sp.Symbol) -> Form:
         real, imaginary = imaginary, -real
     below = time * (2 * sp.sin(sp.pi * F * cycle)) ** wave.poles
     above = (2 * sp.pi * F * cycle) ** 2 if system.rates else sp.S.One
-    return Form(_distributed(real, above / below), _distributed(imaginary, above / below))
+    return Form(_distribute(real, above / below), _distribute(imaginary, above / below))
 
 
-def _distributed(total: sp.Expr, factor: sp.Expr) -> sp.Expr:
+def _distribute(total: sp.Expr, factor: sp.Expr) -> sp.Expr:
     return sp.Add(*(factor * term for term in sp.Add.make_args(total)))
 
 

@@ -116,7 +116,7 @@ class Spectrum:
         InputError
             If it returns another shape, or a number below 0.
         """
-        density = _returned("density", self.density(hertz), hertz, "fiu").astype(float)
+        density = _evaluate("density", self.density(hertz), hertz, "fiu").astype(float)
         if (density < 0).any():
             place = int(np.argmax(density < 0))
             raise InputError(
@@ -146,14 +146,14 @@ class Spectrum:
         """
         channels = {}
         for name, function in self.transfers.items():
-            values = _returned(name, function(hertz), hertz, "fiuc").astype(complex)
+            values = _evaluate(name, function(hertz), hertz, "fiuc").astype(complex)
             if name.startswith("acceleration"):
                 values = values / (2j * np.pi * hertz)
             channels[name.replace("acceleration", "velocity")] = values
         return channels
 
 
-def _returned(what: str, values: Any, hertz: Array, kinds: str) -> Array:
+def _evaluate(what: str, values: Any, hertz: Array, kinds: str) -> Array:
     """Return the values of a function, broadcast to the shape of the frequencies."""
     try:
         array = np.asarray(values)

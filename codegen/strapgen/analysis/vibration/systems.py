@@ -15,6 +15,7 @@ from strapgen.analysis.vibration.waves import Expander, Expansion, Number, Shift
 from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.fixed_settings import NODE_ROTATIONS
 from strapgen.ir.signals import Signal
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.kernel import Kernel
@@ -27,7 +28,7 @@ F, T, T_L, T_M = sp.symbols("f T T_l T_m", positive=True)
 ANGLES, VELOCITIES = ("angle_x", "angle_y"), ("velocity_x", "velocity_y")
 CHANNELS = (*ANGLES, *VELOCITIES)
 #: Names of inputs that are samples of the vibration.
-SAMPLES = ("increments", "increment", "turns", "velocity_increments", "velocity_increment")
+SAMPLES = ("increments", "increment", *NODE_ROTATIONS, "velocity_increments", "velocity_increment")
 #: Kernels of the catalogue that accumulate sums over a slow cycle.
 RECURSIONS = ("coning-fast", "sculling-fast-1", "sculling-fast-2", "two-speed-fast-1", "two-speed-fast-2")
 #: Vectors of a step that have a mean rate.
@@ -78,7 +79,7 @@ def of(
 
     `unit`: for a recursion that sums coning and sculling, the one to assess: "rad" or "m/s".
     """
-    sampled = [signal for signal in checked(kernel).inputs if signal.name in SAMPLES]
+    sampled = [signal for signal in require_kernel(kernel).inputs if signal.name in SAMPLES]
     if not any(signal.unit == "rad" for signal in sampled):
         raise InputError(
             f"kernel {kernel.name} takes no samples of a vibration; allowed: {', '.join(NAMES)}, or a kernel of your "
@@ -98,7 +99,7 @@ def _check_beside(signal: Signal, previous: int, ahead: int) -> None:
     checks.count("ahead", ahead, smallest=0, largest=signal.size // 3 - 1 - before)
 
 
-def checked(kernel: Any) -> Kernel:
+def require_kernel(kernel: Any) -> Kernel:
     """Return the argument if it is a kernel."""
     if not isinstance(kernel, Kernel):
         raise InputTypeError(f"kernel is {kernel!r}; a Kernel is needed")
@@ -134,7 +135,7 @@ def _of_step(kernel: Kernel, sampled: Sequence[Signal], nodes: Sequence[Fraction
         times=times,
         watched=_rotation_about_z(expander, matrix),
         unit="rad",
-        rates=sampled[0].name == "turns",
+        rates=sampled[0].name in NODE_ROTATIONS,
     )
 
 
@@ -202,7 +203,7 @@ def _of_vector(
         times=times,
         watched=watched,
         unit=output.unit,
-        rates=sampled[0].name == "turns",
+        rates=sampled[0].name in NODE_ROTATIONS,
     )
 
 
@@ -285,7 +286,7 @@ def _waves(
     cycle: sp.Symbol = T,
 ) -> tuple[dict[str, dict[str, Wave]], tuple[sp.Expr, ...], Shift]:
     """Return the responses of the samples to the channels, the basic times in s, and the cycle as a shift."""
-    if sampled[0].name == "turns":
+    if sampled[0].name in NODE_ROTATIONS:
         return _waves_of_rates(expander, kernel, sampled[0], nodes, cycle)
     previous = beside[0]
     counts = {signal.size // 3 - sum(beside) for signal in sampled}

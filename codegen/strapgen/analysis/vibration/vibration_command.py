@@ -345,7 +345,7 @@ def vibration(
         output.show(ClosedFormsResult(cases))
         return
     source.check()
-    cases = [case for method in methods.each() for case in _assessed(algorithm, method, source)]
+    cases = [case for method in methods.each() for case in _assess(algorithm, method, source)]
     outcomes, words = source.rates(cases)
     drawn = ((), "", None) if output.plot is None else _curves(cases, source, output)
     output.show(VibrationResult(outcomes, cases, f"{words}; step {source.step} s", *drawn))
@@ -365,7 +365,7 @@ def _cases_with_unknowns(
             f"{algorithm} holds unknowns: its rates have closed forms, as text or json, and no numbers"
         )
     source = replace(source, theta_y=source.theta_y or Number("0"))
-    return [case for method in methods.each() for case in _assessed(algorithm, method, source)]
+    return [case for method in methods.each() for case in _assess(algorithm, method, source)]
 
 
 def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
@@ -382,7 +382,7 @@ def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
     )
 
 
-def _assessed(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
+def _assess(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
     """Return a case for each quantity of an algorithm that the options ask for."""
     from strapgen.analysis.vibration import assessment, systems
     from strapgen.analysis.vibration.vibration_report import AssessedCase

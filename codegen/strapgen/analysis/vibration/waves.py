@@ -11,7 +11,7 @@ import sympy as sp
 
 from strapgen.ir.exceptions import InputError
 from strapgen.kernel import power_series
-from strapgen.kernel.kernel import Kernel, rationalized
+from strapgen.kernel.kernel import Kernel, rationalize
 from strapgen.kernel.power_series import Powers
 
 #: A time as whole multiples of the basic times.
@@ -41,10 +41,10 @@ class Wave:
         total = dict(left)
         for shift, c in right.items():
             total[shift] = total[shift] + c if shift in total else c
-        return _reduced(self.cycle, total, poles)
+        return _reduce(self.cycle, total, poles)
 
     def __mul__(self, other: Wave) -> Wave:
-        return _reduced(self.cycle, _product(self.terms, other.terms), self.poles + other.poles)
+        return _reduce(self.cycle, _product(self.terms, other.terms), self.poles + other.poles)
 
     def scaled(self, factor: Any) -> Wave:
         """Return the wave times a number."""
@@ -62,7 +62,7 @@ class Wave:
 
     def summed(self) -> Wave:
         """Return the wave divided by z - 1, which is its sum over all earlier cycles."""
-        return _reduced(self.cycle, self.terms, self.poles + 1)
+        return _reduce(self.cycle, self.terms, self.poles + 1)
 
     def _over(self, poles: int) -> dict[Shift, Any]:
         terms, one = self.terms, (0,) * len(self.cycle)
@@ -92,7 +92,7 @@ def _product(left: dict[Shift, Any], right: dict[Shift, Any]) -> dict[Shift, Any
     return {shift: c for shift, c in total.items() if c}
 
 
-def _reduced(cycle: Shift, terms: dict[Shift, Any], poles: int) -> Wave:
+def _reduce(cycle: Shift, terms: dict[Shift, Any], poles: int) -> Wave:
     """Return the fraction in lowest terms: z - 1 is divided out as often as possible."""
     terms = {shift: c for shift, c in terms.items() if c}
     while poles:
@@ -175,7 +175,7 @@ def _matrix_product(left: Matrix, right: Matrix, zero: Any) -> Matrix:
     ]
 
 
-def combined(cycle: Shift, parts: Sequence[tuple[Any, Wave]]) -> Wave:
+def combine(cycle: Shift, parts: Sequence[tuple[Any, Wave]]) -> Wave:
     """Return the sum of waves, each multiplied by a number."""
     total = Wave(cycle, {})
     for factor, wave in parts:
@@ -184,7 +184,7 @@ def combined(cycle: Shift, parts: Sequence[tuple[Any, Wave]]) -> Wave:
     return total
 
 
-def mapped(wave: Wave, change: Callable[[Any], Any]) -> list[tuple[Shift, Any]]:
+def map_shifts(wave: Wave, change: Callable[[Any], Any]) -> list[tuple[Shift, Any]]:
     """Return the shifts in order, each with its coefficient after a change."""
     return [(shift, change(c)) for shift, c in sorted(wave.terms.items())]
 
@@ -221,7 +221,7 @@ class Expander:
         self._kernels = {kernel.name: kernel for kernel in kernels}
         if any(_is_transcendental(expression) for expression in self._expressions()):
             # They are rounded to so many digits that the results do not differ.
-            self._kernels = {name: rationalized(kernel) for name, kernel in self._kernels.items()}
+            self._kernels = {name: rationalize(kernel) for name, kernel in self._kernels.items()}
         unknowns = [name for kernel in self._kernels.values() for name in kernel.unknowns]
         self.domain = power_series.field(self._expressions(), unknowns).get_field()
         signals = itertools.chain.from_iterable(kernel.inputs for kernel in self._kernels.values())

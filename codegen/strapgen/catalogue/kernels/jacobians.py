@@ -129,7 +129,7 @@ class _Turn:
             meaning = f"derivative of the next state along direction {place}"
             product = self.kinematics.product(state, part)
             along.append(_stage(self.build, self.kinematics, f"along_{place}", meaning, product))
-        return self._summed(along)
+        return self._sum_directions(along)
 
     def angles(self, before: bool) -> list[sp.Matrix]:
         """Add stages for the step's rotations by the increments, axes at its start if `before`, else at its end."""
@@ -143,9 +143,9 @@ class _Turn:
             along.append(
                 self.build.stage(Signal.vector(f"{name}_{place}", f"{name}_{place}", meaning=meaning), turned)
             )
-        return self._summed(along)
+        return self._sum_directions(along)
 
-    def _summed(self, along: Sequence[sp.Matrix]) -> list[sp.Matrix]:
+    def _sum_directions(self, along: Sequence[sp.Matrix]) -> list[sp.Matrix]:
         """Return the derivatives by the elements of the increments from those along the directions."""
         columns = []
         for weights in self.sums:
@@ -184,9 +184,9 @@ def transition(
         if function is not None:
             covariant, sums = function
             places = _places(kinematics)
-            value = build.stage(kinematics.transition, _ordered(kinematics, covariant.values(), places))
+            value = build.stage(kinematics.transition, _reorder(kinematics, covariant.values(), places))
             parts = [
-                _ordered(kinematics, covariant.derivative(vector, axis), places)
+                _reorder(kinematics, covariant.derivative(vector, axis), places)
                 for vector in range(count)
                 for axis in range(3)
             ]
@@ -224,7 +224,7 @@ def _function(
     try:
         evaluated = evaluate_stages(stages, known)
         elements = [frame.ring(evaluated[symbol.name]) for symbol in value]
-        decomposition = _decomposed(frame, value, elements)
+        decomposition = _decompose(frame, value, elements)
     except (
         NotCovariantError,
         TypeError,
@@ -247,7 +247,7 @@ def _function(
     return CovariantFunction(build, decomposition, vectors), sums
 
 
-def _decomposed(frame: Frame, value: sp.Matrix, elements: list[object]) -> Decomposition:
+def _decompose(frame: Frame, value: sp.Matrix, elements: list[object]) -> Decomposition:
     """Return the decomposition of a matrix, of a quaternion by the names of its elements, or of a vector."""
     if value.shape == (3, 3):
         return frame.matrix(elements)
@@ -318,7 +318,7 @@ def _places(kinematics: Kinematics) -> list[int]:
     return ["xyzs".index(element[-1]) for element in kinematics.transition.elements]
 
 
-def _ordered(kinematics: Kinematics, elements: Sequence[sp.Expr], places: Sequence[int]) -> sp.Matrix:
+def _reorder(kinematics: Kinematics, elements: Sequence[sp.Expr], places: Sequence[int]) -> sp.Matrix:
     return sp.Matrix(*kinematics.identity.shape, [elements[place] for place in places])
 
 

@@ -60,7 +60,7 @@ def transition(
     return build.stage(turning, kinematics.exponential(phi, order, square))
 
 
-def _described(kinematics: Kinematics, order: int | None, which: int) -> tuple[str, str, tuple[str, ...]]:
+def _describe(kinematics: Kinematics, order: int | None, which: int) -> tuple[str, str, tuple[str, ...]]:
     """Return the end of the title, the source and the notes for an order."""
     equations = _EQUATIONS[kinematics.state.size][which]
     if order is None:
@@ -79,7 +79,7 @@ def update(name: str, order: int | None = None) -> Kernel:
     state, phi = build.input(kinematics.state), build.input(ROTATION_VECTOR)
     step_transition = transition(build, kinematics, phi, order)
     build.output(kinematics.next, kinematics.product(state, step_transition))
-    words, source, notes = _described(kinematics, order, 0)
+    words, source, notes = _describe(kinematics, order, 0)
     return build.kernel(
         f"{name}-update" + (f"-{order}" if order else ""),
         f"{kinematics.title}: update by a rotation vector{words}",
@@ -106,7 +106,7 @@ def navigation_update(name: str, order: int | None = None) -> Kernel:
     build = KernelBuilder()
     state, theta = build.input(kinematics.state), build.input(NAVIGATION_ROTATION)
     build.output(kinematics.next, turned_frame(build, kinematics, state, theta, order))
-    words, source, notes = _described(kinematics, order, 1)
+    words, source, notes = _describe(kinematics, order, 1)
     return build.kernel(
         f"{name}-navigation-update" + (f"-{order}" if order else ""),
         f"{kinematics.title}: update by the rotation of the navigation frame{words}",

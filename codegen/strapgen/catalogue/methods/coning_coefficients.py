@@ -144,11 +144,11 @@ def design(samples: int, previous: int = 0, form: str = "compressed") -> Design:
             f"samples {count} and previous {before} are {count + before} together; at most {MOST_COMBINED} are allowed "
             "for combined coefficients"
         )
-    return _designed(count, before, form)
+    return _design(count, before, form)
 
 
 @cache
-def _designed(samples: int, previous: int, form: str) -> Design:
+def _design(samples: int, previous: int, form: str) -> Design:
     solve = {"compressed": _compressed, "uncompressed": _uncompressed, "combined": _combined}
     return Design(form, samples, previous, solve[form](samples, previous))
 

@@ -189,10 +189,10 @@ def beside(previous: int, ahead: int = 0) -> str:
     return before + (f"; the last {ahead} are those after the step" if ahead else "")
 
 
-def turns_signal(nodes: Sequence[Number]) -> Signal:
+def node_rotations_signal(nodes: Sequence[Number]) -> Signal:
     """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
     return Signal(
-        "turns",
+        "node_rotations",
         (len(nodes), 3),
         tuple(f"turn_{name}_{axis}" for name in labels(nodes).values() for axis in "xyz"),
         unit="rad",
@@ -261,7 +261,7 @@ class Samples:
         self._build = build
         self._labels = labels(nodes)
         if increments is None:
-            signal, self.fit = turns_signal(nodes), rate_fit.from_rates(nodes)
+            signal, self.fit = node_rotations_signal(nodes), rate_fit.from_rates(nodes)
         else:
             signal = increments_signal(increments, previous, ahead)
             self.fit = fit(increments, previous, ahead)

@@ -1,4 +1,4 @@
-"""What chooses an integration method: its name in the catalogue, or a value with its coefficients.
+"""Specifications of integration methods: a name in the catalogue, or a value with coefficients.
 
 `INTEGRATORS` are the methods without files of coefficients, as plain data: listing them imports no computer algebra.
 """
@@ -18,7 +18,7 @@ MOST_BESIDE = 32
 
 
 class Asked(NamedTuple):
-    """The samples of a step that are asked for; None where the method, or a default, says how many they are."""
+    """The requested numbers of samples of a step; None stands for the number of the method or the default."""
 
     increments: int | None = None
     rates: bool = False
@@ -70,7 +70,7 @@ class MethodSpec(Protocol):
         """Increments in a step of a method that says so itself."""
 
     def select(self, asked: Asked) -> tuple[MethodSpec, StepSamples]:
-        """Return the method for the samples that are asked for, and the samples; refuse what does not go with it."""
+        """Return the method and its samples for the requested ones; refuse numbers that it does not have."""
         ...
 
 
@@ -126,7 +126,7 @@ class Integrator:
         return (self.module, self.function) == _TAYLOR
 
     def keeps(self, samples: int) -> bool:
-        """Tell whether it is no Taylor series, or keeps every power of the rate's polynomial through the samples."""
+        """Return whether the method keeps all powers of time of the polynomial through so many samples."""
         return not self._is_taylor or samples < LEAST_WHOLE or self.order >= samples
 
     def select(self, asked: Asked) -> tuple[Integrator, StepSamples]:

@@ -37,7 +37,7 @@ class Fit:
         t = exact(node)
         powers = [t**k for k in range(self.degree + 1)]
         return [
-            _reduced(sum((c * power for c, power in zip(row, powers, strict=True)), sp.Integer(0)))
+            _reduce(sum((c * power for c, power in zip(row, powers, strict=True)), sp.Integer(0)))
             for row in self.basis
         ]
 
@@ -49,7 +49,7 @@ class Fit:
         """
         factors = [comb(k, power) * middle ** (k - power) for k in range(power, self.degree + 1)]
         return [
-            _reduced(sum((c * x for c, x in zip(row[power:], factors, strict=True)), sp.Integer(0)))
+            _reduce(sum((c * x for c, x in zip(row[power:], factors, strict=True)), sp.Integer(0)))
             for row in self.basis
         ]
 
@@ -64,7 +64,7 @@ class Fit:
             for power, c in enumerate(legendre(degree, sp.Rational(1, 2)))
             if c
         ]
-        return [_reduced(sp.Add(*column)) for column in zip(*terms, strict=True)]
+        return [_reduce(sp.Add(*column)) for column in zip(*terms, strict=True)]
 
     def moment(self, power: int) -> list[sp.Expr]:
         """Return the weights of the samples in the integral over the step of the rate times (t - 1/2)^power."""
@@ -75,7 +75,7 @@ class Fit:
             for k in range(self.degree + 1)
         ]
         return [
-            _reduced(sum((c * x for c, x in zip(row, integrals, strict=True)), sp.Integer(0)))
+            _reduce(sum((c * x for c, x in zip(row, integrals, strict=True)), sp.Integer(0)))
             for row in self.basis
         ]
 
@@ -87,7 +87,7 @@ class Fit:
         """
         ends = [exact(begin), exact(end)]
         powers = [(ends[1] ** (k + 1) - ends[0] ** (k + 1)) / (k + 1) for k in range(self.degree + 1)]
-        return [_reduced(sp.Add(*(c * x for c, x in zip(row, powers, strict=True)))) for row in self.basis]
+        return [_reduce(sp.Add(*(c * x for c, x in zip(row, powers, strict=True)))) for row in self.basis]
 
     def times_remaining(self) -> Fit:
         """Return the rate times 1 - t, the part of the step that is still to come at time t.
@@ -181,11 +181,11 @@ def _lagrange(nodes: list[sp.Expr]) -> list[Coefficients]:
                 raised = [sp.Integer(0), *coefficients]
                 padded = [*coefficients, sp.Integer(0)]
                 coefficients = [
-                    _reduced((a - other * b) / (node - other)) for a, b in zip(raised, padded, strict=True)
+                    _reduce((a - other * b) / (node - other)) for a, b in zip(raised, padded, strict=True)
                 ]
         polynomials.append(tuple(coefficients))
     return polynomials
 
 
-def _reduced(number: sp.Expr) -> sp.Expr:
+def _reduce(number: sp.Expr) -> sp.Expr:
     return number if number.is_Rational else sp.radsimp(sp.expand(number))

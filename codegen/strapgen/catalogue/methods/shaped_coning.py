@@ -112,7 +112,7 @@ class ShapedConing:
         return f"{__package__}.coning", "shaped", (self,)
 
     def select(self, asked: Asked) -> tuple[ShapedConing, StepSamples]:
-        """Return the coefficients and their samples, which are the only ones that can be asked for."""
+        """Return the coefficients and their samples; no other numbers of samples are allowed."""
         if asked.rates:
             raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")
         stated = {"increments": asked.increments, "previous": asked.previous, "ahead": asked.ahead}
@@ -209,7 +209,7 @@ SHAPE_TITLES: Merged[str] = Merged(
 
 
 def read(path: str | Path) -> ShapedConing:
-    """Read coefficients from a TOML file with the keys of `ShapeFile`, and check what they are said to be."""
+    """Read coefficients from a TOML file with the keys of `ShapeFile`, and verify their stated properties."""
 
     def shape(stated: ShapeFile) -> ShapedConing:
         name = coefficient_files.slug(stated.name)

@@ -168,10 +168,10 @@ def _rotation_vector(build: KernelBuilder, rate: Filtered) -> sp.Matrix:
     signal = Signal.vector("beside_0", "beside_0", unit="rad", meaning="what c_0 is crossed with")
     phi += cross(vectors[0], build.stage(signal, beside))
     if rate.degree > 1:
-        phi += crossed(1, 2) * _crossed(build, "cross_1", vectors[1], vectors[2], "c_1 x e_0")
+        phi += crossed(1, 2) * _cross(build, "cross_1", vectors[1], vectors[2], "c_1 x e_0")
     for odd in range(3, rate.degree + 1, 2):
         meaning = f"c_{odd} x e_{odd - 1}"
-        phi += _crossed(build, f"cross_{odd}", rate.coefficient(odd), rate.lever(odd), meaning)
+        phi += _cross(build, f"cross_{odd}", rate.coefficient(odd), rate.lever(odd), meaning)
     return phi
 
 
@@ -233,5 +233,5 @@ class _Scalars:
         return self._build.value(name, total, "weight of a vector") if any(row.values()) else total
 
 
-def _crossed(build: KernelBuilder, name: str, left: sp.Matrix, right: sp.Matrix, meaning: str) -> sp.Matrix:
+def _cross(build: KernelBuilder, name: str, left: sp.Matrix, right: sp.Matrix, meaning: str) -> sp.Matrix:
     return build.stage(Signal.vector(name, name, meaning=meaning), cross(left, right))

@@ -125,7 +125,7 @@ class WindowFile:
         start: tuple[Window, ...] = ()
         if self.start is not None:
             sizes = start_sizes(self.previous, self.ahead)
-            start = _in_order("start", _stored("start", window, self.start, sizes), sizes)
+            start = _in_order("start", _stored_filters("start", window, self.start, sizes), sizes)
         return replace(window, one_sided=one_sided, start=start)
 
 
@@ -300,7 +300,7 @@ def _sum_of_step(window: Window) -> Taps:
 def _all_one_sided(window: Window, tables: Sequence[SideFile]) -> tuple[Window, ...]:
     """Return the one-sided filters of a family, those with fewer samples before the step mirrored where possible."""
     sizes = one_sided_sizes(window.previous, window.ahead)
-    stored = _stored("one_sided", window, tables, sizes)
+    stored = _stored_filters("one_sided", window, tables, sizes)
     for previous, ahead in sizes:
         if (previous, ahead) not in stored and window.gyro is None and (ahead, previous) in stored:
             stored[previous, ahead] = stored[ahead, previous].mirrored()
@@ -319,7 +319,7 @@ def _in_order(
     return tuple(stored[size] for size in sizes)
 
 
-def _stored(
+def _stored_filters(
     key: str, window: Window, tables: Sequence[SideFile], sizes: list[tuple[int, int]]
 ) -> dict[tuple[int, int], Window]:
     """Return the filters of the tables under a key, by the samples before and ahead of their step."""

@@ -14,8 +14,10 @@ from strapgen.catalogue.methods.method import beside
 from strapgen.catalogue.names import reserved
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.fixed_settings import NODE_ROTATIONS, ROTATION_INPUTS
 from strapgen.ir.kernel_info import AttitudeStep, Order
 from strapgen.ir.program import RESOLUTION
+from strapgen.ir.renamed import warn
 from strapgen.kernel import reading
 from strapgen.kernel.algebra import Direction, Wrapped
 from strapgen.kernel.kernel import Kernel
@@ -214,12 +216,15 @@ _BESIDE = re.compile(r"; the (?:first|last) \d+ are those (?:before|after) the s
 def _require_samples(kernel: Kernel, step: AttitudeStep) -> None:
     names = [signal.name for signal in kernel.inputs]
     shape: tuple[int, ...] = kernel.inputs[1].shape if len(kernel.inputs) == 2 else ()
-    if names not in (["state", "increments"], ["state", "turns"]) or len(shape) != 2 or shape[1] != 3:
+    known = len(names) == 2 and names[0] == "state" and names[1] in ROTATION_INPUTS
+    if not known or len(shape) != 2 or shape[1] != 3:
         _refuse(
             kernel,
-            f"it takes {', '.join(names)}; state and increments (K, 3), state and turns (K, 3), or increments and "
-            "velocity_increments are needed",
+            f"it takes {', '.join(names)}; state and increments (K, 3), state and node_rotations (K, 3), or increments "
+            "and velocity_increments are needed",
         )
+    if names[1] == NODE_ROTATIONS[1]:
+        warn(f"input {names[1]} of kernel {kernel.name}", NODE_ROTATIONS[0])
     _require_beside(kernel, step.previous, step.ahead, shape[0])
     said = _BESIDE.findall(kernel.inputs[1].meaning)
     if said and "".join(said) != beside(step.previous, step.ahead):
@@ -230,7 +235,7 @@ def _require_samples(kernel: Kernel, step: AttitudeStep) -> None:
         )
     if names[1] == "increments":
         if step.nodes:
-            _refuse(kernel, "it takes increments and has nodes; nodes go with turns")
+            _refuse(kernel, "it takes increments and has nodes; nodes go with node_rotations")
         return
     if not all(isinstance(node, (int, Fraction)) for node in step.nodes):
         _refuse(kernel, f"its nodes are {step.nodes!r}; whole numbers and fractions.Fraction are needed")

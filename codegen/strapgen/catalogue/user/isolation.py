@@ -124,7 +124,7 @@ _places: WeakKeyDictionary[ModuleType, tuple[str, bool]] = WeakKeyDictionary()
 
 
 def _place(module: ModuleType | None) -> tuple[str, bool]:
-    """Return the file or the folder of a module, "" for a built-in one, and whether it is installed."""
+    """Return the file or folder of a module, "" for a built-in one, and whether it belongs to an installed package."""
     if type(module) is not ModuleType:  # it may answer anything, and differently each time
         place = _file_or_folder(module)
         return place, _is_installed(place)
@@ -183,7 +183,7 @@ _watching: list[Record | None] = []
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    """Record what Python's audit events tell of files, programs and the network while a user's code runs."""
+    """Record files, programs and network access of a user's code from Python's audit events."""
     if not _watching or (event != "open" and event not in _OUTSIDE):
         return
     if sys._getframe(1).f_code.co_filename.startswith("<frozen importlib"):

@@ -72,7 +72,7 @@ def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> UserKernel
 
     def derive() -> tuple[Kernel, isolation.Record]:
         with (
-            _isolated(path.parent) as record,
+            _isolate(path.parent) as record,
             packages.guarded(name, DUTY, lambda file: file.name == path.name),
         ):
             # Two files may have one name: each module gets a name of its own.
@@ -83,7 +83,7 @@ def _of_file(name: str, options: dict[str, Any], texts: list[str]) -> UserKernel
                 raise InputError(
                     f"{name} defines no function {FUNCTION}; one that returns a Kernel is needed"
                 )
-            kernel = _called(name, getattr(module, FUNCTION), options)
+            kernel = _call(name, getattr(module, FUNCTION), options)
         return kernel, record
 
     return cached_kernel(["file", str(path), cache.digest([source]), *texts], path.parent, derive)
@@ -94,15 +94,15 @@ def _of_entry_point(name: str, options: dict[str, Any], texts: list[str]) -> Use
 
     def derive() -> tuple[Kernel, isolation.Record]:
         anew = (point.module.partition(".")[0],)
-        with _isolated(None, anew) as record, packages.guarded(name, DUTY, packages.belongs_to(point.module)):
-            kernel = _called(name, point.load(), options)
+        with _isolate(None, anew) as record, packages.guarded(name, DUTY, packages.belongs_to(point.module)):
+            kernel = _call(name, point.load(), options)
         return kernel, record
 
     return cached_kernel(["entry point", name, point.value, *texts], None, derive)
 
 
 @contextlib.contextmanager
-def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isolation.Record]:
+def _isolate(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isolation.Record]:
     """Begin a session; the modules and the names that strapgen needs in it are read before."""
     from strapgen.catalogue.names import reserved
     from strapgen.catalogue.user import admission  # noqa: F401
@@ -112,7 +112,7 @@ def _isolated(folder: Path | None, anew: tuple[str, ...] = ()) -> Iterator[isola
         yield record
 
 
-def _called(name: str, function: Any, options: dict[str, Any]) -> Kernel:
+def _call(name: str, function: Any, options: dict[str, Any]) -> Kernel:
     """Return the checked kernel that a user's function returns."""
     if not callable(function):
         raise InputError(f"{name}: {FUNCTION} is no function; one that returns a Kernel is needed")
@@ -170,7 +170,7 @@ def cached_kernel(
             return stored
     with timed("derive", what[1]):
         derived, record = derive()
-    data = None if record.outside or not record.holds(folder) else _pickled(derived)
+    data = None if record.outside or not record.holds(folder) else _pickle(derived)
     if data is not None:
         with contextlib.suppress(InputError):
             _store(key, data, packed(derived), record)
@@ -199,12 +199,12 @@ def _stored(key: str, folder: Path | None, derive: Callable[[], tuple[Kernel, Re
         data, head = cache.read(place, _KERNEL), cache.read(place, _HEAD)
         if not head:
             return UserKernel.of(pickle.loads(data))
-        return UserKernel(pickle.loads(head), lambda: _restored(data, derive))
+        return UserKernel(pickle.loads(head), lambda: _restore(data, derive))
     except Exception:  # of another Python, or removed meanwhile: derived again
         return None
 
 
-def _restored(data: bytes, derive: Callable[[], tuple[Kernel, Record]]) -> Kernel:
+def _restore(data: bytes, derive: Callable[[], tuple[Kernel, Record]]) -> Kernel:
     try:
         stored: Kernel = pickle.loads(data)
     except Exception:  # of another SymPy: derived again
@@ -222,7 +222,7 @@ def _store(key: str, data: bytes, head: bytes | None, record: Record) -> None:
     cache.entry(_KIND, key, fill)
 
 
-def _pickled(derived: Kernel) -> bytes | None:
+def _pickle(derived: Kernel) -> bytes | None:
     """Return a kernel as bytes; None if they do not restore it, for instance because it holds a user's class."""
     try:
         data = pickle.dumps(derived)

@@ -28,7 +28,7 @@ from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS
-from strapgen.run.backends import fitted
+from strapgen.run.backends import fit_settings
 from strapgen.run.evaluators import Array, integers, numbers
 
 
@@ -95,10 +95,10 @@ class CommitLate:
     ) -> None:
         self._state: Argument | None = None
         self._rest = np.zeros(3)
-        self._unit = self._loaded(window, algorithm, backend, sample_hz, settings)
+        self._unit = self._load(window, algorithm, backend, sample_hz, settings)
         self.identity = self.attitude
 
-    def _loaded(
+    def _load(
         self,
         window: str | Window,
         algorithm: str,
@@ -108,7 +108,7 @@ class CommitLate:
     ) -> LateUnit | LateUnitInC:
         """Return the unit on a back end; in fixed point, note its formats."""
         checks.choice("backend", backend, BACKENDS)
-        target, settings = BACKENDS[backend].target, fitted(backend, settings)
+        target, settings = BACKENDS[backend].target, fit_settings(backend, settings)
         if target in commit_late_sources.TARGETS:
             whole = commit_late_sources.sources(window, algorithm, target, sample_hz, settings=settings)
             self._note(whole)

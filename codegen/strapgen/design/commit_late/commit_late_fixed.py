@@ -219,8 +219,8 @@ def now_errors(
     truncation: Truncation,
 ) -> NowErrors:
     """Return bounds of the distance of the attitude of now from that of exact arithmetic."""
-    running = _moved(filters.sets, fixed.sets, fixed, interfaces[1])
-    starting = _moved(filters.short, fixed.short, fixed, interfaces[1])
+    running = _rounding_of_filters(filters.sets, fixed.sets, fixed, interfaces[1])
+    starting = _rounding_of_filters(filters.short, fixed.short, fixed, interfaces[1])
     whole = _stretch(filters, fixed, programs[0], interfaces[0], truncation)
     part = _stretch(filters, fixed, programs[1], interfaces[1], truncation)
     step = Advance(_row_length(interfaces[0].outputs[0].errors), whole)
@@ -286,7 +286,7 @@ def _row_length(elements: Sequence[Fraction]) -> Fraction:
     return max(_length(elements[k : k + width]) for k in range(0, len(elements), width))
 
 
-def _moved(
+def _rounding_of_filters(
     exact: Sequence[Rows],
     integers: Sequence[tuple[Integers, ...]],
     fixed: FixedFilters,

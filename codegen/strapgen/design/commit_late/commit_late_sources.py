@@ -304,7 +304,7 @@ def _in_floating_point(filters: LateFilters, step: Sources) -> dict[str, object]
         "sample_text": "unit rad; any finite number",
         "identity": [printer.constant(Fraction(one)) for one in _identity(size)],
         "sets": [[_line(group[m], printer) for m in rows] for group in filters.sets],
-        "shorts": [[_line(_padded(group[m], Fraction(0)), printer) for m in rows] for group in filters.short],
+        "shorts": [[_line(_pad(group[m], Fraction(0)), printer) for m in rows] for group in filters.short],
         "restoring": [_line(taps, printer) for taps in filters.restoration],
         "next": _line(NEXT, printer),
     }
@@ -337,7 +337,7 @@ def _in_fixed_point(
         "that",
         "identity": [str(one if number else 0) for number in _identity(size)],
         "sets": [[_text(row) for row in group] for group in fixed.sets],
-        "shorts": [[_text(_padded(row, 0)) for row in group] for group in fixed.short],
+        "shorts": [[_text(_pad(row, 0)) for row in group] for group in fixed.short],
         "restoring": [_text(row) for row in fixed.restoring],
         "next": _text([int(2 * tap) for tap in NEXT]),
     }
@@ -364,7 +364,7 @@ def _identity(size: int) -> list[int]:
     return [int(number in ones) for number in range(size)]
 
 
-def _padded(taps: Sequence[_Tap], zero: _Tap) -> list[_Tap]:
+def _pad(taps: Sequence[_Tap], zero: _Tap) -> list[_Tap]:
     """Return the taps of a polynomial with zeros for samples that it does not take."""
     return list(taps) + [zero] * (SHORT - len(taps))
 

@@ -100,13 +100,13 @@ class LateFilters:
         """The filters by the number of samples before the interval, from none to p + L."""
         start = () if self.calm_start else self.window.start
         by_previous = {one.previous: one for one in (self.window, *self.window.one_sided, *start)}
-        return tuple(self._scaled(by_previous[k].filters[: self.degree + 1]) for k in range(self.samples))
+        return tuple(self._scale(by_previous[k].filters[: self.degree + 1]) for k in range(self.samples))
 
     @cached_property
     def short(self) -> tuple[Rows, ...]:
         """The filters on fewer samples: for each of 1 to 4 samples, those of each interval; see `short_place`."""
         return tuple(
-            self._scaled(polynomial(count, place, self.degree))
+            self._scale(polynomial(count, place, self.degree))
             for count in range(1, SHORT + 1)
             for place in range(count)
         )
@@ -116,7 +116,7 @@ class LateFilters:
         """The Legendre coefficients that are sums of samples; of an ideal gyro in rad the first one is a sample."""
         return range(1 if self.window.gyro is None and self.scale == 1 else 0, self.degree + 1)
 
-    def _scaled(self, rows: Rows) -> Rows:
+    def _scale(self, rows: Rows) -> Rows:
         """Return filters of samples with their scale."""
         return rows if self.scale == 1 else tuple(tuple(tap * self.scale for tap in row) for row in rows)
 

@@ -81,7 +81,7 @@ def recording_attitudes(
     row = checks.real_array("increments", increments, (3,))
     if row.ndim != 2:
         raise InputError(f"increments has shape {row.shape}; (N, 3) is needed")
-    row = _restored(row, np.zeros(len(row), int) if kinds is None else np.asarray(kinds), filters)
+    row = _restore(row, np.zeros(len(row), int) if kinds is None else np.asarray(kinds), filters)
     step, rotation, normalization = commit_late_sources.kernels(filters, algorithm)
     loop = attitude_backend(step, backend=backend)
     turn = evaluator(rotation, backend)
@@ -95,20 +95,20 @@ def recording_attitudes(
     previous, ahead, count = filters.window.previous, filters.window.ahead, filters.samples
     first = [start]
     for place in range(previous):
-        first.append(_turned(turn, first[-1], row[:count], place, filters))
+        first.append(_advance(turn, first[-1], row[:count], place, filters))
     part = StepWindows(lambda begin, stop: row[begin:stop], 1, previous + ahead)
     inside = loop.propagate_parts(part, len(row) - previous - ahead)
     inside = evaluator(f"{algorithm}-product", backend)(first[-1], inside)
     last = [inside[-1]]
     for place in range(count - ahead, count):
-        last.append(_turned(turn, last[-1], row[-count:], place, filters))
+        last.append(_advance(turn, last[-1], row[-count:], place, filters))
     states: Array = np.concatenate([np.stack(first[:-1] or [start])[:previous], inside, np.stack(last)[1:]])
     # Rounding alone takes the states off their constraint, so that it can be taken out of each by itself.
     states[1:] = evaluator(normalization, backend)(states[1:])
     return states
 
 
-def _turned(turn: Evaluator, state: Array, samples: Array, place: int, filters: LateFilters) -> Array:
+def _advance(turn: Evaluator, state: Array, samples: Array, place: int, filters: LateFilters) -> Array:
     """Return a state after the interval at a place of a whole window of samples."""
     rows = np.array(filters.sets[place], float)
     result: Array = turn(state, *(rows @ samples))
@@ -125,7 +125,7 @@ def _few(row: Array, place: int, filters: LateFilters) -> Array:
     return result
 
 
-def _restored(row: Array, kinds: Array, filters: LateFilters) -> Array:
+def _restore(row: Array, kinds: Array, filters: LateFilters) -> Array:
     """Return the samples with the lost ones restored, and those merged with them taken apart."""
     if kinds.shape != (len(row),) or kinds.dtype.kind not in "iu":
         raise InputError(

@@ -114,7 +114,7 @@ class LateUnit:
         """Return the attitude at the end of the last interval; nothing is stored."""
         attitude, feedback = self.attitude, self._feedback
         for place in range(len(self._samples) - self.pending, len(self._samples)):
-            attitude, feedback = self._advanced(attitude, feedback, place)
+            attitude, feedback = self._advance(attitude, feedback, place)
         return attitude
 
     def flush(self) -> int:
@@ -160,7 +160,7 @@ class LateUnit:
         self.committed = []
         for _ in range(count):
             place = len(self._samples) - self.pending
-            attitude, self._feedback = self._advanced(self.attitude, self._feedback, place)
+            attitude, self._feedback = self._advance(self.attitude, self._feedback, place)
             self.pending -= 1
             self._commits += 1
             if self._commits == self._normalized_every:
@@ -173,7 +173,7 @@ class LateUnit:
             self.committed.append(self.attitude)
         return count
 
-    def _advanced(self, attitude: Array, feedback: Array, place: int) -> tuple[Array, Array]:
+    def _advance(self, attitude: Array, feedback: Array, place: int) -> tuple[Array, Array]:
         """Return attitude and error feedback after the interval of a sample, with the samples that are there."""
         window, count = self.filters.window, len(self._samples)
         after = count - 1 - place
@@ -181,15 +181,15 @@ class LateUnit:
             width = min(count, SHORT)
             first = min(max(place - 1, 0), count - width)
             rows = self._short[short_place(width, place - first)]
-            return self._rotated(attitude, rows, self._samples[first : first + width], place), feedback
+            return self._rotate(attitude, rows, self._samples[first : first + width], place), feedback
         if place >= window.previous and after >= window.ahead:
             samples = self._samples[place - window.previous : place + window.ahead + 1]
             return _called(self._step, feedback, attitude, samples)
         before = place if after > window.ahead else self.filters.samples - 1 - after
         samples = self._samples[place - before : place - before + self.filters.samples]
-        return self._rotated(attitude, self._sets[before], samples, place), feedback
+        return self._rotate(attitude, self._sets[before], samples, place), feedback
 
-    def _rotated(self, attitude: Array, rows: Any, samples: Array, place: int) -> Array:
+    def _rotate(self, attitude: Array, rows: Any, samples: Array, place: int) -> Array:
         """Return an attitude after an interval, by filters on samples."""
         sums = [self._sum(taps, samples, shift) for taps, shift in zip(rows, self._shifts, strict=True)]
         if self.filters.sums.start:
@@ -293,27 +293,27 @@ class LateUnitInC:
         gap, count = self._memory.gap, self._memory.count
         status = self._call("push", self._pointer(np.ascontiguousarray(sample, self.dtype)), kind)
         if status < 0:
-            raise self._refused(status, kind, gap, count)
+            raise self._refusal(status, kind, gap, count)
         return self._commit(status)
 
     def now(self) -> Array:
         """Return the attitude at the end of the last interval."""
         attitude = np.empty(self._state.shape, self.dtype)
-        self._accepted("now", self._pointer(attitude))
+        self._accept("now", self._pointer(attitude))
         return attitude
 
     def flush(self) -> int:
         """Commit all intervals with the samples that are there, and return how many."""
-        return self._commit(self._accepted("flush"))
+        return self._commit(self._accept("flush"))
 
-    def _accepted(self, what: str, *arguments: Any) -> int:
+    def _accept(self, what: str, *arguments: Any) -> int:
         """Call a function and return its result, unless it refuses the state."""
         status = self._call(what, *arguments)
         if status < 0:
-            raise self._refused(status, 0, 0, 0)
+            raise self._refusal(status, 0, 0, 0)
         return status
 
-    def _refused(self, status: int, kind: int, gap: int, count: int) -> InputError:
+    def _refusal(self, status: int, kind: int, gap: int, count: int) -> InputError:
         """Return the error that a status stands for."""
         if self.fixed is not None and status == -1:
             return InputError("a sample lies outside the range of its format")

@@ -92,7 +92,7 @@ class BandGrid:
     def errors(self, m: int, taps: Sequence[int], previous: int) -> list[tuple[int, int]]:
         """Return the error of a filter as real and imaginary part, by frequency."""
         result = []
-        even, odd = _folded(taps, 2 * previous + self._increments - 1)
+        even, odd = _fold(taps, 2 * previous + self._increments - 1)
         for cosines, sines, (x, y), right in zip(
             self.cosines, self.sines, self.gains, self.bessel(m), strict=True
         ):
@@ -103,7 +103,7 @@ class BandGrid:
         return result
 
 
-def _folded(taps: Sequence[int], twice_middle: int) -> tuple[list[int], list[int]]:
+def _fold(taps: Sequence[int], twice_middle: int) -> tuple[list[int], list[int]]:
     """Return the weights of cos(jb) and of sin(jb), j from 0 or 1/2, in a sum over samples on both sides."""
     reach = max(twice_middle, 2 * len(taps) - 2 - twice_middle) // 2
     even, odd = [0] * (reach + 1), [0] * (reach + 1)

@@ -94,12 +94,12 @@ def least_largest(problem: Problem, band: Fraction, points: int = SEARCH_POINTS)
     reference = _start(problem, band)
     previous = None
     for _ in range(_MOST_ROUNDS):
-        free, level = _levelled(problem.answers(reference))
+        free, level = _level(problem.answers(reference))
         errors = table.errors(free)
         places = alternating(errors, problem.free + 1)
         if places is None:
             break
-        reference = _refined(problem, grid, places, free)
+        reference = _refine(problem, grid, places, free)
         if previous is not None and abs(level - previous) * _STABLE.denominator <= level:
             largest = max(map(abs, errors))
             if largest * _EXCESS.denominator > integer(level) * (_EXCESS.denominator + 1):
@@ -112,7 +112,7 @@ def least_largest(problem: Problem, band: Fraction, points: int = SEARCH_POINTS)
     )
 
 
-def _levelled(answers: Answers) -> tuple[list[Any], Any]:
+def _level(answers: Answers) -> tuple[list[Any], Any]:
     """Return the free unknowns whose errors alternate and are equally large, and how large."""
     matrix = [
         [*(REAL.ldexp(REAL.mpf(column[i]), -BITS) for column in answers.columns), REAL.mpf((-1) ** i)]
@@ -122,7 +122,7 @@ def _levelled(answers: Answers) -> tuple[list[Any], Any]:
     return solution[:-1], abs(solution[-1])
 
 
-def _refined(problem: Problem, grid: Sequence[Any], places: Sequence[int], free: Sequence[Any]) -> list[Any]:
+def _refine(problem: Problem, grid: Sequence[Any], places: Sequence[int], free: Sequence[Any]) -> list[Any]:
     """Return the frequencies of the extrema of the error next to points of the grid."""
     last = len(grid) - 1
     inner = [place for place in places if 0 < place < last]

@@ -210,7 +210,9 @@ def choice_of(candidate: Candidate, state: str, path: str) -> Choice:
     """
     method = candidate.method
     if method.startswith(TUNED):
-        shape = tuned(path, method.removeprefix(TUNED), candidate.increments, candidate.previous)
+        shape = design_coefficients(
+            path, method.removeprefix(TUNED), candidate.increments, candidate.previous
+        )
         return catalogue.choose_step(state, shape, candidate.increments, previous=candidate.previous)
     return catalogue.choose_step(
         state, method, candidate.increments, previous=candidate.previous, ahead=candidate.ahead
@@ -267,7 +269,7 @@ def _has_coning(environment: SpectralEnvironment) -> bool:
 
 
 @lru_cache(maxsize=16)
-def tuned(path: str, objective: str, samples: int, previous: int) -> ShapedConing:
+def design_coefficients(path: str, objective: str, samples: int, previous: int) -> ShapedConing:
     """Return the coefficients that are designed for the spectrum of a brief and for its gyro."""
     brief = read_brief(Path(path))
     assert isinstance(brief.environment, SpectralEnvironment), "only these are tuned for"

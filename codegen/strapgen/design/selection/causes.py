@@ -99,7 +99,7 @@ def mean_error(assessed: Assessment, brief: DesignBrief, step: Fraction, cycles:
     """
     if brief.environment is None:
         return 0.0
-    return brief.environment.error(_seen(assessed, brief), step, cycles)
+    return brief.environment.error(_through_gyro(assessed, brief), step, cycles)
 
 
 def line_errors(
@@ -111,7 +111,9 @@ def line_errors(
     """
     if not isinstance(brief.environment, LineEnvironment):
         return []
-    plain, seen = (brief.environment.errors(one, step, cycles) for one in (assessed, _seen(assessed, brief)))
+    plain, seen = (
+        brief.environment.errors(one, step, cycles) for one in (assessed, _through_gyro(assessed, brief))
+    )
     return [
         DEG_H * error for error in (*plain, *(both - alone for both, alone in zip(seen, plain, strict=True)))
     ]
@@ -132,7 +134,7 @@ def tones(brief: DesignBrief) -> list[Tone]:
     ]
 
 
-def _seen(assessed: Assessment, brief: DesignBrief) -> Assessment:
+def _through_gyro(assessed: Assessment, brief: DesignBrief) -> Assessment:
     """Return an assessment through the gyro of a brief."""
     if brief.gyro.bandwidth_hz is None or brief.gyro.damping is None:
         return assessed
@@ -177,7 +179,7 @@ def rounding(choice: Choice, brief: DesignBrief, allowed: float) -> Rounding:
         if carry == CARRIES[0] and _least_without_feedback(choice, brief) > allowed:
             continue
         try:
-            several.append(_certified(choice, brief, carry))
+            several.append(_certified_drift(choice, brief, carry))
         except InputError as error:
             several.append(Rounding(None, carry, str(error)))
         bound = several[-1].deg_h
@@ -192,7 +194,7 @@ def _least_without_feedback(choice: Choice, brief: DesignBrief) -> float:
     return math.degrees(steps * 2.0 ** (_STATE_PLACES - brief.processor.word)) / _hours(brief)
 
 
-def _certified(choice: Choice, brief: DesignBrief, carry: str) -> Rounding:
+def _certified_drift(choice: Choice, brief: DesignBrief, carry: str) -> Rounding:
     """Return the certified drift with some error feedback."""
     fixed = pipeline.fixed_program(choice, settings(choice, brief, carry))
     angles = fixed.interface.angle_accumulation

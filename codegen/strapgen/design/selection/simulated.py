@@ -159,7 +159,7 @@ def _largest_turn(brief: DesignBrief) -> Motion:
     return motion("constant", z_deg_s=brief.max_rate_deg_s)
 
 
-def confirmed(brief: DesignBrief, path: str | Path, ordered: Iterable[Judgement]) -> list[Judgement]:
+def confirm(brief: DesignBrief, path: str | Path, ordered: Iterable[Judgement]) -> list[Judgement]:
     """Run algorithms that meet a brief, the cheapest first, until one meets it in its run too.
 
     What is above fourth order in the angles of lines, and above second order under a spectrum, shows in a run alone.

@@ -150,14 +150,12 @@ class ExpressionFormulas:
                 kind = self.model.named(tuple(node.to_type.type.type.names))
                 return self.converted(self.value(node.expr, known), kind)
             case c_ast.UnaryOp(op="-"):
-                number = self._promoted(self.value(node.expr, known))
-                return self._fitted(number.kind, -number.high, -number.low, -number.real, number.variables)
+                number = self._promote(self.value(node.expr, known))
+                return self._fit(number.kind, -number.high, -number.low, -number.real, number.variables)
             case c_ast.UnaryOp(op="~"):
-                number = self._promoted(self.value(node.expr, known))
+                number = self._promote(self.value(node.expr, known))
                 assert number.kind.signed
-                return self._fitted(
-                    number.kind, ~number.high, ~number.low, -number.real - 1, number.variables
-                )
+                return self._fit(number.kind, ~number.high, ~number.low, -number.real - 1, number.variables)
             case c_ast.BinaryOp():
                 left, right = self.value(node.left, known), self.value(node.right, known)
                 return self._binary(node.op, left, right)
@@ -168,7 +166,7 @@ class ExpressionFormulas:
                 return self._calls(node.name.name, arguments)
         raise NotImplementedError(f"{type(node).__name__} in {self.place}")
 
-    def _promoted(self, number: Number) -> Number:
+    def _promote(self, number: Number) -> Number:
         return number.as_type(self.model.promoted(number.kind))
 
     def converted(self, number: Number, kind: IntegerType) -> Number:
@@ -177,10 +175,10 @@ class ExpressionFormulas:
             if kind.low <= number.low and number.high <= kind.high:
                 return number.as_type(kind)
             if kind.signed:
-                return self._fitted(kind, number.low, number.high, number.real, number.variables)
+                return self._fit(kind, number.low, number.high, number.real, number.variables)
         return Number.of(self.variable(kind.low, kind.high, "low_bits"), kind)
 
-    def _fitted(
+    def _fit(
         self, kind: IntegerType, low: int, high: int, real: Any, variables: frozenset[Variable]
     ) -> Number:
         """Return a result, which a type with a sign must hold; one without keeps the low bits."""
@@ -195,32 +193,32 @@ class ExpressionFormulas:
 
     def _binary(self, operator: str, left: Number, right: Number) -> Number:
         if operator in ("<<", ">>"):
-            return self._shifted(operator, self._promoted(left), right)
+            return self._shift(operator, self._promote(left), right)
         kind = self.model.common(left.kind, right.kind)
         left, right = self.converted(left, kind), self.converted(right, kind)
         variables = left.variables | right.variables
         if operator == "+":
-            return self._fitted(
+            return self._fit(
                 kind, left.low + right.low, left.high + right.high, left.real + right.real, variables
             )
         if operator == "-":
-            return self._fitted(
+            return self._fit(
                 kind, left.low - right.high, left.high - right.low, left.real - right.real, variables
             )
         if operator == "*":
             ends = [a * b for a, b in product((left.low, left.high), (right.low, right.high))]
             low = 0 if left.real is right.real and min(ends) < 0 else min(ends)
-            return self._fitted(kind, low, max(ends), left.real * right.real, variables)
+            return self._fit(kind, low, max(ends), left.real * right.real, variables)
         if operator == "/":
             return self._quotient(kind, left, right)
         raise NotImplementedError(f"{operator} in {self.place}")
 
-    def _shifted(self, operator: str, left: Number, right: Number) -> Number:
+    def _shift(self, operator: str, left: Number, right: Number) -> Number:
         assert right.exact and 0 <= right.low < left.kind.bits, "the places of a shift are constant"
         factor = 1 << right.low
         self._at_least(left, 0, "what is shifted must not be negative")
         if operator == "<<":
-            return self._fitted(
+            return self._fit(
                 left.kind, left.low * factor, left.high * factor, left.real * factor, left.variables
             )
         return self.floored(left, right.low)

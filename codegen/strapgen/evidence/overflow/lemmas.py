@@ -47,10 +47,10 @@ class ParsedSource:
     @cached_property
     def functions(self) -> dict[str, c_ast.FuncDef]:
         """The functions that the file defines, by name."""
-        tree = c_parser.CParser().parse(self._preprocessed())
+        tree = c_parser.CParser().parse(self._preprocess())
         return {node.decl.name: node for node in tree.ext if isinstance(node, c_ast.FuncDef)}
 
-    def _preprocessed(self) -> str:
+    def _preprocess(self) -> str:
         with temporary_folder() as folder:
             for file, text in {**self._files, "stdint.h": _STDINT, "stddef.h": ""}.items():
                 (folder / file).write_text(text)
@@ -112,10 +112,10 @@ class BitVectorFunction:
             match statement:
                 case c_ast.Decl():
                     value = self._value(statement.init, known)
-                    known[statement.name] = self._converted(value, self._kind(statement.type))
+                    known[statement.name] = self._convert(value, self._kind(statement.type))
                 case c_ast.Return():
                     value = self._value(statement.expr, known)
-                    return self._converted(value, self._kind(self._function.decl.type.type))
+                    return self._convert(value, self._kind(self._function.decl.type.type))
         raise NotImplementedError(f"{self._function.decl.name} does not return")
 
     def kind(self, parameter: str) -> IntegerType:
@@ -129,7 +129,7 @@ class BitVectorFunction:
     def _require(self, condition: Any) -> None:
         self.safe.append(z3.Implies(z3.And(self._path), condition))
 
-    def _converted(self, value: Bits, kind: IntegerType) -> Bits:
+    def _convert(self, value: Bits, kind: IntegerType) -> Bits:
         if kind.bits > value.kind.bits:
             return Bits(kind, value.extended(kind.bits))
         vector = z3.Extract(kind.bits - 1, 0, value.vector)
@@ -146,24 +146,24 @@ class BitVectorFunction:
             case c_ast.ID():
                 return known[node.name]
             case c_ast.Cast():
-                return self._converted(self._value(node.expr, known), self._kind(node.to_type.type))
+                return self._convert(self._value(node.expr, known), self._kind(node.to_type.type))
             case c_ast.UnaryOp(op="~"):
-                value = self._promoted(node.expr, known)
+                value = self._promote(node.expr, known)
                 return Bits(value.kind, ~value.vector)
             case c_ast.UnaryOp(op="-"):
-                value = self._promoted(node.expr, known)
-                return self._fitted(value.kind, -value.extended(value.kind.bits + 1))
+                value = self._promote(node.expr, known)
+                return self._fit(value.kind, -value.extended(value.kind.bits + 1))
             case c_ast.BinaryOp():
                 return self._binary(node, known)
             case c_ast.TernaryOp():
-                return self._chosen(node, known)
+                return self._choose(node, known)
         raise NotImplementedError(f"{type(node).__name__} in {self._function.decl.name}")
 
-    def _promoted(self, node: Any, known: Mapping[str, Bits]) -> Bits:
+    def _promote(self, node: Any, known: Mapping[str, Bits]) -> Bits:
         value = self._value(node, known)
-        return self._converted(value, self._model.promoted(value.kind))
+        return self._convert(value, self._model.promoted(value.kind))
 
-    def _fitted(self, kind: IntegerType, vector: Any) -> Bits:
+    def _fit(self, kind: IntegerType, vector: Any) -> Bits:
         """Return a result of more bits than its type has: it must fit, or without a sign its low bits stay."""
         low = z3.Extract(kind.bits - 1, 0, vector)
         if kind.signed:
@@ -171,25 +171,25 @@ class BitVectorFunction:
         return Bits(kind, low)
 
     def _binary(self, node: c_ast.BinaryOp, known: Mapping[str, Bits]) -> Bits:
-        left, right = self._promoted(node.left, known), self._promoted(node.right, known)
+        left, right = self._promote(node.left, known), self._promote(node.right, known)
         if node.op == ">>":
-            return self._shifted(left, right)
+            return self._shift(left, right)
         kind = self._model.common(left.kind, right.kind)
-        left, right = self._converted(left, kind), self._converted(right, kind)
+        left, right = self._convert(left, kind), self._convert(right, kind)
         more = kind.bits + 1
         vectors = left.extended(more), right.extended(more)
         match node.op:
             case "+":
-                return self._fitted(kind, vectors[0] + vectors[1])
+                return self._fit(kind, vectors[0] + vectors[1])
             case "-":
-                return self._fitted(kind, vectors[0] - vectors[1])
+                return self._fit(kind, vectors[0] - vectors[1])
             case "&":
                 return Bits(kind, left.vector & right.vector)
             case "|":
                 return Bits(kind, left.vector | right.vector)
         raise NotImplementedError(f"{node.op} in {self._function.decl.name}")
 
-    def _shifted(self, left: Bits, right: Bits) -> Bits:
+    def _shift(self, left: Bits, right: Bits) -> Bits:
         bits = left.kind.bits
         places = Bits(right.kind, right.vector).extended(64)
         self._require(z3.And(places >= 0, places < bits))
@@ -198,22 +198,22 @@ class BitVectorFunction:
         wide = z3.Extract(bits - 1, 0, places) if bits <= 64 else z3.ZeroExt(bits - 64, places)
         return Bits(left.kind, z3.LShR(left.vector, wide))
 
-    def _chosen(self, node: c_ast.TernaryOp, known: Mapping[str, Bits]) -> Bits:
+    def _choose(self, node: c_ast.TernaryOp, known: Mapping[str, Bits]) -> Bits:
         condition = self._condition(node.cond, known)
         values = []
         for way, branch in ((condition, node.iftrue), (z3.Not(condition), node.iffalse)):
             self._path.append(way)
-            values.append(self._promoted(branch, known))
+            values.append(self._promote(branch, known))
             self._path.pop()
         kind = self._model.common(values[0].kind, values[1].kind)
-        first, second = (self._converted(value, kind).vector for value in values)
+        first, second = (self._convert(value, kind).vector for value in values)
         return Bits(kind, z3.If(condition, first, second))
 
     def _condition(self, node: c_ast.BinaryOp, known: Mapping[str, Bits]) -> Any:
-        left, right = self._promoted(node.left, known), self._promoted(node.right, known)
+        left, right = self._promote(node.left, known), self._promote(node.right, known)
         kind = self._model.common(left.kind, right.kind)
         more = kind.bits + 1
-        first, second = (self._converted(value, kind).extended(more) for value in (left, right))
+        first, second = (self._convert(value, kind).extended(more) for value in (left, right))
         return {
             "<": first < second,
             ">": first > second,
@@ -241,7 +241,7 @@ def is_root(function: c_ast.FuncDef, model: Model, nearest: bool) -> bool:
     first = bit.bit_length() // 2
     if bit != 4**first or 4 ** (first + 1) < 2 ** (bits - 1) or not _says_more_than_zero(loop.cond):
         return False
-    if not _proved(
+    if not _prove(
         [square >= 0, square < 2 ** (bits - 1)], [run.known["rest"] == square, run.known["root"] == 0]
     ):
         return False
@@ -286,7 +286,7 @@ def _keeps(loop: c_ast.While, square: Any, k: int, bits: int) -> bool:
         square < (after + unit) * (after + unit),
         *run.safe,
     ]
-    return _proved(holds, claims)
+    return _prove(holds, claims)
 
 
 def _ends(statements: list[Any], square: Any, bits: int, nearest: bool) -> bool:
@@ -297,12 +297,12 @@ def _ends(statements: list[Any], square: Any, bits: int, nearest: bool) -> bool:
     run.block(statements)
     root = run.result
     if not nearest:
-        return _proved(holds, [*run.safe, root == part])
+        return _prove(holds, [*run.safe, root == part])
     # rest and root are integers, so that rest > root says rest >= root + 1
     up = square - part * part > part
     near = [root == z3.If(up, part + 1, part)]
     below = [*holds, z3.Or(square - part * part <= part, square - part * part >= part + 1)]
-    return _proved(below, [*run.safe, *near, root * root - root <= square, square <= root * root + root])
+    return _prove(below, [*run.safe, *near, root * root - root <= square, square <= root * root + root])
 
 
 class _Run:
@@ -321,7 +321,7 @@ class _Run:
                 case c_ast.Decl():
                     self.known[statement.name] = self._value(statement.init)
                 case c_ast.Assignment():
-                    self.known[statement.lvalue.name] = self._assigned(statement)
+                    self.known[statement.lvalue.name] = self._assign(statement)
                 case c_ast.If(iffalse=None):
                     self._if(statement)
                 case c_ast.Return():
@@ -338,7 +338,7 @@ class _Run:
             if self.known[name] is not value:
                 self.known[name] = z3.If(condition, self.known[name], value)
 
-    def _assigned(self, statement: c_ast.Assignment) -> Any:
+    def _assign(self, statement: c_ast.Assignment) -> Any:
         left, right = self.known[statement.lvalue.name], self._value(statement.rvalue)
         match statement.op:
             case "+=":
@@ -371,7 +371,7 @@ class _Run:
         raise NotImplementedError(type(node).__name__)
 
 
-def _proved(holds: list[Any], claims: list[Any]) -> bool:
+def _prove(holds: list[Any], claims: list[Any]) -> bool:
     for claim in claims:
         solver = z3.SolverFor("QF_NRA")
         solver.add(*holds, z3.Not(claim))

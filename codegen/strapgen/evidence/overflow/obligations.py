@@ -157,7 +157,7 @@ class KernelStatements:
 
     def _if(self, statement: c_ast.If, known: dict[str, Number]) -> None:
         if statement.iffalse is None and isinstance(_items(statement.iftrue)[-1], c_ast.Return):
-            self._refused(statement.cond, known)
+            self._refuse(statement.cond, known)
             return
         condition = self._expressions.condition(statement.cond, known)
         branches = _items(statement.iftrue), _items(statement.iffalse)
@@ -166,7 +166,7 @@ class KernelStatements:
             return
         after = []
         for fact, items in zip((condition, condition.negated()), branches, strict=True):
-            learned = self._learned(statement.cond, fact is condition, known)
+            learned = self._learn(statement.cond, fact is condition, known)
             inside = known | learned
             self._expressions.under(fact, lambda: self._block(items, inside))  # noqa: B023
             untouched = {name for name, number in learned.items() if inside[name] is number}
@@ -177,7 +177,7 @@ class KernelStatements:
                 merged = self._expressions.merged(condition, first[name], second[name])
                 self._assign(name, merged, known)
 
-    def _learned(self, condition: Any, true: bool, known: Mapping[str, Number]) -> dict[str, Number]:
+    def _learn(self, condition: Any, true: bool, known: Mapping[str, Number]) -> dict[str, Number]:
         """Return the values in a comparison with the intervals that its outcome leaves to them."""
         if not isinstance(condition, c_ast.BinaryOp) or condition.op not in (">", ">="):
             return {}
@@ -192,18 +192,18 @@ class KernelStatements:
             learned[place] = known[place].between(smaller.low, most.high - more)
         return learned
 
-    def _refused(self, condition: Any, known: dict[str, Number]) -> None:
+    def _refuse(self, condition: Any, known: dict[str, Number]) -> None:
         """Go on where a check has let the values pass."""
         if isinstance(condition, c_ast.BinaryOp) and condition.op == "||":
-            self._refused(condition.left, known)
-            self._refused(condition.right, known)
+            self._refuse(condition.left, known)
+            self._refuse(condition.right, known)
             return
         if isinstance(condition, c_ast.FuncCall):
             body = self._functions[condition.name.name]
             arguments = [self._expressions.value(node, known) for node in condition.args.exprs]
             inside = self._bound(body, arguments)
             (statement,) = body.body.block_items
-            self._refused(statement.expr, inside)
+            self._refuse(statement.expr, inside)
             return
         fact = self._expressions.condition(condition, known)
         assert not isinstance(fact, bool) or not fact, "a check that always refuses"

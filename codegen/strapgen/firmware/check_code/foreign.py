@@ -246,7 +246,7 @@ def compile_foreign(source: ForeignSource) -> Path:
     with drafts.temporary_folder() as folder:
         text = folder / f"bridge{of.ending}"
         text.write_text(bridge)
-        preprocessed = _preprocessed(source, text)
+        preprocessed = _preprocess(source, text)
     key = cache.digest([preprocessed, bridge, compiler.C.identity(_FLAGS), of.identity()])
 
     def fill(draft: Path) -> None:
@@ -255,7 +255,7 @@ def compile_foreign(source: ForeignSource) -> Path:
             if reasons := compiler.compile_module(
                 draft, _MODULE, files, _DECLARATION, _DECLARATION, flags, of
             ):
-                raise CompilerError(_said(source, reasons))
+                raise CompilerError(_diagnostics(source, reasons))
 
     folder_of_build = cache.entry("builds", key, fill, f"compiled {source.function}")
     return next(path for path in folder_of_build.iterdir() if path.name.startswith(f"{_MODULE}."))
@@ -313,13 +313,13 @@ def _reason(status: int) -> str:
         return f"it ends with signal {-status}"
 
 
-def _preprocessed(source: ForeignSource, text: Path) -> str:
+def _preprocess(source: ForeignSource, text: Path) -> str:
     """Return all that the compiler reads, headers included."""
     language = "c++" if source.is_cpp else "c"
     command = [*compiler.C.command(), "-E", "-x", language, str(text)]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
-        raise CompilerError(_said(source, done.stderr.splitlines()))
+        raise CompilerError(_diagnostics(source, done.stderr.splitlines()))
     return done.stdout.replace(str(text), "bridge")
 
 
@@ -329,7 +329,7 @@ def _options(source: ForeignSource) -> list[str]:
     return list(dropwhile(lambda word: not word.startswith("-"), words))
 
 
-def _said(source: ForeignSource, lines: list[str]) -> str:
+def _diagnostics(source: ForeignSource, lines: list[str]) -> str:
     """Return the first error of the compiler, with the path of the file as the user wrote it."""
     errors = [line.strip() for line in lines if re.search(r"\berror\b:", line)] or lines[:1] or ["no reason"]
     error = errors[0].replace(str(source.file.resolve()), str(source.file))

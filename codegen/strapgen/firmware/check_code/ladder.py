@@ -74,7 +74,7 @@ def _along(step: ForeignStep, profile: Motion, length: Fraction, calls: int) -> 
     return Segment(ends.reshape(count, step.samples, 3))
 
 
-def _aligned(step: ForeignStep, relative: Array, profile: Motion, length: Fraction) -> tuple[Array, Array]:
+def _align(step: ForeignStep, relative: Array, profile: Motion, length: Fraction) -> tuple[Array, Array]:
     """Return computed and true matrices, equal at the end of the calls before the run."""
     first = step.settling
     true = profile.attitude(np.arange(first, len(relative)) * float(length))
@@ -84,7 +84,7 @@ def _aligned(step: ForeignStep, relative: Array, profile: Motion, length: Fracti
 
 def _error(step: ForeignStep, relative: Array, profile: Motion, length: Fraction) -> float:
     """Return the largest error of a run in rad."""
-    computed, true = _aligned(step, relative, profile, length)
+    computed, true = _align(step, relative, profile, length)
     return float((np.linalg.norm(computed - true, axis=(-2, -1)) / math.sqrt(2)).max())
 
 
@@ -221,7 +221,7 @@ def _published_drifts(
 
 def _drift(step: ForeignStep, relative: Array, length: Fraction, duration: Fraction) -> Array:
     """Return the drift of a run on the cone in deg/h."""
-    computed, true = _aligned(step, relative, cone(), length)
+    computed, true = _align(step, relative, cone(), length)
     return drift_deg_h(drift_between(computed, true), duration)
 
 

@@ -199,7 +199,7 @@ def _explanations(
     for terms in (_EXACT, _FIRST):
         transitions = _exponential(generators, terms)
         for reads in _possible_reads(convention, elements, np.abs(generators).max(axis=0) > 0):
-            after = _replaced(transitions, states, reads)
+            after = _replace(transitions, states, reads)
             for number, repair in enumerate(_orthogonal(elements)):
                 turned = before @ convention.matrices(repair(after))
                 off = rotation_vectors(np.swapaxes(true, -1, -2) @ turned)
@@ -230,7 +230,7 @@ def _exponential(generators: Array, terms: int) -> Array:
     return total
 
 
-def _replaced(transitions: Array, states: Array, reads: _Reads) -> Array:
+def _replace(transitions: Array, states: Array, reads: _Reads) -> Array:
     """Return states (N, E) after an update whose elements read what is replaced already."""
     after = states.copy()
     elements = range(states.shape[1])

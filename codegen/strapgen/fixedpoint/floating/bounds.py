@@ -23,7 +23,7 @@ from strapgen.fixedpoint.format_plan import largest_magnitude
 from strapgen.fixedpoint.intervals import Interval, norm
 from strapgen.fixedpoint.quantities import up
 from strapgen.ir import checks
-from strapgen.ir.fixed_settings import TURNING, Settings
+from strapgen.ir.fixed_settings import ROTATION_INPUTS, Settings
 from strapgen.ir.interfaces import Condition, RoundingAccumulation, RoundingBounds, StepRounding
 from strapgen.ir.program import Operation, Program, Result, walk
 
@@ -116,7 +116,7 @@ def rounding_bounds(
     precision = NUMBERS[number].precision
     if not _has_numpy():
         return proved.bounds(program, number, precision)
-    known = {*settings.ranges, *TURNING}
+    known = {*settings.ranges, *ROTATION_INPUTS}
     for signal in program.inputs:
         if signal.bound is None and not signal.constraint and signal.name not in known:
             reason = f"the range of {signal.name} is unknown"

@@ -189,18 +189,18 @@ class _ComputedNumbers:
 
     def __post_init__(self) -> None:
         for place, expression in enumerate(self.expressions.items):
-            self.items.append(self._computed(place, expression))
+            self.items.append(self._compute(place, expression))
 
-    def _computed(self, place: int, expression: Expression) -> _ComputedNumber:
+    def _compute(self, place: int, expression: Expression) -> _ComputedNumber:
         exact = self.ranges[place]
         if expression.kind == INPUT:
             return _ComputedNumber(exact, _ZERO, _ZERO, relative=(_ZERO, _ZERO))
         if expression.kind == CONSTANT:
             return self._literal(expression.value)
-        carried, second = self._propagated(place, expression)
+        carried, second = self._propagate(place, expression)
         before = self._before_rounding(expression).meet(exact.widened(carried))
         rounding = self._rounding(expression, before)
-        after = before.widened(rounding).meet(self._rounded(before, expression.kind))
+        after = before.widened(rounding).meet(self._round(before, expression.kind))
         if after.magnitude >= Fraction(2) ** self.number.overflow:
             raise NoBoundError(f"{self.expressions.labels[place]} may overflow")
         return _ComputedNumber(
@@ -219,7 +219,7 @@ class _ComputedNumbers:
 
     # Errors of operands
 
-    def _propagated(self, place: int, expression: Expression) -> tuple[Fraction, Fraction]:
+    def _propagate(self, place: int, expression: Expression) -> tuple[Fraction, Fraction]:
         """Return the error that those of the operands make in an operation, and its part of second order."""
         operands = [self.items[k] for k in expression.arguments]
         errors = [operand.error for operand in operands]
@@ -231,7 +231,7 @@ class _ComputedNumbers:
                 second = up(errors[0] * errors[1])
                 return up(x * errors[1] + y * errors[0]) + second, second
             case "divide":
-                return self._divided(place, expression)
+                return self._divide(place, expression)
             case "sqrt":
                 return self._square_root(place, expression)
             case "sin" | "cos":
@@ -246,7 +246,7 @@ class _ComputedNumbers:
                 return max(errors[1:]), _ZERO
         return _ZERO, _ZERO  # a comparison, which a selection looks into
 
-    def _divided(self, place: int, expression: Expression) -> tuple[Fraction, Fraction]:
+    def _divide(self, place: int, expression: Expression) -> tuple[Fraction, Fraction]:
         numerator, divisor = (self.items[k] for k in expression.arguments)
         exact = _least_magnitude(self.ranges[expression.arguments[1]])
         computed = _least_magnitude(divisor.range)
@@ -353,7 +353,7 @@ class _ComputedNumbers:
             return 1 / abs(powers[-1][1])
         return None
 
-    def _rounded(self, before: Interval, kind: str) -> Interval:
+    def _round(self, before: Interval, kind: str) -> Interval:
         """Return the range after rounding, which keeps the order of numbers; functions are not rounded so."""
         if kind in ("sin", "cos", "sinc"):
             return before.widened(Fraction(1, 4))

@@ -1,4 +1,4 @@
-"""Holds bounds that were proved before, for where numpy is missing, with which bounds are proved: in a browser.
+"""Stores bounds that were proved before, for a browser, which lacks the numpy that proofs need.
 
 A bound belongs to a program, whatever wrote it down: its key is the digest of all that the program holds.
 """
@@ -37,6 +37,6 @@ def load(data: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def bounds(program: Program, number: str, precision: int) -> RoundingBounds:
-    """Return the bounds that were added for a program; where there are none, the reason takes their place."""
+    """Return the stored bounds of a program, or the reason why there are none."""
     unknown = RoundingBounds(number, precision, reason=WITHOUT_NUMPY)
     return _bounds.get(key(program, number), unknown)

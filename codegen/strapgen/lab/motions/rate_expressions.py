@@ -189,7 +189,7 @@ class Jets:
     def multiply(self, x: _Jet, y: _Jet) -> _Jet:
         """Return a product."""
         a, b = x.coefficients, y.coefficients
-        rest = [_convolved(a, b, k, 0, k) for k in range(1, self.order + 1)]
+        rest = [_convolve(a, b, k, 0, k) for k in range(1, self.order + 1)]
         return self.jet(x.value * y.value, rest)
 
     def power(self, x: _Jet, exponent: int) -> _Jet:
@@ -208,7 +208,7 @@ class Jets:
         inverse = 1 / self.divisor(x.value)
         result = [inverse]
         for k in range(1, self.order + 1):
-            result.append(self.sign * inverse * _convolved(result, x.coefficients, k, 0, k - 1))
+            result.append(self.sign * inverse * _convolve(result, x.coefficients, k, 0, k - 1))
         return self.jet(1 / x.value, result[1:])
 
     def root(self, x: _Jet) -> _Jet:
@@ -218,7 +218,7 @@ class Jets:
         half = 1 / (2 * self.divisor(value))
         result = [_largest(value) if self.bounds else value]
         for k in range(1, self.order + 1):
-            inner = _convolved(result, result, k, 1, k - 1)
+            inner = _convolve(result, result, k, 1, k - 1)
             result.append((x.coefficients[k] + self.sign * inner) * half)
         return self.jet(value, result[1:])
 
@@ -228,7 +228,7 @@ class Jets:
         result = [_largest(value) if self.bounds else value]
         slope = [j * c for j, c in enumerate(x.coefficients)]
         for k in range(1, self.order + 1):
-            result.append(_convolved(slope, result, k, 1, k) / k)
+            result.append(_convolve(slope, result, k, 1, k) / k)
         return self.jet(value, result[1:])
 
     def log(self, x: _Jet) -> _Jet:
@@ -238,7 +238,7 @@ class Jets:
         result: list[Any] = [0]
         for k in range(1, self.order + 1):
             slope = [j * c for j, c in enumerate(result)]
-            inner = _convolved(slope, x.coefficients, k, 1, k - 1) / k
+            inner = _convolve(slope, x.coefficients, k, 1, k - 1) / k
             result.append((x.coefficients[k] + self.sign * inner) * inverse)
         return self.jet(self.context.log(x.value), result[1:])
 
@@ -248,8 +248,8 @@ class Jets:
         sine, cosine = ([_largest(value) if self.bounds else value] for value in values)
         slope = [j * c for j, c in enumerate(x.coefficients)]
         for k in range(1, self.order + 1):
-            sine.append(_convolved(slope, cosine, k, 1, k) / k)
-            cosine.append(self.sign * _convolved(slope, sine, k, 1, k) / k)
+            sine.append(_convolve(slope, cosine, k, 1, k) / k)
+            cosine.append(self.sign * _convolve(slope, sine, k, 1, k) / k)
         return self.jet(values[0], sine[1:]), self.jet(values[1], cosine[1:])
 
     def require_positive(self, value: Any) -> None:
@@ -283,7 +283,7 @@ class Jets:
         return jets
 
 
-def _convolved(x: Sequence[Any], y: Sequence[Any], k: int, first: int, last: int) -> Any:
+def _convolve(x: Sequence[Any], y: Sequence[Any], k: int, first: int, last: int) -> Any:
     """Return the sum of x_j y_(k - j) for j from the first to the last."""
     total = 0
     for a, b in zip(x[first : last + 1], y[k - last : k - first + 1][::-1], strict=True):

@@ -48,13 +48,13 @@ class RateMotion(Motion):
     elements: tuple[Any, ...] = field(default=())
 
     @cached_property
-    def _integrated(self) -> Integrated:
+    def _integrate(self) -> Integrated:
         return Integrated(self.name, *operations_of(self.name, self.elements))
 
     def error_bound(self, time: float) -> float:
         """Return a proved bound of the error of the attitude at a time in s, before it is rounded, in rad."""
         with mp.workdps(DIGITS):
-            return self._integrated.piece(_number(time)).error
+            return self._integrate.piece(_number(time)).error
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
         """Return angle increments of some sampling intervals, integrated in 50 digits, see `Motion.samples`."""
@@ -65,7 +65,7 @@ class RateMotion(Motion):
         """Return what `samples` does before it is rounded, integrated in 50 digits: (stop - first) rows of three."""
         with mp.workdps(DIGITS):
             edges = [_time(k * interval) for k in range(first, stop + 1)]
-            angles = [self._integrated.piece(edge).angle_at(edge) for edge in edges]
+            angles = [self._integrate.piece(edge).angle_at(edge) for edge in edges]
             return [[b - a for a, b in zip(*pair, strict=True)] for pair in pairwise(angles)]
 
     def attitude(self, time: Any) -> Array:
@@ -76,7 +76,7 @@ class RateMotion(Motion):
         """Return the true attitude at a time in s before it is rounded, row by row, within `error_bound`."""
         with mp.workdps(DIGITS):
             moment = _time(time)
-            return _attitude_elements(self._integrated.piece(moment), moment)
+            return _attitude_elements(self._integrate.piece(moment), moment)
 
     def rate(self, time: Any) -> Array:
         """Return the body rate, see `Motion.rate`."""
@@ -91,7 +91,7 @@ class RateMotion(Motion):
             raise InputError(f"{self.name}: a time is not finite")
         with mp.workdps(DIGITS):
             exact = map(_number, times.ravel().tolist())
-            rows = [[float(x) for x in function(self._integrated.piece(t), t)] for t in exact]
+            rows = [[float(x) for x in function(self._integrate.piece(t), t)] for t in exact]
         return np.array(rows, float).reshape(*times.shape, *shape)
 
 
@@ -136,7 +136,7 @@ class _Piece:
 
     @cached_property
     def _integral(self) -> list[list[Any]]:
-        return _integrated(self.rate)
+        return _integrate(self.rate)
 
     def rate_at(self, time: Any) -> list[Any]:
         """Return the rate at a time in the piece."""
@@ -218,7 +218,7 @@ class Integrated:
         edge = -direction * half  # where it meets the piece before it
         turned, gained = (
             _series_at(transition, edge),
-            [edge * mp.polyval(row, edge) for row in _integrated(rate)],
+            [edge * mp.polyval(row, edge) for row in _integrate(rate)],
         )
         if before:
             angle, attitude = before[-1].angle_at(middle + edge), before[-1].attitude_at(middle + edge)
@@ -290,7 +290,7 @@ def _transition(rate: list[list[Any]], half: Any) -> list[list[list[Any]]]:
     ]
 
 
-def _integrated(rate: list[list[Any]]) -> list[list[Any]]:
+def _integrate(rate: list[list[Any]]) -> list[list[Any]]:
     """Return the coefficients of the integral of a polynomial rate, without the factor of time, the highest first."""
     return [[c / (k + 1) for k, c in enumerate(row)][::-1] for row in rate]
 

@@ -306,8 +306,8 @@ class ReferenceAttitude:
         parts = [self._states]
         for first in range(len(self._states) - 1, last, _PART):
             starts = (first + np.arange(_PART * self._substeps) / self._substeps) * KNOT
-            turns = self._turns(starts, np.full(starts.shape, KNOT / self._substeps))
-            states = _magnus().propagate(turns, self._substeps, initial=parts[-1][-1])[1:]
+            vectors = self._node_rotations(starts, np.full(starts.shape, KNOT / self._substeps))
+            states = _magnus().propagate(vectors, self._substeps, initial=parts[-1][-1])[1:]
             # The length of a product of rotations is 1 but for rounding.
             parts.append(states / np.linalg.norm(states, axis=1, keepdims=True))
         self._states = np.concatenate(parts)
@@ -317,15 +317,15 @@ class ReferenceAttitude:
         step = KNOT / self._substeps
         starts = knots[:, None] * KNOT + np.arange(self._substeps) * step
         lengths = np.clip(times[:, None] - starts, 0, step)
-        turns = self._turns(starts, lengths)
-        result: Array = _magnus().propagate(turns, self._substeps, initial=states)[:, -1]
+        vectors = self._node_rotations(starts, lengths)
+        result: Array = _magnus().propagate(vectors, self._substeps, initial=states)[:, -1]
         return result
 
-    def _turns(self, starts: Array, lengths: Array) -> Array:
+    def _node_rotations(self, starts: Array, lengths: Array) -> Array:
         """Return the rates at the nodes of some substeps, each times its length, (..., 3, 3)."""
         rates = self._rate(starts[..., None] + lengths[..., None] * _NODES)
-        turns: Array = rates * lengths[..., None, None]
-        return turns
+        vectors: Array = rates * lengths[..., None, None]
+        return vectors
 
 
 @lru_cache(maxsize=1)

@@ -81,22 +81,22 @@ class UsersMotion(Motion):
     def attitude(self, time: Any) -> Array:
         """Return the true attitude, see `Motion.attitude`."""
         times = np.asarray(time, float)
-        return self._called("attitude", (*times.shape, 3, 3), times)
+        return self._call("attitude", (*times.shape, 3, 3), times)
 
     def rate(self, time: Any) -> Array:
         """Return the body rate, see `Motion.rate`."""
         if "rate" not in self.functions:
             raise InputError(f"{self.name} defines no function rate; rates of the motion need one")
         times = np.asarray(time, float)
-        return self._called("rate", (*times.shape, 3), times)
+        return self._call("rate", (*times.shape, 3), times)
 
     def _windows(self, step: float, steps: int, samples: int, previous: int, ahead: int) -> Array:
         shape = (steps, previous + samples + ahead, 3)
-        return self._called("increments", shape, step, steps, samples, previous, ahead)
+        return self._call("increments", shape, step, steps, samples, previous, ahead)
 
-    def _called(self, function: str, shape: tuple[int, ...], *arguments: Any) -> Array:
+    def _call(self, function: str, shape: tuple[int, ...], *arguments: Any) -> Array:
         """Return what a function of the file returns, checked."""
-        with _guarded(self.name):
+        with _guard(self.name):
             value = self.functions[function](*arguments)
         try:
             array = np.asarray(value, float)
@@ -165,7 +165,7 @@ def _read(name: str, source: bytes, duration: Fraction) -> UsersMotion | RateMot
     """Return the motion of a file with these contents, checked once."""
     functions = _functions(name)
     if EXPRESSION in functions:
-        with _guarded(name):
+        with _guard(name):
             rate = rate_of(name, functions[EXPRESSION])
         motion_of_rate = RateMotion(name, {}, rate)
         motion_of_rate.error_bound(float(duration))  # integrates it over the duration, or refuses it
@@ -212,7 +212,7 @@ def require_consistent(users: Motion, duration: float | str | Fraction) -> None:
 
 def _functions(name: str) -> dict[str, Callable[..., Any]]:
     """Return the functions of a user's file."""
-    with _guarded(name), packages.importing_beside(Path(name)):
+    with _guard(name), packages.importing_beside(Path(name)):
         names = runpy.run_path(name, run_name=Path(name).stem)
     if callable(names.get(EXPRESSION)):
         if others := [function for function in FUNCTIONS if function in names]:
@@ -236,7 +236,7 @@ def rate_expressions(path: str | Path) -> tuple[Any, ...]:
     return users.elements
 
 
-def _guarded(name: str) -> Any:
+def _guard(name: str) -> Any:
     """Run a user's code; a failure becomes one line with its place."""
     file = Path(name).name
     return packages.guarded(name, "define a motion", lambda path: path.name == file)
@@ -281,12 +281,12 @@ class _Integral:
         """Return what is wrong first, and in which interval; "" if nothing is."""
         matrices = self._users.attitude(edges)
         true = np.swapaxes(matrices[:-1], -1, -2) @ matrices[1:]
-        turned, angle, summed = self._integrated(edges, 1)
+        turned, angle, summed = self._integrate(edges, 1)
         added, pieces = np.zeros(len(edges) - 1), 1
         apart = change = np.zeros(len(edges) - 1)
         while True:
             pieces *= 2
-            before, (turned, finer, summed) = (turned, angle, summed), self._integrated(edges, pieces)
+            before, (turned, finer, summed) = (turned, angle, summed), self._integrate(edges, pieces)
             added = np.maximum(added, np.abs(finer - before[1]).max(axis=-1))
             # At a kink of the rate one halving may by chance change little; the one before it is told too.
             apart = np.maximum(_distance(turned, before[0]), apart / 4)
@@ -304,7 +304,7 @@ class _Integral:
         places = {said: int(np.argmax(wrong)) for said, wrong in faults.items() if wrong.any()}
         return min(places.items(), key=lambda item: item[1]) if places else ("", 0)
 
-    def _integrated(self, edges: Array, pieces: int) -> tuple[Array, Array, Array]:
+    def _integrate(self, edges: Array, pieces: int) -> tuple[Array, Array, Array]:
         """Return the rotation, the sum of the increments and the integral of the rate of every interval."""
         row = self._row(edges, pieces)
         states = self._step.propagate(row, pieces)  # at the start of each interval and at its end

@@ -71,9 +71,9 @@ def rates_layout(
         if len(of_rates) > 1:
             raise InputError(f"the rates are in {' and '.join(sorted(of_rates))}; one unit is needed")
         for place in places[has_time:]:
-            unit = _agreed("--rate-unit", unit, cells[place], units.RATES, "rates")
+            unit = _agree("--rate-unit", unit, cells[place], units.RATES, "rates")
         if has_time:
-            time_unit = _agreed("--time-unit", time_unit, cells[places[0]], units.TIMES, "times")
+            time_unit = _agree("--time-unit", time_unit, cells[places[0]], units.TIMES, "times")
     return ColumnLayout(places, width, has_time, time_unit, unit)
 
 
@@ -97,7 +97,7 @@ def named_layout(
     for place, unit in zip(places[1:], wanted[1:], strict=True):
         if cells[place].unit not in (None, unit):
             raise InputError(f"column {cells[place].text!r} is in {cells[place].unit}; {unit} is needed")
-    return ColumnLayout(places, width, True, _agreed("", None, cells[places[0]], units.TIMES, "times"))
+    return ColumnLayout(places, width, True, _agree("", None, cells[places[0]], units.TIMES, "times"))
 
 
 def _cell(text: str) -> _HeaderCell:
@@ -191,7 +191,7 @@ def known_unit(what: str, text: str, table: Mapping[str, Fraction]) -> str:
     return name if name in table else checks.choice(what, text, [*table])
 
 
-def _agreed(
+def _agree(
     option: str, stated: str | None, cell: _HeaderCell, table: Mapping[str, Fraction], what: str
 ) -> str | None:
     """Return the unit that a user or a column states."""

@@ -150,7 +150,7 @@ def covariances(path: Path, errors: InstrumentErrors) -> dict[str, Array]:
     return result
 
 
-def _turned(attitudes: Array, variances: Array) -> Array:
+def _rotate(attitudes: Array, variances: Array) -> Array:
     """Return C diag(v) C^T of variances on body axes, (3,), for many attitudes."""
     result: Array = np.einsum("nij,j,nkj->nik", attitudes, variances, attitudes)
     return result
@@ -174,7 +174,7 @@ def _effect(path: Path, errors: InstrumentErrors) -> Array:
 
 def _of_noise(path: Path, errors: InstrumentErrors) -> Array:
     """White noise: the integral of C diag(N^2) C^T."""
-    return path.summed(_turned(path.attitudes, errors.gyro.noise**2)) * float(path.interval)
+    return path.summed(_rotate(path.attitudes, errors.gyro.noise**2)) * float(path.interval)
 
 
 def _of_walk(path: Path, errors: InstrumentErrors) -> Array:
@@ -204,17 +204,17 @@ def _of_output_noise(path: Path, errors: InstrumentErrors) -> Array:
     # Of the spectrum of the sum, 1 at frequency zero, a step takes in addition what lies at half of its samples' rate.
     beside = path.choice.increments_per_step * float(path.noise.turning) - 1
     factor = (1 + beside * bounded**2) * path.sampling / float(path.interval)
-    return bounded * _turned(path.ends, rms**2) + factor * path.summed(_turned(_across(path), rms**2))
+    return bounded * _rotate(path.ends, rms**2) + factor * path.summed(_rotate(_across(path), rms**2))
 
 
 def _of_pulses(path: Path, errors: InstrumentErrors) -> Array:
     """Pulses: independent errors of q^2/12 of all sampled angles, that at the start among them."""
     variances, noise = errors.gyro.pulse**2 / 12, path.noise
-    once = float(noise.end) * _turned(path.ends, variances) + float(noise.start) * np.diag(variances)
+    once = float(noise.end) * _rotate(path.ends, variances) + float(noise.start) * np.diag(variances)
     steps = path.steps // path.records * np.arange(1, path.records + 1)
     walk = float(noise.walk) * steps[:, None, None] * np.diag(variances)
     factor = float(noise.turning) * float(path.step) / float(path.interval)
-    return once + walk + factor * path.summed(_turned(_across(path), variances))
+    return once + walk + factor * path.summed(_rotate(_across(path), variances))
 
 
 def _of_jitter(path: Path, errors: InstrumentErrors) -> Array:

@@ -61,7 +61,7 @@ class MeasurementUnit:
     def __init__(self, errors: InstrumentErrors, interval: float, run: int = 0) -> None:
         self._interval = interval
         self._streams = _Streams(errors.seed, run)
-        self.errors = _drawn(errors, self._streams) if errors.drawn else errors
+        self.errors = _draw(errors, self._streams) if errors.drawn else errors
         self._causes = {*self.errors.causes}
         gyro, accelerometer = self.errors.gyro, self.errors.accelerometer
         self._gyro = _Triad(gyro, self.errors, "gyro", interval, self._streams)
@@ -278,7 +278,7 @@ class _Loss:
                 self._late = np.zeros(6)
 
 
-def _drawn(errors: InstrumentErrors, streams: _Streams) -> InstrumentErrors:
+def _draw(errors: InstrumentErrors, streams: _Streams) -> InstrumentErrors:
     """Return errors whose constants are drawn from the normal distributions that were stated."""
 
     def drawn(name: str, values: Array) -> Array:

@@ -131,7 +131,7 @@ def verify(core: Core, program: Program) -> None:
     ring, vectors = _coordinates(count)
     values: dict[str, Any] = {}
     for name, unit in zip(core.inputs, units, strict=True):
-        vector = _combined(components(unit, base), ring, vectors)
+        vector = _combine(components(unit, base), ring, vectors)
         values |= dict(zip(Signal.vector(name, name).elements, vector, strict=True))
     (computed,) = program.transition_program().run(values).values()
     if [ring(element) for element in computed] != _transition(core, base, ring, vectors):
@@ -146,7 +146,7 @@ def _coordinates(count: int) -> tuple[Any, list[list[Any]]]:
     return ring, [generators[3 * k : 3 * k + 3] for k in range(count)]
 
 
-def _combined(coefficients: list[Fraction], ring: Any, vectors: list[list[Any]]) -> list[Any]:
+def _combine(coefficients: list[Fraction], ring: Any, vectors: list[list[Any]]) -> list[Any]:
     return [
         sum(
             (
@@ -163,7 +163,7 @@ def _transition(core: Core, base: list[Form], ring: Any, vectors: list[list[Any]
     """Evaluate a core where the vectors of a base have given coordinates."""
     values: dict[str, Any] = {}
     for signal, form in core.vectors.values():
-        vector = _combined(components(form, base), ring, vectors)
+        vector = _combine(components(form, base), ring, vectors)
         values |= dict(zip(signal.elements, vector, strict=True))
     try:
         return [ring(element) for element in core.evaluate(values)]

@@ -165,7 +165,7 @@ class Plan:
         shared: Iterable[tuple[Polynomial, str]] = (),
     ) -> None:
         straight = {c[0]: p for c, p in coefficients.items() if len(c) == 1}
-        terms = [*shared, *self._grouped(straight)]
+        terms = [*shared, *self._group(straight)]
         levers: dict[int, dict[int, Polynomial]] = {}
         for covariant, polynomial in coefficients.items():
             if len(covariant) == 2:
@@ -175,7 +175,7 @@ class Plan:
                 else:
                     levers.setdefault(j, {})[i] = polynomial
         for centre, lever in levers.items():
-            groups = self._grouped(lever)
+            groups = self._group(lever)
             right = self.basis[centre]
             if len(groups) > 1 and self.weighted_first:
                 left = f"{name}_lever" if len(levers) == 1 else f"{name}_lever_{right}"
@@ -195,7 +195,7 @@ class Plan:
         if definition not in self.definitions:
             self.definitions.append(definition)
 
-    def _grouped(self, columns: dict[int, Polynomial]) -> list[tuple[Polynomial, str]]:
+    def _group(self, columns: dict[int, Polynomial]) -> list[tuple[Polynomial, str]]:
         """Return weights and vectors, with vectors of proportional weights summed first where that saves operations."""
         groups: list[tuple[Polynomial, list[tuple[Fraction, int]]]] = []
         for index, polynomial in columns.items():
@@ -381,7 +381,7 @@ def _terms(form: Form) -> int:
 
 
 def _outlook(decomposition: Decomposition) -> int:
-    """Return a first guess at the number of operations of a decomposition."""
+    """Return a quick estimate of the number of operations of a decomposition."""
     polynomials = decomposition.coefficients()
     vectors = len(decomposition.vector) + len(decomposition.symmetric)
     axes = {c[0] for c in decomposition.symmetric if c}

@@ -83,7 +83,7 @@ def _form(core: Core, decomposition: Decomposition, plan: Plan) -> VectorForm:
     diagonal = moved.symmetric.get((), {}) if moved.scalar is None else moved.scalar
     skew = _named(moved.vector, names)
     form = VectorForm(tuple(core.inputs), {}, skew, diagonal, outers, moved.scalar is None)
-    form = _crossed_inputs(form, offered)
+    form = _cross_inputs(form, offered)
     basis = [(name, offered[name]) for name in names]
     form = _with_weights(form, iter(choose_products(list(_polynomials(form)), basis, offered)))
     used = {name for product in form.products for name in product} | {
@@ -121,7 +121,7 @@ def _axis(covariant: Covariant, partners: dict[int, Coefficients]) -> int:
     return next((k for k in first if k in partners), first[0])
 
 
-def _crossed_inputs(form: VectorForm, forms: dict[str, Form]) -> VectorForm:
+def _cross_inputs(form: VectorForm, forms: dict[str, Form]) -> VectorForm:
     """Write cross products of two inputs as that of the inputs: of two vectors there is only one cross product."""
     if len(form.inputs) != 2 or not set(form.inputs) <= set(forms):
         return form

@@ -49,7 +49,7 @@ def separate(layout: Layout) -> Kernel:
             *kernel.notes,
             f"The determinant of the six torques is {_text(determinant(described, layout.sign))} in magnitude.",
             "Equal, independent noise of 1 rad on all torques becomes "
-            f"{_listed(gains[:3])} in the rates x, y and z, and {_listed(gains[3:])} m/s in the accelerations.",
+            f"{_list(gains[:3])} in the rates x, y and z, and {_list(gains[3:])} m/s in the accelerations.",
         ),
     )
 
@@ -87,7 +87,7 @@ def _text(value: sp.Expr) -> str:
     return f"{float(value):.6g}" if len(text) > _MOST_CHARACTERS and not value.free_symbols else text
 
 
-def _listed(words: Iterable[str]) -> str:
+def _list(words: Iterable[str]) -> str:
     """Return words with commas and an "and" between them."""
     *first, last = words
     return f"{', '.join(first)} and {last}"

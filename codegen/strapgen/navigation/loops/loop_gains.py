@@ -92,13 +92,13 @@ def _heading() -> ClosedLoop:
     psi, B, drift, magnetic = map(_symbol, ("psi", "B", "drift", "psi_m"))
     later = _outputs(heading_loop(), {"heading": psi, "magnetic_heading": magnetic, "heading_bias": B})
     (rate,), (bias,) = (
-        [_unwrapped(value) for value in later[name]] for name in ("heading_rate", "next_heading_bias")
+        [_unwrap(value) for value in later[name]] for name in ("heading_rate", "next_heading_bias")
     )
     step = sp.Matrix([psi + T * (drift - rate), bias])
     return _linear(step, ("psi", "B"), ("drift", "psi_m"), ("k1", "k2"))
 
 
-def _unwrapped(expression: sp.Expr) -> sp.Expr:
+def _unwrap(expression: sp.Expr) -> sp.Expr:
     """Return an expression without the reduction of angles by a turn, of which errors are far."""
     return expression.replace(Wrapped, lambda angle: angle)
 

@@ -233,7 +233,7 @@ def exponential(matrix: Array) -> Array:
     return np.asarray(total)
 
 
-def _unchecked(name: str, backend: str, inputs: Array) -> Callable[..., Any]:
+def _without_checks(name: str, backend: str, inputs: Array) -> Callable[..., Any]:
     """Return a kernel for as many runs as `inputs` has rows, without the checks of arrays, most of a call."""
     kernel, batch = backends.evaluator(name, backend), (len(inputs),)
 
@@ -247,7 +247,7 @@ class _LevelPlant:
     """The channel of V_y and phi_x, with the kernel of levelling or of erection."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernels = {name: _unchecked(name, backend, inputs) for name in ("level-loop", "erection")}
+        self._kernels = {name: _without_checks(name, backend, inputs) for name in ("level-loop", "erection")}
         self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
         self._curvature = 1 / float(schedule.radius)
         self._drift, self._force, reference = inputs.T
@@ -286,7 +286,7 @@ class _HeadingPlant:
     """The heading, which the commanded rate turns."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernel = _unchecked("heading-loop", backend, inputs)
+        self._kernel = _without_checks("heading-loop", backend, inputs)
         self._cycle = float(schedule.cycle_s)
         self._drift, self._reference = inputs.T
 
@@ -309,7 +309,7 @@ class _VerticalPlant:
     """The vertical channel, whose states are all in the kernel."""
 
     def __init__(self, schedule: LoopSchedule, inputs: Array, backend: str) -> None:
-        self._kernel = _unchecked("vertical-loop", backend, inputs)
+        self._kernel = _without_checks("vertical-loop", backend, inputs)
         self._cycle, self._gravity = float(schedule.cycle_s), float(schedule.gravity)
         self._gradient = 2 * self._gravity / float(schedule.radius)
         force, self._reference = inputs.T

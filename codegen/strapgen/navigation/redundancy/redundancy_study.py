@@ -177,14 +177,14 @@ def _step(
         size,
         trials,
         int((detected > 0.5).sum()),
-        *_told(rule, failing, size),
+        *_isolated_counts(rule, failing, size),
         without(triad),
-        *_told(table, failing, size),
+        *_isolated_counts(table, failing, size),
         without(chosen),
     )
 
 
-def _told(told: Any, failing: Any, size: float) -> tuple[int, int]:
+def _isolated_counts(told: Any, failing: Any, size: float) -> tuple[int, int]:
     """Return how often the failing sensor is isolated, and how often another one."""
     right = (told == failing) & (size > 0)
     return int(right.sum()), int(((told >= 0) & ~right).sum())

@@ -134,7 +134,7 @@ def budget(
     bytes_of = dict.fromkeys(("cell", "feedback", "counter"), 0)
     for kind, count, size in sizes:
         bytes_of[kind] += count * size
-    padding = _aligned([(count, size) for _, count, size in sizes]) - sum(bytes_of.values())
+    padding = _align([(count, size) for _, count, size in sizes]) - sum(bytes_of.values())
     system = fit.description.system
     constants = sum(
         _bytes(fit, stage.name) * len(_constants(fit.description.programs[stage.name], _is_fixed(fit)))
@@ -229,7 +229,7 @@ def _sizes(fit: Fitted) -> Iterator[tuple[str, int, int]]:
     yield "counter", 2 if _is_fixed(fit) else 1, _COUNTER
 
 
-def _aligned(members: list[tuple[int, int]]) -> int:
+def _align(members: list[tuple[int, int]]) -> int:
     """Return the size of a struct whose members lie at multiples of the size of their numbers."""
     place = 0
     for count, size in members:

@@ -375,7 +375,7 @@ class Straight:
 
 def tracks(runs: Mapping[Hashable, Straight], apart: float) -> dict[Hashable, int]:
     """Return a track for each stretch: 0 for the first, and so on; the order stays where no other is better."""
-    order = _ordered(list(runs), runs)
+    order = _order(list(runs), runs)
     numbers: dict[Hashable, int] = {}
     for key in order:
         run = runs[key]
@@ -388,7 +388,7 @@ def tracks(runs: Mapping[Hashable, Straight], apart: float) -> dict[Hashable, in
     return numbers
 
 
-def _ordered(order: list[Hashable], runs: Mapping[Hashable, Straight]) -> list[Hashable]:
+def _order(order: list[Hashable], runs: Mapping[Hashable, Straight]) -> list[Hashable]:
     """Return stretches in an order with few crossings: each moves to its best place until nothing gets better."""
     excess = {  # crossings of a before b less those of b before a
         (a, b): runs[a].crossings(runs[b]) - runs[b].crossings(runs[a]) for a in order for b in order

@@ -11,7 +11,7 @@ from strapgen import pipeline, targets
 from strapgen.fixedpoint.format_plan import ranges_of_copies
 from strapgen.fixedpoint.sensor_scale import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings, rounded_limit
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, ROTATION_INPUTS, Settings, rounded_limit
 from strapgen.ir.formats import Format
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Operation, Program, Reference
@@ -186,7 +186,7 @@ class _Fit:
                 if not wired:
                     raise
             # The formats of states are shared; those of wires give way, the last first.
-            movable = [name for name in wired if name not in self._shared(stage)]
+            movable = [name for name in wired if name not in self._shared_signals(stage)]
             if not movable:
                 return self._without_needless_feedback(stage, replace(settings, formats={**stated, **wired}))
             del wired[movable[-1]]
@@ -206,11 +206,11 @@ class _Fit:
             largest = self._range(stage, known, sources[known], signal)
             if signal.constraint or largest is None:
                 continue
-            if wire.input in TURNING:
+            if wire.input in ROTATION_INPUTS:
                 angle = largest
             else:
                 ranges[wire.input] = largest
-        settings = self.settings if self._counted(stage) else self.settings.without_counts()
+        settings = self.settings if self._count_inputs(stage) else self.settings.without_counts()
         settings = replace(
             settings,
             word=stage.word or self.settings.word,
@@ -223,7 +223,7 @@ class _Fit:
         wider = ranges_of_copies(self.description.programs[stage.name], settings, copied)
         return replace(settings, ranges=ranges | wider)
 
-    def _counted(self, stage: SystemStage) -> set[str]:
+    def _count_inputs(self, stage: SystemStage) -> set[str]:
         """Return the inputs of a stage that are counts of the gyro."""
         if self.settings.input_bits is None:
             return set()
@@ -273,11 +273,11 @@ class _Fit:
             known = None if argument is None else argument.unit * max(-argument.low, argument.high)
         if known is None or not known:
             return signal.bound
-        if name in self._shared(stage) or signal.bound is None:
+        if name in self._shared_signals(stage) or signal.bound is None:
             return known
         return min(known, signal.bound)
 
-    def _shared(self, stage: SystemStage) -> set[str]:
+    def _shared_signals(self, stage: SystemStage) -> set[str]:
         """Return the inputs and outputs of a stage that are held in cells of another stage."""
         names = {wire.input for wire in stage.wires if wire.source in dict(stage.results).values()}
         names |= {output for output, _ in stage.results}
@@ -288,7 +288,7 @@ class _Fit:
         """Return the formats of what is wired to a stage, and of the cells that its outputs replace, in its word."""
         word = stage.word or self.settings.word
         wired: dict[str, str] = {}
-        counts = self._counted(stage)  # their format follows from their bits
+        counts = self._count_inputs(stage)  # their format follows from their bits
         for wire, signal in zip(stage.wires, self._signals(stage), strict=True):
             if wire.input in counts:
                 continue
@@ -298,7 +298,7 @@ class _Fit:
             argument = self.arguments.get(wire.source)
             if argument is None or argument.format.word != word or wire.source in self.pushed:
                 continue
-            if not signal.constraint or wire.input in self._shared(stage):
+            if not signal.constraint or wire.input in self._shared_signals(stage):
                 wired[wire.input] = str(argument.format)
         wired |= {state: wired[name] for state, name in self._copies(stage).items() if name in wired}
         states = {output for output, cell in stage.results if cell in {w.source for w in stage.wires}}

@@ -11,7 +11,7 @@ from strapgen.fixedpoint.floating.errors import Expression, Expressions, NoBound
 from strapgen.fixedpoint.floating.exact_ranges import ExactRanges
 from strapgen.fixedpoint.intervals import Interval
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import DEFAULT_ANGLE, TURNING, Settings
+from strapgen.ir.fixed_settings import DEFAULT_ANGLE, ROTATION_INPUTS, Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
 from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
@@ -77,23 +77,23 @@ class _Pass:
 
     def _push(self, push: Push) -> None:
         """Put a new sample last; those before move."""
-        new = self._wired(push.source, self.fit.arguments.get(push.cell))
+        new = self._at_wire(push.source, self.fit.arguments.get(push.cell))
         self.errors[push.cell] = self.errors[push.cell][len(new) :] + new
         if push.source in self.reasons:
             self.reasons[push.cell] = self.reasons[push.source]
         elif clipped(self.fit.held(push.source), self.fit.arguments.get(push.cell)):
             self.reasons[push.cell] = f"its word does not hold all that {push.source} may be"
 
-    def _wired(self, source: str, here: Argument | None) -> Errors:
+    def _at_wire(self, source: str, here: Argument | None) -> Errors:
         """Return the errors at the end of a wire, rescaled to the format there."""
-        return _rescaled(self.errors[source], self.fit.arguments.get(source), here)
+        return _rescale(self.errors[source], self.fit.arguments.get(source), here)
 
     def _call(self, stage: SystemStage) -> None:
         """Add the rounding of a stage to what its inputs bring."""
         program = self.fit.description.programs[stage.name]
         arguments = self.fit.arguments_of(stage)
         unknown = next((self.reasons[w.source] for w in stage.wires if w.source in self.reasons), "")
-        errors = {wire.input: self._wired(wire.source, arguments.get(wire.input)) for wire in stage.wires}
+        errors = {wire.input: self._at_wire(wire.source, arguments.get(wire.input)) for wire in stage.wires}
         limits = self._limits(stage, errors)
         brought, added = {}, {}
         if not unknown:
@@ -111,7 +111,7 @@ class _Pass:
                 self.reasons[cell] = f"its word does not hold all that {output} of {stage.name} may be"
                 continue
             new = tuple(a + b for a, b in zip(brought[output], added[output], strict=True))
-            self.errors[cell] = tuple(map(max, self.faster[cell], _rescaled(new, there, here)))
+            self.errors[cell] = tuple(map(max, self.faster[cell], _rescale(new, there, here)))
 
     def _limits(self, stage: SystemStage, errors: Mapping[str, Errors]) -> dict[str, Fraction]:
         """Return the largest magnitudes of a stage's inputs, with their errors."""
@@ -131,9 +131,9 @@ class _Pass:
         plain = {
             signal.name: limits[signal.name]
             for signal in program.inputs
-            if not signal.constraint and signal.name not in TURNING
+            if not signal.constraint and signal.name not in ROTATION_INPUTS
         }
-        angle = max((limits[name] for name in TURNING if name in limits), default=DEFAULT_ANGLE)
+        angle = max((limits[name] for name in ROTATION_INPUTS if name in limits), default=DEFAULT_ANGLE)
         result = rounding_bounds(
             program, TARGETS[self.fit.target].number, Settings(ranges=plain, largest_angle=angle)
         )
@@ -142,7 +142,7 @@ class _Pass:
         return dict(result.errors)
 
 
-def _rescaled(errors: Errors, there: Argument | None, here: Argument | None) -> Errors:
+def _rescale(errors: Errors, there: Argument | None, here: Argument | None) -> Errors:
     """Return the errors of integers after they are rescaled to the nearest: half a unit more where bits are lost."""
     if there is None or here is None or there.format.fraction <= here.format.fraction:
         return errors

@@ -102,13 +102,13 @@ def _legend(placed: Placement) -> Iterator[tuple[str, str, float, float]]:
 def plan(system: DescribedSystem) -> Placement:
     """Return a drawing of a system as places of its parts."""
     for abreast in range(ABREAST, 0, -1):
-        placed = _planned(system, abreast)
+        placed = _plan(system, abreast)
         if placed.width <= WIDEST:
             break
     return placed
 
 
-def _planned(system: DescribedSystem, abreast: int) -> Placement:
+def _plan(system: DescribedSystem, abreast: int) -> Placement:
     """Return a drawing with at most so many boxes side by side."""
     boxes, links = Graph(system).run()
     rows = list(_rows(boxes, abreast))

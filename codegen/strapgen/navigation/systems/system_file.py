@@ -15,6 +15,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import CARRIES
 from strapgen.ir.formats import LONGEST_WORD, SHORTEST_WORD
 from strapgen.ir.signals import ANY, FRAMES
+from strapgen.storage import streams
 from strapgen.targets.names import PYTHON, C
 
 #: Most stages of a system, and most cycles from one call of a stage to the next.
@@ -280,7 +281,9 @@ SYSTEM = UserFile("a system", SystemFile, 1 << 20)
 
 def read(path: str | Path, sample_hz: Fraction | None = None) -> SystemText:
     """Read the file of a system."""
-    name = re.sub(r"[^a-z0-9]+", "_", checks.path("path", path).stem.lower()).strip("_")
+    place = checks.path("path", path)
+    stem = "system" if place == streams.STANDARD else place.stem
+    name = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
     return SYSTEM.convert(path, lambda file: file.described(name, sample_hz))
 
 
@@ -338,20 +341,20 @@ def check_names(system: str, inputs: Iterable[str], stages: Iterable[str]) -> No
     """
     stages = list(stages)
     if system in _HEADERS or not _is_free(system):
-        raise _refused("the name", system)
+        raise _refuse("the name", system)
     for name in stages:
         if _FUNCTIONS.fullmatch(name) or _USED.fullmatch(name) or not _is_free(name):
-            raise _refused("stage", name)
+            raise _refuse("stage", name)
     for name in inputs:
         rest = name.removeprefix(f"{system}_")
         shadowed = rest != name and (_FUNCTIONS.fullmatch(rest) or rest in stages)
         if shadowed or _FUNCTIONS.fullmatch(name) or _USED.fullmatch(name) or not _is_free(name):
-            raise _refused("input", name)
+            raise _refuse("input", name)
 
 
 def _is_free(name: str) -> bool:
     return C.allows(name) and PYTHON.allows(name)
 
 
-def _refused(what: str, name: str) -> InputError:
+def _refuse(what: str, name: str) -> InputError:
     return InputError(f"{what} {name!r} has a meaning in generated code; another name is needed")

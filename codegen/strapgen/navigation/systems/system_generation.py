@@ -63,7 +63,7 @@ class _Printer:
     stages: Mapping[str, Sources]
     arguments: Mapping[str, Argument]
 
-    def _told(self, signal: Signal, cell: Cell | None = None) -> str:
+    def _describe(self, signal: Signal, cell: Cell | None = None) -> str:
         """Return what a cell or an input is: meaning, frame, unit, and format or range."""
         history = f"the last {cell.samples} samples, the newest last: " if cell and cell.samples else ""
         argument = self.arguments.get(signal.name if cell is None else cell.name)
@@ -137,7 +137,7 @@ class _CPrinter(_Printer):
             "fixed": bool(self.arguments),
             "headers": [f"{sources.function.name}.h" for sources in self.stages.values()],
             "cells": [
-                (cell, self._type(cell.name), f"{cell.name}: {self._told(cell.signal, cell)}.")
+                (cell, self._type(cell.name), f"{cell.name}: {self._describe(cell.signal, cell)}.")
                 for cell in system.cells
             ],
             "feedback": [
@@ -145,7 +145,7 @@ class _CPrinter(_Printer):
                 for stage, word, fresh in self._feedback()
             ],
             "inputs": [
-                (s, self._type(s.name), f"in      {s.name}[{s.size}]: {self._told(s)}.")
+                (s, self._type(s.name), f"in      {s.name}[{s.size}]: {self._describe(s)}.")
                 for s in system.inputs
             ],
             "outputs": [(system.cell(name), self._type(name), system.every(name)) for name in system.outputs],
@@ -301,8 +301,8 @@ class _PythonPrinter(_Printer):
             imports=[
                 (f"{system.name}_{s.name}", self.stages[s.name].function.name, s.name) for s in system.stages
             ],
-            cells=[(cell, self._told(cell.signal, cell), self._initial(cell)) for cell in system.cells],
-            inputs=[(signal, self._told(signal)) for signal in system.inputs],
+            cells=[(cell, self._describe(cell.signal, cell), self._initial(cell)) for cell in system.cells],
+            inputs=[(signal, self._describe(signal)) for signal in system.inputs],
             feedback=[(stage, fresh) for stage, _, fresh in self._feedback()],
             rates=bodies,
             rescaled=any("_moved(" in line for _, lines in bodies for line in lines),

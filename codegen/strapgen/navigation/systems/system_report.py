@@ -121,9 +121,9 @@ class SystemResult(Result):
                 *(written if self.files else []),
                 f"{self.title} ({self.name}, {self.target}, {self.sample_hz:.6g} Hz)",
                 "",
-                *_used(reader_table(self.stages, StageRow)).lines(),
+                *_used_columns(reader_table(self.stages, StageRow)).lines(),
                 "",
-                *_used(TextTable(columns, shown)).lines(),
+                *_used_columns(TextTable(columns, shown)).lines(),
                 "",
                 f"outputs: {', '.join(self.outputs)}",
                 *(f"no bound for {name}: {reason}" for name, reason in self.bounds.reasons.items()),
@@ -133,7 +133,7 @@ class SystemResult(Result):
         )
 
 
-def _used(table: TextTable) -> TextTable:
+def _used_columns(table: TextTable) -> TextTable:
     """Return a table without the columns in which no row has a value; what is missing in the others is left empty."""
     used = [k for k in range(len(table.columns)) if any(row[k] is not None for row in table.rows)]
     columns = [replace(table.columns[k], missing="") for k in used]

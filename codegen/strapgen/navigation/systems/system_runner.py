@@ -25,7 +25,7 @@ from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.wiring import Description
 from strapgen.run import compiler
 from strapgen.run.backend_names import BACKENDS, evaluator_class
-from strapgen.run.backends import fitted as fitted_settings
+from strapgen.run.backends import fit_settings
 from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array, Evaluator, fresh_feedback, in_si, stored
 from strapgen.run.increments import pulses
@@ -440,7 +440,7 @@ def system_runner(
         If the back end needs a C compiler and there is none.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
-    chosen = fitted_settings(backend, settings)
+    chosen = fit_settings(backend, settings)
     if entry.target not in TARGETS:
         sources = {name: sources_of_choice(c, entry.target) for name, c in description.choices.items()}
         return SystemRunner(Fitted(description, entry.target, None, sources), backend)

@@ -204,7 +204,7 @@ def samples(description: Description, angle: Array, velocity: Array) -> dict[str
     `angle, velocity` (cycles, 3): increments in rad and m/s, body axes. Returns (cycles, 3).
     """
     system = description.system
-    sensed = _sensed(description, angle, velocity)
+    sensed = _with_errors(description, angle, velocity)
     result = {}
     for signal in system.inputs:
         if signal.shape == (3,) and signal.frame == "n" and signal.unit in ("rad", "rad/s"):
@@ -222,7 +222,7 @@ def samples(description: Description, angle: Array, velocity: Array) -> dict[str
     return result
 
 
-def _sensed(description: Description, angle: Array, velocity: Array) -> tuple[Array, Array]:
+def _with_errors(description: Description, angle: Array, velocity: Array) -> tuple[Array, Array]:
     """Return increments with the errors that the system compensates."""
     for stage in description.system.stages:
         if stage.kernel.startswith("imu-compensate"):

@@ -150,7 +150,7 @@ def compared_system(
     output.check(name, *source.files)
     from strapgen import registration
     from strapgen.cli.progress import waiting
-    from strapgen.lab.compare_command import counted
+    from strapgen.lab.compare_command import with_counts
     from strapgen.navigation.systems.system_comparison import SystemComparisonResult, compare_system
 
     names, reference = backends
@@ -160,7 +160,7 @@ def compared_system(
         for path in files[0] or ():
             reader = registration.extension("navigation.source-files", "--source")
             runners[path] = reader(path, description, [name], files[1])
-        settings = counted(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
+        settings = with_counts(fixed.settings(1), {path: stated for path, (_, stated) in runners.items()})
         of_files = {str(path): runner for path, (runner, _) in runners.items()}
         rows = compare_system(description, names, reference, inputs, settings, of_files)
     output.show(SystemComparisonResult(rows, f"{name}: {title}", reference))

@@ -84,10 +84,10 @@ class TurningVehicle:
 
     def attitude(self, time: Array) -> Array:
         """Return C_b^n at some times, (..., 3, 3); axes n are east, north, up."""
-        return self._turned([(np.sin(a), np.cos(a)) for a in self._angles(np.asarray(time, float))])
+        return self._attitude([(np.sin(a), np.cos(a)) for a in self._angles(np.asarray(time, float))])
 
     @staticmethod
-    def _turned(angles: Sequence[tuple[Array, Array]]) -> Array:
+    def _attitude(angles: Sequence[tuple[Array, Array]]) -> Array:
         """Return C_b^n from the sines and cosines of roll, pitch and heading."""
         (sr, cr), (sp, cp), (sh, ch) = angles
         rows = [
@@ -111,7 +111,7 @@ class TurningVehicle:
             ],
             axis=-1,
         )
-        attitude = self._turned(angles)
+        attitude = self._attitude(angles)
         force = attitude[..., 2, :] * self.gravity
         zero = np.zeros_like(time)
         shaken = [self._channel(f"velocity_{axis}", time, 1) for axis in "xy"]

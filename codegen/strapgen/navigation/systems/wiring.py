@@ -10,7 +10,7 @@ from pathlib import Path
 from strapgen.catalogue import Choice
 from strapgen.ir.checks import unknown
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.fixed_settings import TURNING
+from strapgen.ir.fixed_settings import ROTATION_INPUTS
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
 from strapgen.ir.signals import ANY, Signal
@@ -371,7 +371,7 @@ class _Wiring:
                 cell, signal = self._cell(stage, state), stage.inputs[state]
                 if state in stage.sums and cell not in self.cleared:
                     raise InputError(f"stage {stage.name}: {state} is a sum that no stage takes")
-                known = signal.bound is not None or signal.constraint or state in TURNING
+                known = signal.bound is not None or signal.constraint or state in ROTATION_INPUTS
                 if not known and state not in stage.text.ranges:
                     raise InputError(
                         f"stage {stage.name}: the range of {state} is missing; state it under ranges"

@@ -26,7 +26,7 @@ from strapgen.navigation.two_speed import two_speed_sources
 from strapgen.navigation.two_speed.two_speed_sources import LOOPS, wiring
 from strapgen.run import compiler
 from strapgen.run.backend_names import BACKENDS, evaluator_class
-from strapgen.run.backends import fitted
+from strapgen.run.backends import fit_settings
 from strapgen.run.compiled_code import array_type, real_type
 from strapgen.run.evaluators import Array, Evaluator, in_si, stored
 from strapgen.run.kernel_sources import sources_of_choice
@@ -101,7 +101,7 @@ class TwoSpeed:
         settings: Settings | None = None,
     ) -> None:
         target = BACKENDS[checks.choice("backend", backend, BACKENDS)].target
-        chosen = fitted(backend, settings)
+        chosen = fit_settings(backend, settings)
         self._load(backend, loop_sources(algorithm, sculling, target, chosen))
 
     @classmethod

@@ -239,7 +239,7 @@ def as_latex(kernel: Kernel) -> str:
 
 
 def short_latex(kernel: Kernel) -> str | None:
-    """Return a kernel's formulas as LaTeX if a reader sees them at a glance; None for scalars of half a page."""
+    """Return a kernel's formulas as LaTeX; None if they are longer than half a page."""
     text = _in_vectors(kernel)
     if text is None:
         rows = sum(stage.signal.size for stage in (*kernel.stages, *kernel.outputs))

@@ -43,7 +43,7 @@ def broken(text: str, room: float) -> str:
             line = ""
         line += part
     lines.append(line.strip())
-    lines = [line.removeprefix(r"\quad ") for line in _unpaired(lines)]
+    lines = [line.removeprefix(r"\quad ") for line in _fix_fences(lines)]
     # A line may begin with a sign: {} before it keeps the space of an operation between two numbers.
     return " \\\\\n    &\\quad {} ".join(lines)
 
@@ -54,7 +54,7 @@ def width(text: str) -> float:
     >>> width("a + b"), width(r"\tfrac{1}{48} A"), width(r"\boldsymbol\sigma")
     (4.8, 2.6, 1.2)
     """
-    total, _ = _measured(text, 0)
+    total, _ = _measure(text, 0)
     return round(total, 3)
 
 
@@ -112,8 +112,8 @@ def _with_slashes(text: str, room: float) -> str:
     out, place, depth = "", 0, 0
     while place < len(text):
         if not depth and text.startswith(r"\frac{", place):
-            _, middle = _measured(text, place + 6, "}")
-            size, end = _measured(text, middle + 1, "}")
+            _, middle = _measure(text, place + 6, "}")
+            size, end = _measure(text, middle + 1, "}")
             above, below = text[place + 6 : middle - 1], text[middle + 1 : end - 1]
             if max(width(above), size) > room:
                 over = above if width(above) < 2 else rf"\left({above}\right)"
@@ -131,14 +131,14 @@ def _after_fence(text: str) -> bool:
     return text.rstrip().endswith((r"\left(", r"\left[", "(", "-", "+"))
 
 
-def _unpaired(lines: list[str]) -> list[str]:
+def _fix_fences(lines: list[str]) -> list[str]:
     r"""Return lines with fences that close on the same line stretched, and those across lines of a fixed size."""
     if len(lines) < 2:
         return lines
     return [line.replace(r"\left", r"\bigl").replace(r"\right", r"\bigr") for line in lines]
 
 
-def _measured(text: str, place: int, end: str = "") -> tuple[float, int]:
+def _measure(text: str, place: int, end: str = "") -> tuple[float, int]:
     """Return the width of a formula from a place up to a closing brace, and the place after it."""
     total = 0.0
     while place < len(text):
@@ -171,7 +171,7 @@ def _measured(text: str, place: int, end: str = "") -> tuple[float, int]:
             argument, place = _argument(text, place + 1)
             total += 0.75 * argument
         elif character == "{":
-            inner, place = _measured(text, place + 1, "}")
+            inner, place = _measure(text, place + 1, "}")
             total += inner
         else:
             total += {" ": 0.2, "+": 2.4, "-": 2.4, "=": 2.8, "(": 0.8, ")": 0.8, "&": 0.0}.get(
@@ -201,6 +201,6 @@ def _argument(text: str, place: int) -> tuple[float, int]:
     while place < len(text) and text[place] == " ":
         place += 1
     if place < len(text) and text[place] == "{":
-        return _measured(text, place + 1, "}")
+        return _measure(text, place + 1, "}")
     match = re.compile(r"\\[A-Za-z]+|.", flags=re.DOTALL).match(text, place)
     return (1.0, match.end()) if match else (0.0, place)

@@ -44,7 +44,7 @@ _DECIMALS = 4
 
 @singledispatch
 def latex(value: Any) -> str | None:
-    """Return an object as LaTeX; None where a reader would not see it at a glance."""
+    """Return an object as LaTeX; None if it is too long to read."""
     return None
 
 
@@ -224,16 +224,16 @@ def _by_stage(tableau: Tableau) -> str:
     rows = []
     for stage, (node, row) in enumerate(zip(tableau.nodes, tableau.matrix, strict=True), 1):
         parts = [rf"a_{{{stage},{place}}} = {_number(x)}" for place, x in enumerate(row, 1) if x]
-        rows.append((f"c_{{{stage}}}", _joined([_number(node), *parts])))
+        rows.append((f"c_{{{stage}}}", _join([_number(node), *parts])))
     for letter, weights in (("b", tableau.weights), (r"\hat b", tableau.embedded_weights or ())):
         named = [(f"{letter}_{{{place}}}", _number(x)) for place, x in enumerate(weights, 1) if x]
         if named:
             (left, right), *others = named
-            rows.append((left, _joined([right, *(f"{name} = {text}" for name, text in others)])))
+            rows.append((left, _join([right, *(f"{name} = {text}" for name, text in others)])))
     return equations(rows)
 
 
-def _joined(parts: Iterable[str]) -> str:
+def _join(parts: Iterable[str]) -> str:
     return r", \quad ".join(parts)
 
 

@@ -136,7 +136,7 @@ def _right_side(stage: Stage, kind: str, known: Sequence[_Quantity], domain: Any
         for letters, elements in _templates(kind, used, together)
         if (terms := _terms(elements, symbols, domain)) is not None
     ]
-    numbers = _solved(target, [terms for _, terms in candidates], domain)
+    numbers = _solve(target, [terms for _, terms in candidates], domain)
     if numbers is None:
         return None
     return sum_text([_term(c, letters) for c, (letters, _) in zip(numbers, candidates, strict=True) if c])
@@ -218,7 +218,7 @@ def _terms(elements: Sequence[sp.Expr], symbols: Sequence[sp.Expr], domain: Any)
     return terms
 
 
-def _solved(target: _Terms, candidates: Sequence[_Terms], domain: Any) -> list[sp.Expr] | None:
+def _solve(target: _Terms, candidates: Sequence[_Terms], domain: Any) -> list[sp.Expr] | None:
     """Return the numbers by which candidates add up to a target, 0 where one is not needed; None if there are none."""
     places = list(dict.fromkeys([*target, *(place for terms in candidates for place in terms)]))
     columns = [*candidates, target]
@@ -340,7 +340,7 @@ def _powers(letters: Sequence[str]) -> str:
 
 
 def _sum(terms: Sum, names: Mapping[str, str], products: Mapping[tuple[str, ...], str]) -> str:
-    """Return a sum of vectors and cross products; a weight of several terms stands in brackets."""
+    """Return a sum of vectors and cross products; a weight of several terms is in brackets."""
     text = ""
     for vector, weight in sorted(terms.items(), key=lambda term: len(term[0])):
         shown = r" \times ".join(names[name] for name in vector)
