@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
@@ -13,7 +12,7 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES, SHAPES
 from strapgen.catalogue.methods.tableaux import TABLEAUX, TITLES
 from strapgen.catalogue.methods.windows import EXACT, WINDOW_TITLES, named_window
 from strapgen.ir.kernel_info import Recipe
-from strapgen.registry import Merged, Registry, Titles
+from strapgen.registry import Merged, Names, Registry, Titles
 
 #: Kernels that take no method.
 KERNELS = Registry("kernels", Recipe, lambda recipe: not getattr(recipe, "reader", ""))
@@ -31,11 +30,13 @@ def reserved() -> tuple[str, ...]:
 _METHODS = f"{__package__}.methods."
 
 #: Attitude algorithms, by the state they integrate.
-ALGORITHMS = {
-    "dcm": "direction cosine matrix",
-    "euler": "Euler parameters, scalar last",
-    "cayley-klein": "Cayley-Klein parameters, scalar first",
-}
+ALGORITHMS: Names[str] = Merged(
+    {
+        "dcm": "direction cosine matrix",
+        "euler": "Euler parameters, scalar last",
+        "cayley-klein": "Cayley-Klein parameters, scalar first",
+    }
+)
 
 #: Integration methods without files of coefficients.
 INTEGRATORS = Registry("methods", Integrator)
@@ -92,7 +93,7 @@ def is_built_in(method: str) -> bool:
 
 
 #: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
-METHODS: Mapping[str, str] = Merged(TITLES, Titles(INTEGRATORS), SHAPE_TITLES, WINDOW_TITLES)
+METHODS: Names[str] = Merged(TITLES, Titles(INTEGRATORS), SHAPE_TITLES, WINDOW_TITLES)
 
 #: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")

@@ -107,8 +107,8 @@ class Comparison(Record):
         return f"{self.backend}: {angle}\ndrift {self.drift_deg:.4g} deg, {self.ns_per_step:.1f} ns a step"
 
 
-class Comparisons(list[Comparison]):
-    """Back ends beside one reference, a `Comparison` each; a list that a notebook shows as a table."""
+class Comparisons(tuple[Comparison, ...]):
+    """Back ends beside one reference, a `Comparison` each; a tuple that a notebook shows as a table."""
 
     __repr__ = short_repr
     _repr_html_ = notebook_html
@@ -154,7 +154,7 @@ def compare(
     Returns
     -------
     Comparisons
-        A list of `Comparison`, in the order of `backends`.
+        A tuple of `Comparison`, in the order of `backends`.
 
     Raises
     ------
