@@ -329,3 +329,17 @@ def test_every_target_of_strapgen_has_its_properties():
         assert (target.number == "") == target.fixed
         assert target.compiled == (target.language == "C") == (name.partition("-")[0] == "c")
         assert callable(target.function())
+
+
+@pytest.mark.parametrize("has_table", [True, False])
+def test_a_printer_that_lacks_a_function_says_which(toy, has_table, monkeypatch):
+    import toy_target
+
+    monkeypatch.setattr(toy_target.PlainPrinter, "functions", {})
+    if not has_table:
+        monkeypatch.delattr(toy_target.PlainPrinter, "function")
+    with pytest.raises(
+        InputError,
+        match=r"^PlainPrinter does not print sqrt of 1 arguments; its method function must return the text$",
+    ):
+        strapgen.generate(program(catalogue.choose("euler-normalize")), "plain-python")

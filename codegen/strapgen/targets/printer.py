@@ -6,6 +6,7 @@ import re
 import textwrap
 from fractions import Fraction
 
+from strapgen.ir.exceptions import InputError
 from strapgen.ir.program import DOUBLE_RESOLUTION, RESOLUTION, Constant, Node, Reference
 
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
@@ -48,7 +49,16 @@ class Printer:
         if method is not None:
             printed: tuple[str, int] = method(*node.arguments)
             return printed
-        return self.function(node.kind, [self.text(argument) for argument in node.arguments]), _ATOM
+        arguments = [self.text(argument) for argument in node.arguments]
+        try:
+            return self.function(node.kind, arguments), _ATOM
+        except (KeyError, NotImplementedError) as error:
+            if isinstance(error, KeyError) and error.args != (node.kind,):
+                raise
+            raise InputError(
+                f"{type(self).__name__} does not print {node.kind} of {len(arguments)} arguments; its method function "
+                "must return the text"
+            ) from None
 
     def _inside(self, node: Node, level: int) -> str:
         text, binding = self._print(node)
