@@ -30,7 +30,7 @@ class Item(NamedTuple):
     record: Callable[[], Any]
 
 
-class _Own(Mapping[str, T], Generic[T]):
+class _BuiltIn(Mapping[str, T], Generic[T]):
     """The objects of a kind that strapgen itself registers, by name."""
 
     __repr__ = short_repr
@@ -92,7 +92,7 @@ class Registry(Mapping[str, T], Generic[T]):
         group: str = "",
         first: str = "",
     ) -> None:
-        self.own: _Own[T] = _Own(kind, keep, first)
+        self.own: _BuiltIn[T] = _BuiltIn(kind, keep, first)
         self._kind, self._record, self._keep, self._group = kind, record, keep, group
 
     def _in_words(self) -> str:

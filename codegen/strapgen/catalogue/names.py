@@ -8,7 +8,13 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
-from strapgen.catalogue.methods.method_spec import Asked, Integrator, MethodSpec, StepSamples, through_samples
+from strapgen.catalogue.methods.method_spec import (
+    Integrator,
+    MethodSpec,
+    RequestedSamples,
+    StepSamples,
+    through_samples,
+)
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES, SHAPES
 from strapgen.catalogue.methods.tableaux import TABLEAUX, TITLES
 from strapgen.catalogue.methods.windows import EXACT, WINDOW_TITLES, named_window
@@ -62,7 +68,7 @@ class _NamedTableau:
         """Largest residual of a condition that the rounding of published coefficients explains."""
         return TABLEAUX[self.name].tolerance
 
-    def select(self, asked: Asked) -> tuple[_NamedTableau, StepSamples]:
+    def select(self, asked: RequestedSamples) -> tuple[_NamedTableau, StepSamples]:
         """Return the samples that are asked for."""
         return self, through_samples(self.name, asked)
 

@@ -324,7 +324,7 @@ class _Either(_Form):
         return {"anyOf": [form.schema() for form in self.forms]}
 
 
-class _Own(_Form):
+class _Custom(_Form):
     """A class that reads itself, a `Readable`."""
 
     def __init__(self, kind: Any) -> None:
@@ -418,7 +418,7 @@ def _form_of(hint: Any, key: Key) -> _Form:
     if hint is bool:
         return _Flag()
     if hasattr(hint, "from_toml"):
-        return _Own(hint)
+        return _Custom(hint)
     return _table(hint) if hasattr(hint, "__dataclass_fields__") else _Number(hint, key)
 
 

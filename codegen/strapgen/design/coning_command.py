@@ -129,7 +129,7 @@ class ConingDesign(BandOptions):
 
 @dataclass(frozen=True)
 class ConingOutput(Output):
-    """Where the coefficients go, and in which format."""
+    """Options for the output of the coefficients."""
 
     format: Annotated[_Text, format_option((*Output.formats, _FILE_FORMAT))] = "text"
     formats: ClassVar[tuple[str, ...]] = (*Output.formats, _FILE_FORMAT)

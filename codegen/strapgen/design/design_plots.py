@@ -164,7 +164,7 @@ _LABEL_GAIN = 0.2
 
 
 def selection_image(result: SelectionResult, path: str | Path) -> bytes:
-    """Return a picture of judgements: what the software adds to the drift, over its operations a second."""
+    """Return a plot of judgements: the drift due to software over its operations a second."""
     brief, ordered = result.brief, result.ordered
     figure, grid = figures.grid_of_axes(1, 1, (9.0, 5.4))
     axes = grid[0, 0]

@@ -1,4 +1,4 @@
-"""Scripts for Gappa: what a program computes with roundings, beside the same program in exact numbers.
+"""Scripts for Gappa: a program with its roundings, and the same program in exact numbers.
 
 Gappa follows sums, products, quotients and square roots; it checks that the rules by which a script rewrites one
 expression as another are identities. In fixed point ``c_x`` is the number that the integer in the C stands for, ``e_x``
@@ -27,7 +27,7 @@ SIGNS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 
 
 class CannotFollowError(Exception):
-    """A program has what Gappa has no theorem for; the message says what."""
+    """A program has an operation for which Gappa has no theorem; the message names it."""
 
 
 @dataclass
@@ -86,7 +86,7 @@ def product(coefficient: Fraction, names: Sequence[str]) -> str:
 
 
 def total(terms: Sequence[str]) -> str:
-    """Return a sum; what is less than nothing is subtracted, as programs have it.
+    """Return a sum; negative terms are subtracted, as in programs.
 
     >>> total(["a * b", "-1 * c", "1b-3"])
     'a * b - c + 1b-3'
@@ -102,7 +102,7 @@ def total(terms: Sequence[str]) -> str:
 def exact_lines(
     program: Program, name_of_input: Callable[[str], str]
 ) -> tuple[list[str], dict[str, list[str]]]:
-    """Return an exact program as definitions, and what holds its results."""
+    """Return an exact program as definitions, and the names of its results."""
     inputs = {element for signal in program.inputs for element in signal.elements}
 
     def name(reference: str) -> str:

@@ -1,4 +1,4 @@
-"""`compare` runs back ends over the same increments and shows how far each is from a reference."""
+"""`compare` runs back ends over the same increments and measures the difference of each from a reference."""
 
 from __future__ import annotations
 

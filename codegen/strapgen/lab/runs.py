@@ -281,7 +281,7 @@ def _node_rotations(motion: Motion, step: Fraction, nodes: Sequence[float]) -> C
 def samples_of_steps(
     backend: Backend, motion: Motion, step: Fraction, pulse: float | str | Fraction | None = None
 ) -> Callable[[int, int], Array]:
-    """Return what the steps of a run take, part by part: increments, or rates at nodes."""
+    """Return the samples of the steps of a run, part by part: increments, or rates at nodes."""
     if not backend.nodes:
         backend.need_increments()
         return _increments(motion, step, backend.increments, (backend.previous, backend.ahead), pulse)

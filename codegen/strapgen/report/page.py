@@ -121,7 +121,7 @@ class _PageCell:
 
 @dataclass(frozen=True)
 class Content:
-    """What a page is made of."""
+    """The content of a page."""
 
     #: Heading of the page, and the command that writes it
     title: str
@@ -141,7 +141,7 @@ class Content:
 
     @cached_property
     def views(self) -> tuple[AlgorithmView, ...]:
-        """What the page shows of each algorithm."""
+        """The content of the page on each algorithm."""
         return tuple(view(known, self.evidence) for known in self.algorithms)
 
     @cached_property
@@ -156,7 +156,7 @@ class Content:
         return {"": compared, **results}
 
     def data(self) -> dict[str, Any]:
-        """Return what the page embeds: the results as plain JSON data, and what charts show beside them."""
+        """Return the embedded data: results as plain JSON data, and the data of charts."""
         return {
             "results": self.results,
             "motion": self.conditions.motion,
@@ -250,7 +250,7 @@ class Content:
 
     @cached_property
     def shared_sources(self) -> list[str]:
-        """What all algorithms that are compared come from, besides what each states."""
+        """The common source of all compared algorithms."""
         first, *others = [one.source.split(_SOURCES) for one in self.drifts_and_costs] or [[]]
         return [part for part in first if all(part in parts for parts in others)] if others else []
 

@@ -18,6 +18,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
+from strapgen.ir.renamed import renamed
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
@@ -53,6 +54,7 @@ KEEP_THE_ATTITUDE = frozenset(
 _DUAL_ROWS = "dcm-orthonormalize"
 
 
+@renamed(beside="companion")
 class Backend:
     """An attitude algorithm that runs.
 
@@ -124,7 +126,7 @@ class Backend:
         self.takes = samples.name
         self.samples = samples.shape[0]
         self.previous, self.ahead = kernels.previous, kernels.ahead
-        self.increments = self.samples - kernels.beside
+        self.increments = self.samples - kernels.extra_increments
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = kernels.attitude
@@ -156,7 +158,7 @@ class Backend:
         """Nodes at which a step takes the rate, as fractions of its length; empty if it takes increments."""
         return self._parts.nodes
 
-    def beside(self, kernel: str) -> Evaluator:
+    def companion(self, kernel: str) -> Evaluator:
         """Return another kernel on the same target as the step: one that restores a state, or converts it.
 
         Parameters
@@ -248,7 +250,7 @@ class Backend:
             ):
                 return None
             count = steps // orthonormalize_every
-            error = max(self.beside(kernel).interface.outputs[0].errors)
+            error = max(self.companion(kernel).interface.outputs[0].errors)
         bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
         return bound if math.isfinite(bound) else None
 
@@ -317,7 +319,7 @@ class Backend:
         -------
         array, (..., state shape)
         """
-        return np.asarray(self.beside(self._need_orthonormalization())(state))
+        return np.asarray(self.companion(self._need_orthonormalization())(state))
 
     def _need_orthonormalization(self) -> str:
         """Return the kernel that orthonormalizes, if there is one."""
@@ -453,7 +455,7 @@ class Backend:
         return Loop(
             self.evaluator.stored(0, states.reshape(len(states), self.identity.size)),
             self.evaluator.fresh(len(states)),
-            product=None if self._product is None else self.beside(self._product),
+            product=None if self._product is None else self.companion(self._product),
         )
 
     def _schedule(self, record_every: int, orthonormalize_every: int | None) -> dict[str, Any]:
@@ -462,7 +464,7 @@ class Backend:
         if orthonormalize_every is None:
             return {"record_every": record_every}
         checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
-        restore = self.beside(self._need_orthonormalization())
+        restore = self.companion(self._need_orthonormalization())
         return {"record_every": record_every, "restore_every": orthonormalize_every, "restore": restore}
 
 

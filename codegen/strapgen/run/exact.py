@@ -167,7 +167,7 @@ def attitudes(backend: Backend, increments: Iterable[Sequence[Any]]) -> Iterator
 
     Increments are those of each step in rad, row-major, as numbers of mpmath.
     """
-    step, convert = backend.evaluator, backend.attitude and backend.beside(backend.attitude)
+    step, convert = backend.evaluator, backend.attitude and backend.companion(backend.attitude)
     assert isinstance(step, ExactEvaluator), "doubles hold no further digits"
     assert backend.sources.attitude_step is not None, "a back end runs an attitude step"
     state = [number(value) for value in backend.sources.attitude_step.identity]

@@ -82,7 +82,7 @@ class ThesisTablesResult(Result):
 
 
 def repair_notes(table: Table) -> list[str]:
-    """Return what is repaired of a table of the thesis, as lines for a reader."""
+    """Return the repairs of a table of the thesis, as lines for a reader."""
     sentences = (each.sentence for each in table.repairs)
     return [f"  {line}" for sentence in sentences for line in textwrap.wrap(sentence, _WIDTH)]
 
@@ -107,12 +107,12 @@ def _row(entries: Sequence[TableEntry], backend: str, algorithm: str) -> list[An
 
 
 def _mark(entry: TableEntry) -> str:
-    """Return what stands behind a figure: round-off says more than that the figure is not the thesis's."""
+    """Return the mark of a figure: round-off, or else a difference from the thesis."""
     return "r" if entry.roundoff_dominates else "" if entry.agrees else "*"
 
 
 def _notes(entries: Sequence[TableEntry]) -> list[str]:
-    """Return what the marks mean that stand in the table, and what is to be said about figures of the thesis."""
+    """Return the notes of a table: the meaning of its marks, and remarks on figures of the thesis."""
     lines = []
     if not all(entry.agrees for entry in entries):
         lines.append("  * not the thesis's figure in its printed digits")

@@ -448,7 +448,7 @@ def _axial(matrix: Array) -> Array:
 
 
 def _difference(product: Product, hertz: Sequence[Fraction], step: Fraction | None) -> complex:
-    """Return by what a product is multiplied for its difference from step to step, or for its derivative."""
+    """Return the factor of a product for its difference from step to step, or for its derivative."""
     frequency = sum((hertz[k // 2] * (-1) ** k for k in product), Fraction(0))
     if step is None:
         return 2j * math.pi * float(frequency)

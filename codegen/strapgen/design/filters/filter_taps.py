@@ -29,7 +29,7 @@ from strapgen.ir.exceptions import InputError
 
 @dataclass(frozen=True)
 class Shape:
-    """What determines the conditions of a filter: the samples around and in a step, the number of powers, the gyro."""
+    """Parameters of the conditions of a filter: samples around and in a step, number of powers, gyro."""
 
     previous: int
     ahead: int

@@ -1,4 +1,4 @@
-"""Names the likely cause of a wrong coning correction from the coefficients that a function is seen to have."""
+"""Names the likely cause of a wrong coning correction from the measured coefficients of a function."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _WEIGHT_WITHIN = 0.01
 
 
 def standard_design(products: Products) -> Design:
-    """Return the published correction that a function is measured by.
+    """Return the published correction with which a function is compared.
 
     It has the samples of a call, and from before the call as many as the function is seen to use rightly, but for one
     sample a call at least one, without which nothing can be corrected. A function that turns by every sample on its own
@@ -54,8 +54,8 @@ def plain_design(samples: int) -> Design:
     return design(samples, 1 if samples == 1 else 0)
 
 
-def seen_design(products: Products) -> Design:
-    """Return the correction that a function is seen to have, as a design with the samples that are looked at."""
+def measured_design(products: Products) -> Design:
+    """Return the measured correction of a function as a design on the probed samples."""
     previous = -min(older for older, _ in products.finally_)
     table = {
         (older + previous, newer + previous): Fraction(c).limit_denominator(_DENOMINATOR)
@@ -156,7 +156,7 @@ def cause(products: Products) -> str | None:
 
 
 def _by_size(products: Products) -> str:
-    """Return the size of a correction that is a multiple of a known one, or else that it is none."""
+    """Return the cause in words for a multiple of a known correction, or for no correction."""
     for ideal, base in _ideals(products.samples):
         correction = _less(products.finally_, base)
         visible = {pair: ideal.get(pair, 0.0) for pair in correction}

@@ -1,4 +1,4 @@
-"""The motions by name, as plain data: what sets a motion, and the function that makes it."""
+"""The motions by name, as plain data: their parameters, and the functions that make them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Turns rates that are expressions of SymPy into operations on Taylor polynomials, and refuses what has none."""
+"""Turns rates in SymPy expressions into operations on Taylor polynomials; refuses other functions."""
 
 from __future__ import annotations
 
