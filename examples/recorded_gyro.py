@@ -16,7 +16,7 @@ LOG = Path(__file__).parent / "gyro_log.csv"
 
 def main(log=LOG):
     recording = strapgen.read_rates(log, "deg/s", resample_hz=100)
-    print(f"{len(recording.increments)} increments of {recording.interval} s")
+    print(f"{len(recording.samples)} increments of {recording.interval} s")
     for name in strapgen.BACKENDS:
         try:
             backend = strapgen.backend("euler", "rk4", 2, name)

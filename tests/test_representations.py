@@ -295,3 +295,19 @@ def test_value_refuses_conflicting_fields():
         algorithm.simulate(motion, "0.1", 1, z_deg_s=1)
     with pytest.raises(strapgen.InputError, match=r"^algorithm 'dcm-product' is no attitude step"):
         strapgen.algorithm("dcm-product")
+
+
+@pytest.mark.parametrize("name", ["Course", "History", "InertialRecording", "Recording", "Run"])
+def test_arrays_of_results_cannot_be_written(name):
+    result = OBJECTS[name]()
+    arrays = [value for value in vars(result).values() if isinstance(value, np.ndarray)]
+    assert arrays and not any(array.flags.writeable for array in arrays)
+    with pytest.raises(ValueError, match="read-only"):
+        arrays[0][...] = 0
+
+
+def test_the_array_of_a_user_stays_writeable():
+    rows = np.zeros((4, 3))
+    recording = strapgen.Recording(0.0, 0.01, rows)
+    rows[0] = 1
+    assert recording.samples[0, 0] == 1

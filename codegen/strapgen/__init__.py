@@ -1,7 +1,24 @@
 """strapgen: attitude algorithms derived symbolically, generated as numpy and C code, and compared with truth.
 
-The stages in order: `derive` a kernel, `lower` it to straight-line code, `generate` source text, `build` a back
-end, `simulate` it against a closed-form motion. `backend` does the first four at once, from the cache.
+Begin with one object: ``alg = strapgen.algorithm("euler", "rk4", increments=2)``.
+
+  formulas   alg.formulas, which prints, with .latex, .program and .operations; alg.series()
+  runs       alg.simulate("coning", ...), alg.compare(), alg.converge(), alg.check()
+  code       alg.generate("c"), alg.generate("c-fixed", word=32, max_rate_deg_s=400, step="0.01"),
+             alg.quantize(...), alg.cost("cortex-m3")
+
+What there is, each a table of names: ALGORITHMS, METHODS, KERNELS, MOTIONS, TARGETS, BACKENDS, TABLEAUX, WINDOWS.
+Functions take the object, a name or a Choice alike:
+
+  stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
+  motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
+  judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
+  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
+  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
+  notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
+
+Units are SI and angles rad, unless a name says otherwise; matrices lead from body to reference axes. Wrong input
+raises a StrapgenError with one line. ``help(strapgen.NAME)`` has shapes, units, errors and an example of each.
 """
 
 import importlib as _importlib
@@ -33,6 +50,9 @@ if _typing.TYPE_CHECKING:
     from strapgen.catalogue.methods.tableaux import Tableau as Tableau
     from strapgen.catalogue.methods.window import Window as Window
     from strapgen.catalogue.methods.windows import WINDOWS as WINDOWS
+    from strapgen.catalogue.names import ALGORITHMS as ALGORITHMS
+    from strapgen.catalogue.names import KERNELS as KERNELS
+    from strapgen.catalogue.names import METHODS as METHODS
     from strapgen.design import family as _family
     from strapgen.design.commit_late.commit_late import CommitLate as CommitLate
     from strapgen.design.commit_late.late_recording import recording_attitudes as recording_attitudes
@@ -69,6 +89,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.comparison import compare as compare
     from strapgen.lab.convergence import Convergence as Convergence
     from strapgen.lab.convergence import converge as converge
+    from strapgen.lab.motions.motion_names import MOTIONS as MOTIONS
     from strapgen.lab.motions.motions import Motion as Motion
     from strapgen.lab.motions.motions import motion as motion
     from strapgen.lab.motions.users_motions import read_motion as read_motion
@@ -143,6 +164,11 @@ _NAMES = {
         "EULER",
         "Kinematics",
     ),
+    "catalogue.names": (
+        "ALGORITHMS",
+        "KERNELS",
+        "METHODS",
+    ),
     "catalogue.methods.method": (
         "Samples",
         "increments_signal",
@@ -196,6 +222,7 @@ _NAMES = {
         "Course",
         "course",
     ),
+    "lab.motions.motion_names": ("MOTIONS",),
     "lab.motions.motions": (
         "Motion",
         "motion",

@@ -383,10 +383,13 @@ class AttitudeAlgorithm:
 
         return costs_of([self.choice], target, Settings.stated_or(settings, stated), cpus)
 
-    def c(self, target: str = "c", settings: Settings | None = None) -> Sources:
-        """Return the generated code; the name of `generate` in the version before."""
-        warn("AttitudeAlgorithm.c", "generate")
-        return self.generate(target, settings)
+    if not TYPE_CHECKING:  # no name that completes
+
+        def __getattr__(self, name: str) -> Any:
+            if name == "c":
+                warn("AttitudeAlgorithm.c", "generate")
+                return self.generate
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
 
 def algorithm(

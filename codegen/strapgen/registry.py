@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from strapgen.ir import packages
 from strapgen.ir.exceptions import InputError, StrapgenError
-from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.notebook_display import names_table, short_repr
 from strapgen.registration import KINDS, built_in, loaded, read, table
 
 if TYPE_CHECKING:
@@ -30,10 +30,34 @@ class Item(NamedTuple):
     record: Callable[[], Any]
 
 
-class _BuiltIn(Mapping[str, T], Generic[T]):
-    """The objects of a kind that strapgen itself registers, by name."""
+class Names(Mapping[str, T], Generic[T]):
+    """Values by name: the names complete as keys in IPython, which shows them as a table with their titles.
+
+    >>> print(Merged({"dcm": "direction cosine matrix", "euler": "Euler parameters"}))
+    dcm    direction cosine matrix
+    euler  Euler parameters
+    """
 
     __repr__ = short_repr
+
+    def _in_words(self) -> str:
+        return ", ".join(self)
+
+    def __str__(self) -> str:
+        return str(names_table(Titles(self)).as_text())
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        printer.text(str(self))
+
+    def _repr_html_(self) -> str:
+        return str(names_table(Titles(self)).as_html())
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+
+class _BuiltIn(Names[T]):
+    """The objects of a kind that strapgen itself registers, by name."""
 
     def __init__(self, kind: str, keep: Callable[[Any], bool] | None, first: str) -> None:
         self._kind, self._keep, self._first = kind, keep, first
@@ -58,7 +82,7 @@ class _BuiltIn(Mapping[str, T], Generic[T]):
         return len(self._records)
 
 
-class Registry(Mapping[str, T], Generic[T]):
+class Registry(Names[T]):
     """The objects of a kind by name: those of strapgen, then those of installed packages.
 
     Looking up a name of a package that cannot be used raises an `InputError`; another name is not disturbed by it.
@@ -81,8 +105,6 @@ class Registry(Mapping[str, T], Generic[T]):
     own : mapping
         What strapgen's folders bring.
     """
-
-    __repr__ = short_repr
 
     def __init__(
         self,
@@ -173,7 +195,9 @@ class Titles(Mapping[str, str]):
     def __getitem__(self, name: str) -> str:
         try:
             record = self._records[name]
-            return str(record.title) if self._line is None else self._line(name, record)
+            if self._line is not None:
+                return self._line(name, record)
+            return record if isinstance(record, str) else str(record.title)
         except StrapgenError as error:
             return f"cannot be used: {error}"
 
@@ -194,16 +218,11 @@ def _code(point: EntryPoint) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
-class Merged(Mapping[str, T], Generic[T]):
+class Merged(Names[T]):
     """Several mappings as one; the first that has a name gives its value. The first of all is `own`."""
-
-    __repr__ = short_repr
 
     def __init__(self, *parts: Mapping[str, T]) -> None:
         self.own, self._parts = parts[0], parts
-
-    def _in_words(self) -> str:
-        return ", ".join(self)
 
     def __getitem__(self, name: str) -> T:
         for part in self._parts:

@@ -145,7 +145,7 @@ BAD = {
     "converge euler --motion constant": "motion constant needs parameters",
     "converge euler --fail-beyond -1": "fail-beyond is -1",
     "converge euler --out a --plot a": "--out and --plot are both a",
-    "generate euler --out -": "--out - is no folder; files are not written to the terminal",
+    "generate euler --target c --out -": "--out - prints one file; --file chooses it of euler_rk4_2.h, euler_rk4_2.c",
     "system imu --out -": "--out - is no folder; files are not written to the terminal",
     "converge euler --method rk1 --steps 1/2,1/4 --plot a.docx": "file type 'docx' is not known",
     "converge euler --method rk4 --tableau x.toml": "are both given; one is needed",

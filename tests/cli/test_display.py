@@ -116,7 +116,7 @@ def test_comparisons_and_ladders_are_tables():
     rows = ALGORITHM.compare(TURN, ["numpy", "exact"])
     text = rows._repr_html_()
     assert "largest, rad" in text and text.count("<tr>") == 3
-    assert isinstance(rows, list)
+    assert isinstance(rows, tuple)
     coning = strapgen.motion("coning", a_rad_s=1, b_rad_s=1.5, g_rad_s=0.6)
     ladder = strapgen.converge(ALGORITHM.choice, coning, ["1/8", "1/16"], 1, "numpy")
     assert "error_rad" in ladder._repr_html_()

@@ -89,11 +89,11 @@ def test_gaps_that_no_filter_restores_are_refused(kinds, reason):
         ({"backend": "exact"}, "backend 'exact'"),
         ({"algorithm": "cayley-klein"}, "algorithm 'cayley-klein'"),
         ({"initial": [1.0, 0.0]}, "initial"),
-        ({"increments": np.zeros(3)}, "increments has shape"),
+        ({"samples": np.zeros(3)}, "samples has shape"),
     ],
 )
 def test_incompatible_arguments_are_refused(options, reason):
-    arguments = {"window": "window-3-3", "increments": samples(10)} | options
+    arguments = {"window": "window-3-3", "samples": samples(10)} | options
     with pytest.raises((InputError, InputTypeError), match=reason):
         recording_attitudes(**arguments)
 

@@ -76,7 +76,7 @@ REFUSED = [
     (
         with_limits,
         "x is .*; a whole number from 1 to 8 is needed",
-        [0, -1, 9, 1.0, "2", None, True, np.float64(2), np.True_],
+        [0, -1, 9, 1.5, "2", None, True, np.float64(9), math.nan, math.inf, np.True_, 2j],
     ),
     (checks.count, "x is 0; a whole number at least 1 is needed", [0]),
     (
@@ -253,10 +253,10 @@ def test_a_value_that_is_no_text_or_very_long_stays_on_one_line():
 
 
 CALLS = {
-    "increments is 'a'; an array of numbers is needed": lambda: strapgen.gyro.pulses("a", 1),
-    "increments has shape (3,); (..., N, K, 3) is needed": lambda: strapgen.gyro.pulses([1, 2, 3], 1),
-    "increments is 'b'; an array of numbers": lambda: strapgen.gyro.windows("b", 1),
-    "increments is 'c'; an array of numbers": lambda: strapgen.exact.propagate(
+    "samples is 'a'; an array of numbers is needed": lambda: strapgen.gyro.pulses("a", 1),
+    "samples has shape (3,); (..., N, K, 3) is needed": lambda: strapgen.gyro.pulses([1, 2, 3], 1),
+    "samples is 'b'; an array of numbers": lambda: strapgen.gyro.windows("b", 1),
+    "samples is 'c'; an array of numbers": lambda: strapgen.exact.propagate(
         strapgen.lower(strapgen.derive("euler")), "c"
     ),
     "path is None; the path of a file is needed": lambda: strapgen.read_rates(None, "rad/s"),
@@ -470,3 +470,19 @@ def test_a_long_name_is_shortened():
     with pytest.raises(InputTypeError, match=r"^lower takes a Kernel, not 'eu.*\.\.\.") as refused:
         strapgen.lower("euler\n" * 1000)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("two", [2, 2.0, np.int8(2), np.float32(2), np.uint64(2), Fraction(2)])
+def test_a_whole_number_is_a_count_whatever_its_type(two):
+    assert type(checks.count("x", two)) is int and checks.count("x", two) == 2
+    assert strapgen.algorithm("euler", "rk4", two) == strapgen.algorithm("euler", "rk4", 2)
+    turn = np.full((8, 2, 3), 0.01)
+    backend = strapgen.backend("euler", increments=two, previous=None)
+    np.testing.assert_array_equal(
+        backend.propagate(turn, record_every=two, orthonormalize_every=two, jobs=two),
+        backend.propagate(turn, record_every=2, orthonormalize_every=2),
+    )
+    assert strapgen.gyro.windows(turn[:, 0], two).shape == (4, 2, 3)
+    settings = strapgen.Settings(word=8 * two)
+    assert settings == strapgen.Settings(word=16) and type(settings.word) is int
+    assert strapgen.unknowns.series("dcm", terms=two) == strapgen.unknowns.series("dcm", terms=2)

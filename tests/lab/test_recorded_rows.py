@@ -128,7 +128,7 @@ def test_memory_does_not_grow_with_the_file(read, on_disk, tmp_path):
         data = read(path)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-        assert isinstance(data.increments, np.memmap)
+        assert isinstance(data.samples, np.memmap)
     # The greatest part of a block may be a little larger; a byte for each row more would be 20 kB.
     assert peaks[1] - peaks[0] < 20_000, peaks
 
@@ -140,22 +140,22 @@ def test_recordings_on_disk_and_in_memory_are_equal(read, tmp_path, request):
     in_memory = read(path)
     request.getfixturevalue("on_disk")
     data = read(path)
-    assert isinstance(data.increments, np.memmap) and not isinstance(in_memory.increments, np.memmap)
+    assert isinstance(data.samples, np.memmap) and not isinstance(in_memory.samples, np.memmap)
     assert (data.start, data.interval, data.largest) == (
         in_memory.start,
         in_memory.interval,
         in_memory.largest,
     )
-    np.testing.assert_array_equal(data.increments, in_memory.increments)
+    np.testing.assert_array_equal(data.samples, in_memory.samples)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("hz", [3, 999, 1000, 7777])
 def test_resampling_in_parts_gives_the_same_bits(hz, tmp_path, request):
     path = long_file(tmp_path / "gyro.csv", 2_500)
-    at_once = recording.read_rates(path, "rad/s", hz).increments
+    at_once = recording.read_rates(path, "rad/s", hz).samples
     request.getfixturevalue("on_disk")
-    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", hz).increments, at_once)
+    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", hz).samples, at_once)
 
 
 def test_grid_points_at_part_boundaries_give_the_same_bits(rng, tmp_path, monkeypatch):
@@ -163,10 +163,10 @@ def test_grid_points_at_part_boundaries_give_the_same_bits(rng, tmp_path, monkey
     path = tmp_path / "gyro.csv"
     rates = rng.normal(size=(200, 3)).tolist()
     path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
-    at_once = recording.read_rates(path, "rad/s", 64).increments
+    at_once = recording.read_rates(path, "rad/s", 64).samples
     for module in (recorded_rows, recording):
         monkeypatch.setattr(module, "PART", 4)
-    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).increments, at_once)
+    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).samples, at_once)
 
 
 @pytest.fixture

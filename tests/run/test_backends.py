@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -159,7 +160,7 @@ def test_any_floating_point_layout_is_read(make, kind, rng):
 
 
 def test_masked_arrays_are_refused(make):
-    with pytest.raises(InputTypeError, match="increments is a masked array"):
+    with pytest.raises(InputTypeError, match="samples is a masked array"):
         make("euler").propagate(np.ma.masked_array(np.zeros((4, 2, 3)), mask=True))
 
 
@@ -191,12 +192,12 @@ def test_step_broadcasts_leading_axes(make, algorithm, rng):
 @pytest.mark.parametrize(
     ("increments", "error", "words"),
     [
-        (np.zeros((4, 3, 3)), InputError, ["increments", "(4, 3, 3)", "(..., 2, 3)"]),
-        (np.zeros((2, 3)), InputError, ["increments", "steps"]),
-        (np.zeros((4, 2, 3), complex), InputTypeError, ["increments", "complex128"]),
-        ([[["a", "b", "c"]] * 2], InputTypeError, ["increments"]),
-        (np.full((4, 2, 3), np.nan), InputError, ["increments", "nan", "finite"]),
-        (np.full((4, 2, 3), np.inf), InputError, ["increments", "inf", "finite"]),
+        (np.zeros((4, 3, 3)), InputError, ["samples", "(4, 3, 3)", "(..., 2, 3)"]),
+        (np.zeros((2, 3)), InputError, ["samples", "steps"]),
+        (np.zeros((4, 2, 3), complex), InputTypeError, ["samples", "complex128"]),
+        ([[["a", "b", "c"]] * 2], InputTypeError, ["samples"]),
+        (np.full((4, 2, 3), np.nan), InputError, ["samples", "nan", "finite"]),
+        (np.full((4, 2, 3), np.inf), InputError, ["samples", "inf", "finite"]),
     ],
 )
 def test_increments_that_cannot_be_used(make, increments, error, words):
@@ -349,7 +350,7 @@ def test_a_step_takes_increments_beside_its_own_on_every_back_end(
     beside = {"previous": previous, "ahead": ahead}
     backend = make(algorithm, "rk4", count, **beside)
     assert (backend.increments, backend.previous, backend.ahead) == (count, previous, ahead)
-    assert backend.samples == count + previous + ahead
+    assert backend.samples_per_step == count + previous + ahead
     row = random_increments(rng, previous + 60 * count + ahead)
     increments = windows(row, count, previous + ahead)
     wanted = strapgen.backend(algorithm, "rk4", count, "numpy", **beside).propagate(increments)
@@ -380,7 +381,7 @@ def test_an_exact_fit_needs_no_more_samples(make, count, previous, ahead):
 
 def test_increments_that_a_step_keeps_belong_to_its_shape(make):
     backend = make("euler", "rk4", 1, previous=2)
-    with pytest.raises(InputError, match=r"increments has shape \(4, 1, 3\); \(\.\.\., 3, 3\) is needed"):
+    with pytest.raises(InputError, match=r"samples has shape \(4, 1, 3\); \(\.\.\., 3, 3\) is needed"):
         backend.propagate(np.zeros((4, 1, 3)))
 
 
@@ -484,3 +485,36 @@ def test_the_resolution_is_the_targets(backend_name):
     evaluator = made(backend_name, lambda x: x + EPSILON)
     wanted = {"float": 2.0**-23, "32": 2.0**-30, "16": 2.0**-14}
     assert float(evaluator(0.0)[0]) == wanted.get(precision(backend_name), 2.0**-52)
+
+
+def test_samples_keep_their_old_name_with_a_warning():
+    made, turn = strapgen.backend("euler"), np.full((4, 2, 3), 0.01)
+    program = strapgen.lower(strapgen.derive("euler"))
+    calls = [
+        (lambda **given: made.step(made.identity, **given), turn[0]),
+        (made.propagate, turn),
+        (made.representable, turn),
+        (lambda **given: strapgen.gyro.pulses(size=1e-3, **given), turn),
+        (lambda **given: strapgen.gyro.windows(count=2, **given), turn[:, 0]),
+        (lambda **given: strapgen.exact.propagate(program, **given), turn),
+    ]
+    for call, array in calls:
+        with pytest.warns(DeprecationWarning, match=r"^increments is now samples$"):
+            old = call(increments=array)
+        np.testing.assert_array_equal(old, call(samples=array))
+    with pytest.warns(DeprecationWarning, match=r"^Backend\.samples is now samples_per_step$"):
+        assert made.samples == made.samples_per_step == 2
+
+
+def test_a_recording_keeps_the_old_name_of_its_samples():
+    rows = np.full((4, 3), 0.01)
+    for make in (
+        lambda **given: strapgen.Recording(0.0, 0.01, **given),
+        lambda **given: strapgen.InertialRecording(0.0, 0.01, velocity_increments=rows, **given),
+    ):
+        with pytest.warns(DeprecationWarning, match=r"^increments is now samples$"):
+            recording = make(increments=rows)
+        with pytest.warns(DeprecationWarning, match=r"increments is now samples$"):
+            assert np.shares_memory(recording.increments, rows)
+        with pytest.warns(DeprecationWarning, match=r"^increments is now samples$"):
+            assert replace(recording, increments=2 * rows).samples.tolist() == (2 * rows).tolist()

@@ -29,8 +29,8 @@ TARGETS = ["c", "c-float"]
 
 def runs_of(backend: Any, rng: np.random.Generator, runs: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Return increments of some runs and their starts, all different."""
-    increments = rng.normal(scale=0.05, size=(runs, steps, backend.samples, 3)).astype(backend.dtype)
-    first = rng.normal(scale=0.5, size=(runs, backend.samples, 3)).astype(backend.dtype)
+    increments = rng.normal(scale=0.05, size=(runs, steps, backend.samples_per_step, 3)).astype(backend.dtype)
+    first = rng.normal(scale=0.5, size=(runs, backend.samples_per_step, 3)).astype(backend.dtype)
     return increments, backend.step(np.broadcast_to(backend.identity, (runs, *backend.state_shape)), first)
 
 

@@ -88,7 +88,7 @@ def growth(choice: Choice, motion: str = "constant", terms: int = 2) -> Growth:
     -(w_x**2 + w_y**2 + w_z**2)**3/72
     """
     motion_rates.require(motion)
-    checks.count("terms", terms, largest=MOST_TERMS)
+    terms = checks.count("terms", terms, largest=MOST_TERMS)
     attitude_step = one_step.step(choice)
     order = attitude_step.kernel.order
     top = 2 + (order.step if order else 1) + terms

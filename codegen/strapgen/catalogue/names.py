@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
@@ -19,7 +18,7 @@ from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES, SHAPES
 from strapgen.catalogue.methods.tableaux import TABLEAUX, TITLES
 from strapgen.catalogue.methods.windows import EXACT, WINDOW_TITLES, named_window
 from strapgen.ir.kernel_info import Recipe
-from strapgen.registry import Merged, Registry, Titles
+from strapgen.registry import Merged, Names, Registry, Titles
 
 #: Kernels that take no method.
 KERNELS = Registry("kernels", Recipe, lambda recipe: not getattr(recipe, "reader", ""))
@@ -37,11 +36,13 @@ def reserved() -> tuple[str, ...]:
 _METHODS = f"{__package__}.methods."
 
 #: Attitude algorithms, by the state they integrate.
-ALGORITHMS = {
-    "dcm": "direction cosine matrix",
-    "euler": "Euler parameters, scalar last",
-    "cayley-klein": "Cayley-Klein parameters, scalar first",
-}
+ALGORITHMS: Names[str] = Merged(
+    {
+        "dcm": "direction cosine matrix",
+        "euler": "Euler parameters, scalar last",
+        "cayley-klein": "Cayley-Klein parameters, scalar first",
+    }
+)
 
 #: Integration methods without files of coefficients.
 INTEGRATORS = Registry("methods", Integrator)
@@ -69,12 +70,12 @@ class _NamedTableau:
         return TABLEAUX[self.name].tolerance
 
     def select(self, asked: RequestedSamples) -> tuple[_NamedTableau, StepSamples]:
-        """Return the samples that are asked for."""
+        """Return the requested samples."""
         return self, through_samples(self.name, asked)
 
 
 def named_method(method: str | MethodSpec) -> MethodSpec | None:
-    """Return the method of a name, None where there is none; what is a method already is returned as it is.
+    """Return the method of a name, None for an unknown name; return a method unchanged.
 
     Examples
     --------
@@ -92,13 +93,13 @@ def named_method(method: str | MethodSpec) -> MethodSpec | None:
 
 
 def is_built_in(method: str) -> bool:
-    """Tell whether a name is none of an installed package's file of coefficients, which is then part of a choice."""
+    """Return whether a name is not that of an installed package's coefficient file."""
     name = method.removesuffix(EXACT)
     return not any(name in table and name not in table.own for table in (TITLES, SHAPE_TITLES, WINDOW_TITLES))
 
 
 #: Integration methods. Each family of windows has others for the same samples, such as window-8-6 beside window-7-7.
-METHODS: Mapping[str, str] = Merged(TITLES, Titles(INTEGRATORS), SHAPE_TITLES, WINDOW_TITLES)
+METHODS: Names[str] = Merged(TITLES, Titles(INTEGRATORS), SHAPE_TITLES, WINDOW_TITLES)
 
 #: Methods of the standard catalogue, which are those of the thesis.
 STANDARD_METHODS = ("rk1", "rk2", "rk3", "rk4")

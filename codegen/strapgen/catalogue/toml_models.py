@@ -45,6 +45,7 @@ from strapgen.catalogue import coefficients
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives, counted, unknown
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 #: Fractions take no time to read, and those of filters for a gyro are long.
 _FRACTION, _MOST_CHARACTERS = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?"), 4000
@@ -76,7 +77,7 @@ class Key:
 
     @property
     def described(self) -> dict[str, str]:
-        """What a JSON Schema says of the key, with its unit."""
+        """The description of the key in a JSON Schema, with its unit."""
         if not self.unit:
             return {"description": self.text}
         return {"description": f"{self.text} [{self.unit}]", "unit": self.unit}
@@ -494,7 +495,7 @@ def content(path: str | Path, what: str, most_bytes: int) -> dict[str, Any]:
     """Return the content of a TOML file of at most `most_bytes`; error messages say `what` it holds."""
     place = checks.path("path", path)
     try:
-        with place.open("rb") as file:
+        with streams.opened(place) as file:
             data = file.read(most_bytes + 1)
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from None

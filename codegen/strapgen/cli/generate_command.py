@@ -19,12 +19,17 @@ from strapgen.cli.progress import track
 from strapgen.cli.values import names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
     from strapgen.run.kernel_sources import Request
     from strapgen.targets.names import Naming
+
+
+def _folder_or_terminal(option: str, path: Path) -> Path:
+    return path
 
 
 @dataclass(frozen=True)
@@ -38,8 +43,13 @@ class SourceOptions:
         option(
             "--out",
             metavar="FOLDER",
-            help="Folder for the files.  [default: here; generated/ with --all]",
+            help="Folder for the files; - prints one file.  [default: here; generated/ with --all]",
+            read=_folder_or_terminal,
         ),
+    ] = None
+    file: Annotated[
+        str | None,
+        option("--file", metavar="NAME", help="Write one file alone, by its name or its ending, as .h."),
     ] = None
     name: Annotated[
         str | None,
@@ -100,6 +110,28 @@ class SourceOptions:
         if self.project and not TARGETS[target].compiled:
             raise InputError(f"--project goes with targets in C, not with {target}")
 
+    @property
+    def is_printed(self) -> bool:
+        """Whether the file goes to the terminal."""
+        return self.out == streams.STANDARD
+
+    def chosen(self, files: Mapping[str, str]) -> dict[str, str]:
+        """Return the file that the options choose, or all; refuse several that are printed."""
+        if self.file is not None:
+            known = ", ".join(files)
+            end = self.file if self.file.startswith(".") else None
+            files = {
+                name: text
+                for name, text in files.items()
+                if name == self.file or (end is not None and name.endswith(end))
+            }
+            if len(files) != 1:
+                count = "none" if not files else "more than one"
+                raise InputError(f"--file {self.file} is {count} of the files, which are {known}")
+        if self.is_printed and len(files) > 1:
+            raise InputError(f"--out - prints one file; --file chooses it of {', '.join(files)}")
+        return dict(files)
+
     def write(self, files: Mapping[str, str]) -> list[Path]:
         """Write files into the folder, but over none that has another contract, unless that is forced."""
         from strapgen.run.standard_tree import command_of, text_of
@@ -141,9 +173,10 @@ class SourceOptions:
     OneOf("ALGORITHM --all", needed="an algorithm is needed, or --all; strapgen list kernels shows them"),
     Excludes(
         "--all",
-        "@method @fixed --name --prefix --with-runs --project --force",
+        "@method @fixed --name --prefix --with-runs --project --force --file --out=-",
         reason="--all generates the whole catalogue",
     ),
+    Excludes("--out=-", "--check --force --project --format=json", reason="--out - prints one file"),
 )
 def generate(
     algorithm: OptionalAlgorithm = None,
@@ -194,7 +227,11 @@ def generate(
         groups = [
             files | _project_files(task, output) for (task, _), files in zip(results, groups, strict=True)
         ]
-    files = _together(groups)
+    files = output.chosen(_together(groups))
+    groups = [{name: text for name, text in group.items() if name in files} for group in groups]
+    if output.is_printed:
+        terminal.write("".join(files.values()).rstrip("\n"))
+        return
     if output.check:
         output.show_difference(files, format)
         return

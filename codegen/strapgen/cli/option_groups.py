@@ -22,6 +22,7 @@ from strapgen.cli import completion, values
 from strapgen.cli.values import written
 from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -73,7 +74,7 @@ class Shown(NamedTuple):
 
 
 class Option(NamedTuple):
-    """An option or an argument of a command: what Typer reads, and what makes a typed value of it."""
+    """An option or an argument of a command: its declaration for Typer, and the reader of its values."""
 
     spellings: tuple[str, ...]  # on the command line; of an argument its metavar
     kind: Any  # of its values, without None
@@ -92,7 +93,7 @@ class Option(NamedTuple):
 
     @property
     def help(self) -> str:
-        """What the option is, in a line."""
+        """The help of the option, in a line."""
         return next(
             (one.help or "" for one in self.parameter.annotation.__metadata__ if hasattr(one, "help")), ""
         )
@@ -153,6 +154,7 @@ class CommandOptions:
             {one.spelling: one.value(_optional(one.parameter.default)) for one in self.options.values()},
             {name: group.spellings for name, group in self.groups.items()},
         )
+        _check_standard_input(line)
         check(self.rules, line)
         for group in self.groups.values():
             check(getattr(group.kind, "rules", ()), line.of(group.spellings))
@@ -343,6 +345,13 @@ def check(table: Sequence[Rule], line: CommandLine) -> None:
     for rule in table:
         if refusal := rule.refusal(line):
             raise InputError(refusal)
+
+
+def _check_standard_input(line: CommandLine) -> None:
+    """Refuse a command line that reads standard input twice."""
+    reading = [name for name, value in line.values.items() if value == streams.STANDARD and name != "--out"]
+    if len(reading) > 1:
+        raise InputError(f"{reading[0]} and {reading[1]} are both -; standard input is read once")
 
 
 def _in_words(condition: str) -> str:

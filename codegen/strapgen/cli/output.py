@@ -12,6 +12,7 @@ from strapgen.cli.options import option
 from strapgen.ir import checks
 from strapgen.ir.checks import alternatives
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 if TYPE_CHECKING:
     from strapgen.results.result import Result
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _TABLE = ("text", "json", "csv", "markdown", "latex")
 _PLAIN = ("text", "json")
 #: The value of --out that stands for the terminal.
-_TERMINAL = Path("-")
+_TERMINAL = streams.STANDARD
 
 
 def format_option(formats: tuple[str, ...], default: str = "") -> Any:
@@ -34,7 +35,7 @@ def format_option(formats: tuple[str, ...], default: str = "") -> Any:
 
 
 def plot_option(what: str) -> Any:
-    """Return the option --plot for a picture of something."""
+    """Return the option --plot with a help text on its picture."""
     return option("--plot", metavar="FILE", help=f"Image file for {what}; its ending says the type.")
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 #: Reads a word of the command line: the option's name and the word, which is a path where the type is one.
 Reader = Callable[[str, Any], Any]
@@ -108,7 +109,7 @@ def whole(smallest: int, largest: int | None = None) -> Reader:
 
 def folder(option: str, path: Path) -> Path:
     """Return a folder; elsewhere - stands for the terminal."""
-    if path == Path("-"):
+    if path == streams.STANDARD:
         raise InputError(f"{option} - is no folder; files are not written to the terminal")
     return path
 

@@ -161,14 +161,14 @@ class RecordedEnvironment:
         The spectra are means over halfway overlapping parts of 1,024 samples under a Hann window.
         """
         recording = read_increments(path)
-        count = len(recording.increments)
+        count = len(recording.samples)
         if count < _FEWEST * _SEGMENT:
             raise InputError(
                 f"{path} has {count} samples; a spectrum needs {_FEWEST * _SEGMENT} of them or more"
             )
         window = np.hanning(_SEGMENT + 1)[:-1]
         starts = range(0, count - _SEGMENT + 1, _SEGMENT // 2)
-        parts = np.stack([recording.increments[k : k + _SEGMENT] for k in starts])
+        parts = np.stack([recording.samples[k : k + _SEGMENT] for k in starts])
         parts = (parts - parts.mean(axis=1, keepdims=True)) * window[:, None]
         waves = np.fft.rfft(parts, axis=1)[:, 1:-1]
         interval = recording.interval

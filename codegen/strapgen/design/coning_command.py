@@ -99,7 +99,7 @@ class ConingDesign(BandOptions):
     ] = None
 
     def brief(self, samples: int, previous: int) -> ConingBrief:
-        """Return what the options say."""
+        """Return the requirements from the options."""
         from strapgen.analysis.vibration.spectrum import read_spectrum
         from strapgen.design.coning_design import ConingBrief, of_spectrum
 

@@ -167,7 +167,7 @@ class ConingProblem:
 
     @cached_property
     def directions(self) -> list[list[Fraction]]:
-        """What a unit of each free coefficient adds to all of them, (free, unknowns)."""
+        """The derivatives of all coefficients by the free ones, (free, unknowns)."""
         units = [[Fraction(int(i == j)) for j in range(self.free)] for i in range(self.free)]
         return [[a - b for a, b in zip(self.complete(unit), self.base, strict=True)] for unit in units]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -23,6 +22,7 @@ from strapgen.cli.progress import waiting
 from strapgen.cli.values import NotNegative, Positive, names
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.window import Window
@@ -42,10 +42,10 @@ WindowArgument = Annotated[
 
 
 def window_of(argument: str) -> Window:
-    """Return a window, its conditions verified; an argument that ends in .toml or holds a path separator is a file."""
+    """Return a window, its conditions verified; see `streams.names_file` for a file."""
     from strapgen.catalogue.methods import windows
 
-    if argument.endswith(".toml") or any(part in argument for part in (os.sep, os.altsep) if part):
+    if streams.names_file(argument):
         return windows.read(argument)
     if argument not in windows.WINDOWS:
         checks.choice("window", argument, windows.WINDOW_TITLES, "their one-sided filters, as window-14-0")
@@ -205,7 +205,7 @@ def design(
 
 
 def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
-    """Return what the options say."""
+    """Return the requirements from the options."""
     from strapgen.catalogue.methods import windows
     from strapgen.design.family import FamilyBrief
 

@@ -230,7 +230,7 @@ def _nearest_rotation(matrix: Any) -> Any:
 
 
 def _is_proper(values: Sequence[float], angles: AngleAccumulation) -> bool:
-    """Tell whether a state is so near a proper one that the bound holds."""
+    """Return whether a state is so near a proper one that the bound holds."""
     shortest = float(angles.shortest)
     if len(values) == 4:
         return float(np.linalg.norm(values)) >= shortest

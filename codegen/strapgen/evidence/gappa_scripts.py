@@ -46,7 +46,7 @@ class Script:
         return self._text([f"|{text}| <= {number(bound)}" for text, bound in self.goals.items()])
 
     def question(self) -> str:
-        """Return the script that asks Gappa for its bounds."""
+        """Return the script by which Gappa computes its bounds."""
         return self._text([f"|{text}| in ?" for text in self.goals])
 
     def define(self, name: str, text: str) -> None:
@@ -249,7 +249,7 @@ class _FixedScriptWriter:
         self._expand(value, parts)
 
     def _added(self, value: Value, definition: IntegerSum) -> tuple[str, list[str]]:
-        """Return the fine terms of a sum as they are rounded, and what is added to them before."""
+        """Return the fine terms of a sum before rounding, and the terms added to them."""
         name, feedback = value.name, definition.residual
         if feedback is None:
             return f"s_{name}", [number(Fraction(2) ** (-value.fraction - 1))] if self.nearest else []

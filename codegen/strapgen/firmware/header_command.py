@@ -25,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
 from strapgen.run.standard_tree import command_of, text_of
+from strapgen.storage import streams
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -106,7 +107,7 @@ class HeaderCommand:
         return fit, system.unit(fit, needs, bounds(fit), command)
 
     def two_speed(self) -> two_speed.TwoSpeedRequest:
-        """Return what a command of two speeds generates: algorithm, form of sculling, target and settings."""
+        """Return the request of a two-speed command: algorithm, form of sculling, target and settings."""
         values = self.values
         return two_speed.request(values["algorithm"], values["sculling"], values["target"], values["fixed"])
 
@@ -183,6 +184,8 @@ def _regular(word: str) -> Path:
     Files of the kernel, which can wait too, have no size.
     """
     path = Path(word)
+    if path == streams.STANDARD:
+        raise InputError("the header's command reads standard input, which nobody has kept")
     if path.exists() and not (path.is_file() and path.stat().st_size):
         raise InputError(f"{word} in the header's command is no regular file, or empty")
     return path

@@ -180,7 +180,7 @@ def _formats(sources: Sources) -> dict[str, Any]:
 
 
 def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[Fraction]) -> dict[str, Any]:
-    """Return what the main programs of a step and of an algorithm in two speeds have in common."""
+    """Return the common values of the main programs of a step and of an algorithm in two speeds."""
     numbers = numbers_of(sources)
     kernels = ["coning_increments", "coning_truth", *([run.conversion] if run.conversion else [])]
     feedback = () if sources.fixed is None else sources.fixed.residuals

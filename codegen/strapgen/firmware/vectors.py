@@ -118,8 +118,8 @@ def call_vectors(
     sources: Sources, reference: Sources, command: str, count: int = COUNT, seed: int = SEED
 ) -> VectorTable:
     """Return test vectors of a function."""
-    checks.count("count", count, largest=_MOST)
-    checks.count("seed", seed, smallest=0)
+    count = checks.count("count", count, largest=_MOST)
+    seed = checks.count("seed", seed, smallest=0)
     stream = random.Random(seed)  # its `random` is the same in every release of Python
     if sources.fixed is not None:
         rows, tolerances = _fixed_rows(sources, ModelEvaluator(reference), count, stream)

@@ -63,19 +63,19 @@ class Verification(Result):
 
     @property
     def in_step(self) -> bool:
-        """Whether the file is what its command generates."""
+        """Whether the file equals the output of its command."""
         return not self.differences
 
     @property
     def within(self) -> bool:
-        """Whether all calls returned what the reference returns, within the bound."""
+        """Whether all calls agree with the reference, within the bound."""
         if self.max_ulp is None or self.wrong:
             return False
         return self.bound_ulp is None or self.max_ulp <= self.bound_ulp
 
     @property
     def holds(self) -> bool:
-        """Whether the file is in step and computes what it promises."""
+        """Whether the file does not differ and meets its contract."""
         return self.in_step and self.within
 
     @property
@@ -110,7 +110,7 @@ class WholeVerification(Result):
 
     @property
     def holds(self) -> bool:
-        """Whether all files are in step, and every stage computes what it promises."""
+        """Whether no file differs, and every stage meets its contract."""
         return not self.differences and all(stage.holds for stage in self.stages)
 
     def text(self) -> str:
@@ -366,7 +366,7 @@ def _fixed(
 
 
 def _refused(evaluator: Evaluator, arguments: Sequence[Array], feedback: Array) -> bool:
-    """Tell whether a back end refuses its inputs."""
+    """Return whether a back end refuses its inputs."""
     try:
         evaluator.run(arguments, feedback)
     except InputError:
@@ -449,7 +449,7 @@ def _bound(sources: Sources) -> float | None:
 
 
 def _inside(row: CallVector, sources: Sources) -> bool:
-    """Tell whether the inputs of a call lie in the ranges for which the bound holds."""
+    """Return whether the inputs of a call lie in the ranges for which the bound holds."""
     assert sources.rounding is not None
     ranges = {condition.value: condition for condition in sources.rounding.inputs}
     return all(

@@ -8,7 +8,7 @@ import os
 import reprlib
 from collections.abc import Container, Iterable
 from fractions import Fraction
-from numbers import Integral
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,11 +98,19 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
     return exact
 
 
+def is_whole(value: Any) -> bool:
+    """Return whether a value is a whole number, of any type: of Python, of numpy, or a float such as 2.0."""
+    return isinstance(value, Real) and not isinstance(value, bool) and bool(value == value // 1)
+
+
 def count(what: str, value: Any, *, smallest: int = 1, largest: int | None = None) -> int:
-    """Return `value` as a whole number from `smallest` to `largest`."""
+    """Return `value`, a whole number of any type, as an int from `smallest` to `largest`.
+
+    >>> count("increments", 2.0)
+    2
+    """
     limit = f"at least {smallest}" if largest is None else f"from {smallest} to {largest}"
-    whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not whole or value < smallest or (largest is not None and value > largest):
+    if not is_whole(value) or value < smallest or (largest is not None and value > largest):
         raise InputError(f"{what} is {shown(value)}; a whole number {limit} is needed")
     return int(value)
 

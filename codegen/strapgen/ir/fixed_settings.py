@@ -51,7 +51,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class StatedSettings(TypedDict, total=False):
-    """What a user states of fixed point, as the keywords of `Settings.of`."""
+    """The keywords of `Settings.of`."""
 
     word: int
     max_rate_deg_s: Number | None
@@ -84,7 +84,7 @@ def with_settings(function: F) -> F:
 
 
 class _WholeStep(NamedTuple):
-    """What settings say of a whole step, until a program tells how many increments it has."""
+    """Settings of a whole step, until the program determines the number of increments."""
 
     step: str
     max_rate_deg_s: str | None
@@ -160,13 +160,14 @@ class Settings:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        check_word(self.word)
+        object.__setattr__(self, "word", check_word(self.word))
         self._check_inputs()
         self._check_state()
         check_rounding(self.rounding)
         checks.choice("carry", self.carry, CARRIES)
         checks.choice("multiply", self.multiply, MULTIPLICATIONS)
-        checks.count("digits", self.digits, smallest=0, largest=self.word)
+        digits = checks.count("digits", self.digits, smallest=0, largest=self.word)
+        object.__setattr__(self, "digits", digits)
         if self.digits and self.multiply != "shift-add":
             raise InputError(f"digits is {self.digits}; it goes with multiply shift-add")
         most = LARGEST_ANGLE * (1 if self.whole_step is None else _MOST_INCREMENTS)
@@ -196,11 +197,14 @@ class Settings:
         if self.input_bits is None:
             object.__setattr__(self, "input_bits", self.default_input_bits)
         bits = self.input_bits
-        if bits is not None and not SHORTEST_WORD <= bits <= self.word:
+        if bits is None:
+            return
+        if not checks.is_whole(bits) or not SHORTEST_WORD <= bits <= self.word:
             raise InputError(
                 f"input bits is {bits}; a whole number from {SHORTEST_WORD} to {self.word}, the bits of a word, is "
                 "needed"
             )
+        object.__setattr__(self, "input_bits", int(bits))
 
     def _check_state(self) -> None:
         """Check that a saturating state goes with the word, and that no other option sets its range."""

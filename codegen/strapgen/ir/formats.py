@@ -94,7 +94,7 @@ def finest(largest: Fraction, word: int) -> int:
 
 
 def _exceeds(largest: Fraction, fraction: int, top: int) -> bool:
-    """Tell whether a magnitude with so many fraction bits exceeds an integer."""
+    """Return whether a magnitude with so many fraction bits exceeds an integer."""
     if fraction >= 0:
         return largest.numerator << fraction > top * largest.denominator
     return largest.numerator > top * largest.denominator << -fraction
@@ -102,11 +102,11 @@ def _exceeds(largest: Fraction, fraction: int, top: int) -> bool:
 
 def check_word(word: int) -> int:
     """Return a length of word in bits if the integer model has it."""
-    if isinstance(word, bool) or not isinstance(word, int) or not SHORTEST_WORD <= word <= LONGEST_WORD:
+    if not checks.is_whole(word) or not SHORTEST_WORD <= word <= LONGEST_WORD:
         raise InputError(
             f"word is {word!r}; a whole number of bits from {SHORTEST_WORD} to {LONGEST_WORD} is needed"
         )
-    return word
+    return int(word)
 
 
 def check_rounding(rounding: str) -> str:

@@ -16,6 +16,8 @@ from typing import Any
 
 #: Most lines of a `repr`, and most characters of a line.
 LINES, WIDTH = 5, 100
+#: Most lines of a table of names.
+NAMES = 24
 #: Most characters of one field.
 _FIELD = 60
 #: Most characters of a number that is written exactly.
@@ -64,15 +66,39 @@ def notebook_html(value: Any) -> str | None:
     return text
 
 
+def names_table(titles: Mapping[str, str]) -> Any:
+    """Return names with their titles as a table; of many the first ones, and how to see all."""
+    table = importlib.import_module("strapgen.results.table")
+    names = list(titles)
+    shown = names if len(names) <= NAMES else names[: NAMES - 1]
+    rows = [(name, textwrap.shorten(titles[name], WIDTH - 20, placeholder="...")) for name in shown]
+    if len(names) > len(shown):
+        rows.append(("...", f"{len(names) - len(shown)} more; list() of this mapping gives all names"))
+    return table.TextTable((table.Column(align="<"), table.Column(align="<")), rows)
+
+
 def to_pandas(value: Any) -> Any:
     """Return an object as a data frame of pandas, the units in the names of its columns."""
     return _display(value, "frames").pandas_frame(value)
 
 
+def hold_arrays(value: Any) -> None:
+    """Hold views of a dataclass's arrays that cannot be written; the arrays that it was made of stay as they are."""
+    for field in fields(value):
+        array = getattr(value, field.name)
+        if hasattr(array, "setflags"):
+            view = array.view()
+            view.setflags(write=False)
+            object.__setattr__(value, field.name, view)
+
+
 class Records:
-    """Records along a time: a plot, and the forms of other libraries."""
+    """Records along a time, whose arrays cannot be written: a plot, and the forms of other libraries."""
 
     __slots__ = ()
+
+    def __post_init__(self) -> None:
+        hold_arrays(self)
 
     def plot(self, path: Any = None, title: str = "") -> Any:
         """Return a plot of the records against time as a figure of matplotlib, or write it to a file."""
@@ -119,7 +145,7 @@ def _stated(value: Any) -> list[tuple[str, Any]]:
 
 
 def _differs(content: Any, default: Any) -> bool:
-    """Tell whether a value is another than a default of its type; both may be arrays of numpy."""
+    """Return whether a value is another than a default of its type; both may be arrays of numpy."""
     if hasattr(content, "tolist"):
         return bool(content.tolist() != default.tolist())
     return bool(content != default)

@@ -42,10 +42,12 @@ def renamed_parameters(**names: str) -> Callable[[Callable[P, R]], Callable[P, R
 
 
 def current(fields: dict[str, Any], renamed: dict[str, str]) -> dict[str, Any]:
-    """Return keyword arguments with the present names of fields."""
-    for old in renamed.keys() & fields:
+    """Return keywords with the present names; an old one counts, where `dataclasses.replace` adds the other."""
+    old_names = renamed.keys() & fields
+    for old in old_names:
         warn(old, renamed[old], level=4)
-    return {renamed.get(name, name): value for name, value in fields.items()}
+    present = {name: value for name, value in fields.items() if name not in old_names}
+    return present | {renamed[old]: fields[old] for old in old_names}
 
 
 def renamed(**names: str) -> Callable[[T], T]:

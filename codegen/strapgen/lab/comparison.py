@@ -107,8 +107,8 @@ class Comparison(Record):
         return f"{self.backend}: {angle}\ndrift {self.drift_deg:.4g} deg, {self.ns_per_step:.1f} ns a step"
 
 
-class Comparisons(list[Comparison]):
-    """Back ends beside one reference, a `Comparison` each; a list that a notebook shows as a table."""
+class Comparisons(tuple[Comparison, ...]):
+    """Back ends beside one reference, a `Comparison` each; a tuple that a notebook shows as a table."""
 
     __repr__ = short_repr
     _repr_html_ = notebook_html
@@ -154,7 +154,7 @@ def compare(
     Returns
     -------
     Comparisons
-        A list of `Comparison`, in the order of `backends`.
+        A tuple of `Comparison`, in the order of `backends`.
 
     Raises
     ------
@@ -224,7 +224,7 @@ def usable_backends(choice: Choice) -> tuple[str, ...]:
 
 
 def _coning(choice: Choice) -> tuple[Array, Array]:
-    """Return what the steps of a choice take of a coning motion, and its attitude."""
+    """Return the samples of a coning motion for the steps of a choice, and its attitude."""
     profile = motion("coning", **CONING_DEG_S)
     read = samples_of_steps(attitude_backend(choice), profile, STEP)
     return read(0, STEPS), profile.attitude(np.arange(1 + STEPS) * float(STEP))

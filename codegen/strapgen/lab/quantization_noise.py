@@ -53,7 +53,7 @@ class QuantizationNoise:
 
     def along(self, ends: int = 1) -> sp.Expr:
         """Return the variance on the axis of the rate in rad^2; see `across`."""
-        checks.count("ends", ends, largest=2)
+        ends = checks.count("ends", ends, largest=2)
         once = self.end + (self.start if ends == 2 else 0)
         return SAMPLE * (once + self.walk * TIME / STEP)
 
@@ -128,7 +128,7 @@ def extraction_noise(increments: int, node: sp.Expr, previous: int = 0, ahead: i
     >>> [extraction_noise(2, sp.sympify(node)) for node in ("0", "1/2")]
     [sqrt(78)*q/(6*h), sqrt(6)*q/(6*h)]
     """
-    checks.count("increments", increments)
+    increments = checks.count("increments", increments)
     weights = rate_fit.from_increments(increments, previous, ahead).at(node)
     return sp.sqrt(sp.Add(*(a**2 for a in _differences(weights))) / 12) * PULSE / STEP
 

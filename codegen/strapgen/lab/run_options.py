@@ -328,13 +328,13 @@ class SampleSource:
 
         data = self.recording()
         beside = previous + ahead
-        steps = max(0, len(data.increments) - beside) // samples
+        steps = max(0, len(data.samples) - beside) // samples
         if steps < 1:
             raise InputError(
-                f"the recording holds {len(data.increments)} increments; a step needs {samples + beside}"
+                f"the recording holds {len(data.samples)} increments; a step needs {samples + beside}"
             )
-        say_unused(self.file, len(data.increments) - beside - steps * samples, samples)
-        increments = windows(data.increments[: beside + steps * samples], samples, beside)
+        say_unused(self.file, len(data.samples) - beside - steps * samples, samples)
+        increments = windows(data.samples[: beside + steps * samples], samples, beside)
         length = data.interval * samples
         return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
 

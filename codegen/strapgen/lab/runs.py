@@ -316,10 +316,10 @@ def require_finite(backend: Backend, states: Any, time: Array) -> None:
     broken = ~np.isfinite(states.reshape(len(states), -1)).all(axis=1)
     if broken.any():
         cause = "the increments are too large for the method"
-        if backend.takes == "increments" and backend.samples > 2:
+        if backend.takes == "increments" and backend.samples_per_step > 2:
             cause = (
-                f"the increments, or the rates of the polynomial through {backend.samples} of them, are too large for "
-                "the method"
+                f"the increments, or the rates of the polynomial through {backend.samples_per_step} of them, are too "
+                "large for the method"
             )
         raise InputError(
             f"the attitude is not finite from {time[broken][0]:.6g} s on; "
@@ -439,7 +439,7 @@ def _in_digits(motion: Motion, backend: Backend) -> tuple[_Steps, _Truth]:
     def steps_of(length: Fraction, count: int) -> Iterator[list[Any]]:
         rows = row(length / samples, -backend.previous, count * samples + backend.ahead)
         for k in range(0, count * samples, samples):
-            yield [x for vector in rows[k : k + backend.samples] for x in vector]
+            yield [x for vector in rows[k : k + backend.samples_per_step] for x in vector]
 
     return steps_of, truth
 
@@ -467,7 +467,7 @@ def _of_rate(motion: RateMotion) -> tuple[_Row, _Truth]:
 
 
 def _of_functions(motion: UsersMotion, backend: Backend) -> tuple[_Steps, _Truth]:
-    """Return what the functions of a file return, whose digits are those of double."""
+    """Return the increments and the attitude of a user's functions, in double precision."""
 
     def steps_of(length: Fraction, count: int) -> Iterator[list[Any]]:
         rows = motion.increments(length, count, backend.increments, backend.previous, backend.ahead)

@@ -156,7 +156,7 @@ def _on_recording(
     pulse = source.pulse
     data = source.recording()
     length = data.interval * choice.increments_per_step
-    _refuse_many(len(data.increments) / choice.increments_per_step, length, intervals.record)
+    _refuse_many(len(data.samples) / choice.increments_per_step, length, intervals.record)
     backend = build(length, lambda: data.largest + (pulse or 0.0))
     pulse = pulse or backend.count
     with waiting(f"running {backend.kernel}"):

@@ -129,16 +129,16 @@ def course(
     array([0.   , 0.   , 1.962])
     """
     checks.choice("backend", backend, BACKENDS)
-    checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
-    checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
+    fast_cycles = checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
+    slow_cycles = checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
     of_cycle = fast_cycles * slow_cycles
-    cycles, unused = divmod(len(recording.increments), of_cycle)
+    cycles, unused = divmod(len(recording.samples), of_cycle)
     if cycles < 1:
         raise InputError(
-            f"the recording holds {len(recording.increments)} increments; a navigation cycle needs {of_cycle}"
+            f"the recording holds {len(recording.samples)} increments; a navigation cycle needs {of_cycle}"
         )
     used = cycles * of_cycle
-    angles, velocities = recording.increments[:used], recording.velocity_increments[:used]
+    angles, velocities = recording.samples[:used], recording.velocity_increments[:used]
     if BACKENDS[backend].fixed:
         settings = settings or Settings()
         needed = two_speed_sources.ranges(

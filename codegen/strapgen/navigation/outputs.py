@@ -267,7 +267,7 @@ class OutputWord:
 
     def quantum(self, bits: int) -> Fraction:
         """Return the value of the last place of a word of so many bits, in `unit`."""
-        checks.count("bits", bits, smallest=_FEWEST, largest=_MOST)
+        bits = checks.count("bits", bits, smallest=_FEWEST, largest=_MOST)
         return Fraction(self.range, 1 << (bits - 1))
 
     def bits(self, part: Fraction = _PART) -> int:

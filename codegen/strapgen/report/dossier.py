@@ -171,7 +171,7 @@ def _compare(
         held, refused = Comparisons(), {}
         for name in backends:
             try:
-                held += rows([name])
+                held = Comparisons([*held, *rows([name])])
             except InputError as error:
                 refused[name] = str(error)
         return held, refused

@@ -264,7 +264,7 @@ class Content:
         ]
 
     def facts(self) -> list[tuple[str, str, str]]:
-        """Return what the page shows at its head: a name, a value, and a remark."""
+        """Return the facts at the head of the page: a name, a value, and a remark."""
         facts = []
         if self.tables:
             first = self.tables[0].backend
@@ -285,7 +285,7 @@ class Content:
         return facts
 
     def claim_rows(self) -> list[list[_PageCell]]:
-        """Return what tools said by claim: of each how many kernels have it, by the kind of result."""
+        """Return the verdicts of tools by claim: the number of kernels for each kind of result."""
         kinds = ("proved", "agrees", "fails", "not examined", "not installed")
         claims = dict.fromkeys(claim for shown in self.views for claim in shown.evidence)
         rows = []
@@ -315,7 +315,7 @@ def _figure(value: float | None, spec: str = _FIGURE) -> _PageCell:
 
 
 def _evidence_cell(evidence: Mapping[str, str]) -> _PageCell:
-    """Return how many claims tools have proved, and how many agree with what ran."""
+    """Return the number of proved claims, and of those that agree with runs."""
     if not evidence:
         return _PageCell("none on this code", None, mark="note")
     proved, agrees = (

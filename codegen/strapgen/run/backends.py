@@ -18,7 +18,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
-from strapgen.ir.renamed import renamed
+from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
@@ -54,7 +54,7 @@ KEEP_THE_ATTITUDE = frozenset(
 _DUAL_ROWS = "dcm-orthonormalize"
 
 
-@renamed(beside="companion")
+@renamed(samples="samples_per_step", beside="companion")
 class Backend:
     """An attitude algorithm that runs.
 
@@ -83,7 +83,7 @@ class Backend:
         Number of increments of a step.
     previous, ahead : int
         Numbers of increments from before the step and from after it that it takes in addition.
-    samples : int
+    samples_per_step : int
         Number of increments that a step takes in all.
     state_shape : tuple of int
         Shape of the state.
@@ -113,7 +113,7 @@ class Backend:
 
     def _in_words(self) -> str:
         state = f"state {counted_shape(self.state_shape)} {self.dtype}"
-        return f"{self.name}: {self.kernel}, {self.samples} {self.takes} a step, {state}"
+        return f"{self.name}: {self.kernel}, {self.samples_per_step} {self.takes} a step, {state}"
 
     def __init__(self, parts: StepSources) -> None:
         sources, kernels = parts.step, parts.step_kernels
@@ -124,9 +124,9 @@ class Backend:
         self.name = self.evaluator.name
         self.kernel = sources.kernel
         self.takes = samples.name
-        self.samples = samples.shape[0]
+        self.samples_per_step = samples.shape[0]
         self.previous, self.ahead = kernels.previous, kernels.ahead
-        self.increments = self.samples - kernels.extra_increments
+        self.increments = self.samples_per_step - kernels.extra_increments
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = kernels.attitude
@@ -254,23 +254,28 @@ class Backend:
         bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
         return bound if math.isfinite(bound) else None
 
-    def representable(self, increments: Any) -> Array:
-        """Return increments rounded to the numbers that the step takes: to `dtype`, or to a format."""
+    @renamed_parameters(increments="samples")
+    def representable(self, samples: Any) -> Array:
+        """Return samples, such as increments in rad, rounded to the numbers that the step takes.
+
+        These have the type `dtype`, or in fixed point a format.
+        """
         fixed = self.sources.fixed
-        values = np.asarray(increments, self.dtype)
+        values = np.asarray(samples, self.dtype)
         return values if fixed is None else in_si(self.evaluator.stored(1, values), fixed.inputs[1])
 
-    def prepared(self, increments: Any) -> Callable[[], Any]:
+    @renamed_parameters(increments="samples")
+    def prepared(self, samples: Any) -> Callable[[], Any]:
         """Return a call that propagates from zero rotation and records all states, for timing.
 
-        Every conversion of the increments is done before.
+        Every conversion of the samples is done before.
 
         Parameters
         ----------
-        increments : array_like, (N, K, 3)
+        samples : array_like, (N, K, 3)
             Angle increments in rad.
         """
-        rows = self._rows(np.asarray(increments, self.dtype)[None])
+        rows = self._rows(np.asarray(samples, self.dtype)[None])
         loop = self._begin(self.identity[None])
         return lambda: self.evaluator.loop(rows, loop)
 
@@ -287,14 +292,15 @@ class Backend:
                 f"kernel {self.kernel} takes {self.takes}; a step that takes increments is needed"
             )
 
-    def step(self, state: Any, increments: Any) -> Array:
+    @renamed_parameters(increments="samples")
+    def step(self, state: Any, samples: Any) -> Array:
         """Advance the state by one step.
 
         Parameters
         ----------
         state : array_like, (..., state shape)
             Body-to-reference attitude.
-        increments : array_like, (..., samples, 3)
+        samples : array_like, (..., samples a step, 3)
             Angle increments of the step in rad, body axes, oldest first, after those from before it.
 
         Returns
@@ -306,7 +312,7 @@ class Backend:
         InputError, InputTypeError
             If a shape, a dtype or a value does not fit.
         """
-        return np.asarray(self.evaluator(state, increments))
+        return np.asarray(self.evaluator(state, samples))
 
     def orthonormalize(self, state: Any) -> Array:
         """Restore the constraint of a state: its length, or its orthogonality.
@@ -327,19 +333,20 @@ class Backend:
             raise InputError(f"kernel {self.kernel} has nothing to orthonormalize its state with")
         return self._orthonormalization
 
+    @renamed_parameters(increments="samples")
     def propagate(
         self,
-        increments: Any,
+        samples: Any,
         record_every: int = 1,
         orthonormalize_every: int | None = None,
         initial: Any = None,
         jobs: int = 1,
     ) -> Array:
-        """Run the algorithm over a sequence of increments.
+        """Run the algorithm over a sequence of samples.
 
         Parameters
         ----------
-        increments : array_like, (..., N, samples, 3)
+        samples : array_like, (..., N, samples a step, 3)
             Angle increments of N steps in rad, body axes; leading axes are independent runs. `gyro.windows` cuts a
             row of increments into those of each step.
         record_every, orthonormalize_every : int, optional
@@ -368,11 +375,14 @@ class Backend:
         >>> backend("euler", backend="numpy").propagate(turn)[-1].round(6)
         array([0.      , 0.      , 0.707107, 0.707107])
         """
-        d = checks.real_array("increments", increments, (self.samples, 3), self.dtype)
+        d = checks.real_array("samples", samples, (self.samples_per_step, 3), self.dtype)
         if d.ndim < 3:
-            raise InputError(f"increments has shape {d.shape}; (..., steps, {self.samples}, 3) is needed")
+            raise InputError(
+                f"samples has shape {d.shape}; (..., steps, {self.samples_per_step}, 3) is needed"
+            )
         schedule = self._schedule(record_every, orthonormalize_every)
-        checks.count("jobs", jobs)
+        record_every = schedule["record_every"]
+        jobs = checks.count("jobs", jobs)
         start = self._start(initial)
         batch, steps = d.shape[:-3], d.shape[-3]
         try:
@@ -385,7 +395,7 @@ class Backend:
         runs = math.prod(batch)
         if not runs:
             return np.empty(shape, self.dtype)
-        rows = self._rows(d.reshape(runs, steps, self.samples, 3))
+        rows = self._rows(d.reshape(runs, steps, self.samples_per_step, 3))
         begun = self._begin(start.reshape(runs, *self.state_shape))
         history, _ = self.evaluator.loop(rows, replace(begun, **schedule, jobs=jobs))
         return self._states(history).reshape(shape)
@@ -422,14 +432,16 @@ class Backend:
         """
         if steps <= PART:
             return self.propagate(part(0, steps), record_every, orthonormalize_every, initial)
-        schedule = self._schedule(record_every, orthonormalize_every) | {"record_every": 1}
+        schedule = self._schedule(record_every, orthonormalize_every)
+        record_every, orthonormalize_every = schedule["record_every"], schedule.get("restore_every")
+        schedule["record_every"] = 1
         history = np.empty((1 + steps // record_every, *self.state_shape), self.dtype)
         history[0] = start = self._start(initial)
         loop = self._begin(np.broadcast_to(start, self.state_shape)[None])
         for first, count, restore_every in run_parts(steps, orthonormalize_every or 0):
-            increments = checks.real_array("increments", part(first, count), (self.samples, 3), self.dtype)
+            samples = checks.real_array("samples", part(first, count), (self.samples_per_step, 3), self.dtype)
             loop = replace(loop, **schedule | {"first": first, "restore_every": restore_every})
-            states, feedback = self.evaluator.loop(self._rows(increments[None]), loop)
+            states, feedback = self.evaluator.loop(self._rows(samples[None]), loop)
             loop = replace(loop, state=states[:, -1], feedback=feedback)
             ahead = -first % record_every or record_every
             recorded = self._states(states[0, ahead::record_every])
@@ -437,9 +449,9 @@ class Backend:
             history[place : place + len(recorded)] = recorded
         return history
 
-    def _rows(self, increments: Array) -> Array:
-        """Return increments, (runs, N, samples, 3), in the numbers of the code, (runs, N, elements)."""
-        return self.evaluator.stored(1, increments.reshape(*increments.shape[:2], 3 * self.samples))
+    def _rows(self, samples: Array) -> Array:
+        """Return samples, (runs, N, samples, 3), in the numbers of the code, (runs, N, elements)."""
+        return self.evaluator.stored(1, samples.reshape(*samples.shape[:2], 3 * self.samples_per_step))
 
     def _states(self, rows: Array) -> Array:
         """Return states in the numbers of the code, (..., elements), as numbers of the same shape."""
@@ -451,7 +463,7 @@ class Backend:
         return checks.real_array("initial", start, self.state_shape, self.dtype)
 
     def _begin(self, states: Array) -> Loop:
-        """Return what runs begin with, from states, (runs, state shape)."""
+        """Return the initial numbers of runs from states, (runs, state shape)."""
         return Loop(
             self.evaluator.stored(0, states.reshape(len(states), self.identity.size)),
             self.evaluator.fresh(len(states)),
@@ -460,10 +472,10 @@ class Backend:
 
     def _schedule(self, record_every: int, orthonormalize_every: int | None) -> dict[str, Any]:
         """Return the fields of a `Loop` that say when states are recorded and orthonormalized, checked."""
-        checks.count("record_every", record_every, largest=checks.MOST)
+        record_every = checks.count("record_every", record_every, largest=checks.MOST)
         if orthonormalize_every is None:
             return {"record_every": record_every}
-        checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
+        orthonormalize_every = checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
         restore = self.companion(self._need_orthonormalization())
         return {"record_every": record_every, "restore_every": orthonormalize_every, "restore": restore}
 

@@ -1,4 +1,4 @@
-"""The exact back end: programs in arithmetic of 40 digits, the reference for what rounding does on the others.
+"""The exact back end: programs in arithmetic of 40 digits, the reference for rounding errors of the others.
 
 Nothing is generated: the back end interprets the lowered program of a kernel on numbers of mpmath. Inputs are the exact
 numbers that doubles are, and results are rounded to double at the end. An `Interpreter` takes and returns all digits.
@@ -22,6 +22,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import OPERATIONS, Program
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.run.backends import Backend
 from strapgen.run.evaluators import Evaluator
@@ -89,22 +90,24 @@ class Interpreter:
         return self._constants[value]
 
 
-def states(program: Program, increments: Iterable[Sequence[Any]], initial: Sequence[Any]) -> list[list[Any]]:
+@renamed_parameters(increments="samples")
+def states(program: Program, samples: Iterable[Sequence[Any]], initial: Sequence[Any]) -> list[list[Any]]:
     """Return all states of a run of an attitude step in the digits that mpmath is set to, the initial one first.
 
     Angle increments of each step, and states, are row-major.
     """
-    return list(itertools.accumulate(increments, Interpreter(program), initial=list(initial)))
+    return list(itertools.accumulate(samples, Interpreter(program), initial=list(initial)))
 
 
-def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray[np.float64]:
-    """Run a step over increments in 40 digits.
+@renamed_parameters(increments="samples")
+def propagate(program: Program, samples: Any, initial: Any = None) -> NDArray[np.float64]:
+    """Run a step over samples in 40 digits.
 
     Parameters
     ----------
     program : Program
         An attitude step.
-    increments : array_like, (N, K, 3)
+    samples : array_like, (N, K, 3)
         Angle increments in rad, the exact numbers that the doubles are.
     initial : array_like, (state shape), optional
         State at the start, by default zero rotation.
@@ -127,7 +130,7 @@ def propagate(program: Program, increments: Any, initial: Any = None) -> NDArray
     """
     checks.require("propagate", program, Program)
     step = Backend(StepSources(sources_of_program(program, "exact")))
-    return step.propagate(checks.numbers("increments", increments), initial=initial)
+    return step.propagate(checks.numbers("samples", samples), initial=initial)
 
 
 def interpreter(name: str, step: Program | None = None) -> Interpreter:
@@ -162,14 +165,15 @@ class ExactEvaluator(Evaluator):
         return outputs, feedback
 
 
-def attitudes(backend: Backend, increments: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
+@renamed_parameters(increments="samples")
+def attitudes(backend: Backend, samples: Iterable[Sequence[Any]]) -> Iterator[list[Any]]:
     """Yield the matrices of a run of the back end "exact", row by row with all digits, from zero rotation on.
 
-    Increments are those of each step in rad, row-major, as numbers of mpmath.
+    Samples are the increments of each step in rad, row-major, as numbers of mpmath.
     """
     step, convert = backend.evaluator, backend.attitude and backend.companion(backend.attitude)
     assert isinstance(step, ExactEvaluator), "doubles hold no further digits"
     assert backend.sources.attitude_step is not None, "a back end runs an attitude step"
     state = [number(value) for value in backend.sources.attitude_step.identity]
-    for after in itertools.accumulate(increments, step.digits, initial=state):
+    for after in itertools.accumulate(samples, step.digits, initial=state):
         yield convert.digits(after) if isinstance(convert, ExactEvaluator) else after

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.renamed import renamed_parameters
 
 #: Most pulses that can be counted, since a double represents every whole number up to here.
 _MOST_PULSES = 2**53
@@ -19,12 +20,13 @@ _MOST_PULSES = 2**53
 PART = 128_000
 
 
-def windows(increments: Any, count: int, beside: int = 0) -> NDArray[np.float64]:
+@renamed_parameters(increments="samples")
+def windows(samples: Any, count: int, beside: int = 0) -> NDArray[np.float64]:
     """Cut a row of increments into the increments of each step.
 
     Parameters
     ----------
-    increments : array_like, (beside + N count, 3)
+    samples : array_like, (beside + N count, 3)
         Angle increments in rad, body axes.
     count : int
         Increments per step.
@@ -47,12 +49,12 @@ def windows(increments: Any, count: int, beside: int = 0) -> NDArray[np.float64]
     array([[ 0.,  3.,  6.],
            [ 6.,  9., 12.]])
     """
-    row = np.ascontiguousarray(checks.numbers("increments", increments))
-    checks.count("count", count)
-    checks.count("beside", beside, smallest=0)
+    row = np.ascontiguousarray(checks.numbers("samples", samples))
+    count = checks.count("count", count)
+    beside = checks.count("beside", beside, smallest=0)
     if row.ndim != 2 or row.shape[1] != 3 or (len(row) - beside) % count or len(row) < beside:
         raise InputError(
-            f"increments has shape {row.shape}; ({beside} + a multiple of {count}, 3) is needed for whole steps"
+            f"samples has shape {row.shape}; ({beside} + a multiple of {count}, 3) is needed for whole steps"
         )
     if not beside:
         return row.reshape(-1, count, 3)
@@ -62,8 +64,9 @@ def windows(increments: Any, count: int, beside: int = 0) -> NDArray[np.float64]
     return np.ascontiguousarray(np.moveaxis(overlapping, -1, 1))
 
 
+@renamed_parameters(increments="samples")
 @np.errstate(all="ignore")  # angles that overflow are refused, in one line
-def pulses(increments: Any, size: float | str | Fraction, beside: int = 0) -> NDArray[np.float64]:
+def pulses(samples: Any, size: float | str | Fraction, beside: int = 0) -> NDArray[np.float64]:
     """Return increments as a gyro that counts pulses measures them.
 
     The angle since the start is rounded to the nearest pulse, and each increment is a difference of rounded angles.
@@ -71,7 +74,7 @@ def pulses(increments: Any, size: float | str | Fraction, beside: int = 0) -> ND
 
     Parameters
     ----------
-    increments : array_like, (..., N, K, 3)
+    samples : array_like, (..., N, K, 3)
         Angle increments of N steps in rad, body axes; leading axes are independent runs.
     size : number
         Angle of a pulse in rad.
@@ -95,7 +98,7 @@ def pulses(increments: Any, size: float | str | Fraction, beside: int = 0) -> ND
     array([0., 1., 0., 1.])
     """
     pulse = float(checks.number("pulse", size, positive=True))
-    d = checks.numbers("increments", increments, (None, None, 3))
+    d = checks.numbers("samples", samples, (None, None, 3))
     if beside and d.ndim > 3 and d.size:
         return np.stack([pulses(run, size, beside) for run in d])
     if beside and d.size:

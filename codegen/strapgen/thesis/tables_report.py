@@ -88,7 +88,7 @@ def repair_notes(table: Table) -> list[str]:
 
 
 def _printed_rows(table: Table, algorithm: str) -> list[list[Any]]:
-    """Return the figures that the thesis prints of an algorithm, and what the scan reads where they are repaired."""
+    """Return the printed figures of an algorithm, and the misread ones of the scan where they are repaired."""
     row, scan = ["thesis"], ["scan"]
     for order, figure in zip(ORDERS, table.printed[algorithm], strict=True):
         row += [table.base if (algorithm, order) == ("dcm", 1) else "", figure, ""]
@@ -244,7 +244,7 @@ def _title(table: Table, entries: Sequence[_Figure]) -> str:
 
 
 def _place(algorithm: str, order: int) -> float:
-    """Return where the marks of an algorithm stand at an order."""
+    """Return the position of the marks of an algorithm at an order."""
     return ORDERS.index(order) + (_ASIDE if ALGORITHMS.index(algorithm) else -_ASIDE)
 
 

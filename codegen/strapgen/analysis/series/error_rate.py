@@ -259,7 +259,7 @@ def accumulate(choice: Choice, motion: str, terms: int = 2) -> RunDrift:
     -(b + g)*(a**4 + a**2*b**2 + a**2*b*g + 2*a**2*g**2 + b*g**3 + g**4)/(6*(a**2 + b**2 + 2*b*g + g**2))
     """
     checks.choice("motion", motion, catalogue.MOTIONS)
-    checks.count("terms", terms, largest=MOST_TERMS)
+    terms = checks.count("terms", terms, largest=MOST_TERMS)
     error = error_rate(choice, motion, 2 * terms)
     run = _steady_drift(error) if error.steady else _drift_about_an_axis(error)
     return replace(

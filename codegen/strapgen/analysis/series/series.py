@@ -177,7 +177,7 @@ def series(choice: AnyAlgorithm, motion: str = "general", terms: int = 2) -> Err
     (4, h**5*w_z*(w_x**2 + w_y**2 + w_z**2)**2/120)
     """
     motion_rates.require(motion)
-    checks.count("terms", terms, largest=MOST_TERMS)
+    terms = checks.count("terms", terms, largest=MOST_TERMS)
     attitude_step = one_step.step(choice)
     order = attitude_step.kernel.order
     # At a constant rate every other power is missing.
@@ -290,7 +290,7 @@ def effect(scheme: str, order: int = 2) -> dict[int, sp.Matrix]:
     True
     """
     checks.choice("scheme", scheme, catalogue.orthonormalizations("dcm"))
-    checks.count("order", order, largest=4)
+    order = checks.count("order", order, largest=4)
     kernel = pipeline.derive(scheme)
     ring, *elements = sp.ring([str(symbol) for symbol in ERROR], sp.QQ)
 

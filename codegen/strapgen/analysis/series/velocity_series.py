@@ -193,7 +193,7 @@ def series(choice: AnyAlgorithm, terms: int = 1) -> VelocitySeries:
     >>> one.order, one.as_dict()["velocity"]["3"]
     (2, '-1/12 w0 x f1 + 1/12 w1 x f0')
     """
-    checks.count("terms", terms, largest=MOST_TERMS)
+    terms = checks.count("terms", terms, largest=MOST_TERMS)
     kernel = pipeline.derive(choice)
     if not kernel.takes_velocity:
         raise InputError(

@@ -104,7 +104,7 @@ class Family:
         return ()
 
     def holds(self, expression: sp.Expr) -> bool:
-        """Tell whether an expression in the unknowns is zero for all members of the family."""
+        """Return whether an expression in the unknowns is zero for all members of the family."""
         numerator = sp.numer(sp.together(expression.xreplace(self.values)))
         numerator = sp.expand(numerator)
         if numerator == 0 or not self.equations:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -14,6 +13,7 @@ from strapgen.cli.output import TEXT_OUTPUT, Output, format_option
 from strapgen.cli.progress import waiting
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.storage import streams
 
 if TYPE_CHECKING:
     from strapgen.catalogue.methods.tableaux import Tableau
@@ -169,7 +169,7 @@ def tableau(
     from strapgen.analysis.unknowns.tableau_report import TableauResult, toml_text
     from strapgen.catalogue.methods import tableaux
 
-    is_file = method.endswith(".toml") or any(mark in method for mark in (os.sep, os.altsep) if mark)
+    is_file = streams.names_file(method)
     if is_file and unknown_tableau.has_unknowns(method):
         if not settings:
             _families(method, output)

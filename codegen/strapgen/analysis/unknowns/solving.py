@@ -184,7 +184,7 @@ def solve(choice: AnyAlgorithm, order: int | Mapping[str, int]) -> SolvedStep:
 
 
 def _statement(algorithm: AnyAlgorithm) -> tuple[Kernel, State]:
-    """Return the kernel of an algorithm, and what states the conditions on it."""
+    """Return the kernel of an algorithm, and the function that states its conditions."""
     choice = choose(algorithm)
     if choice.takes_velocity:
         kernel = pipeline.derive(choice)

@@ -197,7 +197,7 @@ class Sampling(NamedTuple):
 
 
 class _Term(NamedTuple):
-    """What products of one order and of the same phase add to the error of the mean rate."""
+    """A term of the error of the mean rate: products of one order and phase."""
 
     order: int
     #: How often the start phase of each tone is in that of the term; the first one that is not 0 is positive

@@ -96,7 +96,7 @@ def of(
 def _check_beside(signal: Signal, previous: int, ahead: int) -> None:
     """Refuse numbers of samples from beside a step that leave none for the step itself."""
     before = checks.count("previous", previous, smallest=0, largest=signal.size // 3 - 1)
-    checks.count("ahead", ahead, smallest=0, largest=signal.size // 3 - 1 - before)
+    ahead = checks.count("ahead", ahead, smallest=0, largest=signal.size // 3 - 1 - before)
 
 
 def require_kernel(kernel: Any) -> Kernel:

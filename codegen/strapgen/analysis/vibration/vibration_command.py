@@ -383,7 +383,7 @@ def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
 
 
 def _assess(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
-    """Return a case for each quantity of an algorithm that the options ask for."""
+    """Return a case for each requested quantity of an algorithm."""
     from strapgen.analysis.vibration import assessment, systems
     from strapgen.analysis.vibration.vibration_report import AssessedCase
 

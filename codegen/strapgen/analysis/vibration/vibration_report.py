@@ -42,7 +42,7 @@ _REPAIRS = {
 
 @dataclass(frozen=True)
 class AssessedCase:
-    """An assessment as it stands in a report."""
+    """An assessment in a report."""
 
     assessment: Assessment
     #: Fast cycles in a step of an algorithm in two speeds; None for any other algorithm

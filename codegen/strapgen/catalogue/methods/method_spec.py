@@ -130,7 +130,7 @@ class Integrator:
         return not self._is_taylor or samples < LEAST_WHOLE or self.order >= samples
 
     def select(self, asked: RequestedSamples) -> tuple[Integrator, StepSamples]:
-        """Return the method for the samples that are asked for, and the samples.
+        """Return the method and its samples for the requested ones.
 
         A Taylor series that ends before the rate's polynomial through many samples does is refused: the powers of time
         that it leaves out are of first order in the increments, and the step does not turn by their sum.

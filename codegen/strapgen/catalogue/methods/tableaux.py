@@ -260,7 +260,7 @@ class Tableau:
         return f"{__package__}.runge_kutta", "verified", (self,)
 
     def select(self, asked: RequestedSamples) -> tuple[Tableau, StepSamples]:
-        """Return the method for the samples that are asked for, and the samples."""
+        """Return the method and its samples for the requested ones."""
         return self, through_samples(self.name, asked)
 
     @property

@@ -126,7 +126,7 @@ class Window:
         return f"{__package__}.windowed", "method", (self,)
 
     def select(self, asked: RequestedSamples) -> tuple[Window, StepSamples]:
-        """Return the filters of the family with the samples that are asked for, and the samples."""
+        """Return the filters of the family for the requested samples, and the samples."""
         previous, ahead = asked.previous, asked.ahead
         if asked.rates:
             raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")

@@ -159,7 +159,7 @@ def sources(
 
 
 def _identifier(window: Window, algorithm: str, target: str, name: str | None) -> str:
-    """Return what the names of functions and files begin with."""
+    """Return the prefix of the names of functions and files."""
     infix = f"_w{WORD}" if BUILT_IN[target].fixed else real_of(target).infix
     default = f"{algorithm}_late_{window.name.removeprefix('window-')}".replace("-", "_") + infix
     identifier = default if name is None else name
@@ -344,7 +344,7 @@ def _in_fixed_point(
 
 
 def _unit(samples: Argument) -> str:
-    """Return in words what the integers of samples are."""
+    """Return the scale of the integers of samples in words."""
     if samples.sensor is not None:
         return f"counts of the gyro, unit {samples.sensor.unit}"
     return f"format {samples.format}, unit 2^-{samples.format.fraction} rad"

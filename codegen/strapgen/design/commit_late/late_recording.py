@@ -20,6 +20,7 @@ from strapgen.design.commit_late.late_filters import NEXT, REACH, SHORT, LateFil
 from strapgen.design.commit_late.late_unit import GapError, SampleKind, refusal
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.recordings.recording import History, Recording, record_interval
 from strapgen.run.backends import backend as attitude_backend
 from strapgen.run.backends import evaluator
@@ -27,9 +28,10 @@ from strapgen.run.evaluators import Array, Evaluator
 from strapgen.run.increments import StepWindows, pulses
 
 
+@renamed_parameters(increments="samples")
 def recording_attitudes(
     window: str | Window,
-    increments: Any,
+    samples: Any,
     kinds: Sequence[int] | None = None,
     *,
     algorithm: str = "euler",
@@ -43,7 +45,7 @@ def recording_attitudes(
     ----------
     window : str or Window
         A window of the catalogue by its name, or a family of filters.
-    increments : array_like, (N, 3)
+    samples : array_like, (N, 3)
         Angle increments of the intervals in rad, body axes; of no meaning where they were lost.
     kinds : sequence of int, (N,), optional
         What each sample is, as for `CommitLate.push`; by default all are good.
@@ -78,9 +80,9 @@ def recording_attitudes(
     """
     filters = commit_late_sources.family(window, sample_hz)
     checks.choice("backend", backend, ("numpy", "c", "c-float"))
-    row = checks.real_array("increments", increments, (3,))
+    row = checks.real_array("samples", samples, (3,))
     if row.ndim != 2:
-        raise InputError(f"increments has shape {row.shape}; (N, 3) is needed")
+        raise InputError(f"samples has shape {row.shape}; (N, 3) is needed")
     row = _restore(row, np.zeros(len(row), int) if kinds is None else np.asarray(kinds), filters)
     step, rotation, normalization = commit_late_sources.kernels(filters, algorithm)
     loop = attitude_backend(step, backend=backend)
@@ -126,7 +128,7 @@ def _few(row: Array, place: int, filters: LateFilters) -> Array:
 
 
 def _restore(row: Array, kinds: Array, filters: LateFilters) -> Array:
-    """Return the samples with the lost ones restored, and those merged with them taken apart."""
+    """Return the samples with lost ones restored, and merged samples split."""
     if kinds.shape != (len(row),) or kinds.dtype.kind not in "iu":
         raise InputError(
             f"kinds has shape {kinds.shape}; a whole number for each of {len(row)} samples is needed"
@@ -200,7 +202,7 @@ def propagate_whole(
     window = choice.window
     if window is None or not covers(choice, backend):
         raise InputError(f"{choice.kernel} on back end {backend} does not cover the ends of a recording")
-    row, step = recording.increments, recording.interval
+    row, step = recording.samples, recording.interval
     if not len(row):
         raise InputError("the recording holds 0 increments; a step needs 1")
     if orthonormalize is not None:

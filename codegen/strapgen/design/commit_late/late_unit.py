@@ -242,7 +242,7 @@ def state_argument(step: Sources) -> Argument:
 
 
 def sample_integers(argument: Argument, values: Any, kind: int, rest: Array) -> tuple[Array, Array]:
-    """Return a sample in rad, (3,), as nearest integers, and what rounding leaves for the next one.
+    """Return a sample in rad, (3,), as nearest integers, and the remainder for the next one.
 
     As from a gyro that counts pulses, the error of a sum of samples is at most a unit: `rest` is what the samples
     before have left, in units. A sample outside its range, or that of the sum of two, is refused.
@@ -314,7 +314,7 @@ class LateUnitInC:
         return status
 
     def _refusal(self, status: int, kind: int, gap: int, count: int) -> InputError:
-        """Return the error that a status stands for."""
+        """Return the error for a status."""
         if self.fixed is not None and status == -1:
             return InputError("a sample lies outside the range of its format")
         if self.fixed is not None and status == -2:

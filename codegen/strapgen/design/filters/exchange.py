@@ -50,7 +50,7 @@ class Responses(NamedTuple):
     right: list[int]
 
     def errors(self, free: Sequence[Any]) -> list[int]:
-        """Return what the unknowns leave of the right side at each point."""
+        """Return the residual of the right side at each point."""
         if not free:
             return self.right
         weights = [integer(value) for value in free]
@@ -61,7 +61,7 @@ class Responses(NamedTuple):
 
 
 class Problem(Protocol):
-    """A function of frequency that is linear in its unknowns, and is to be as small as possible."""
+    """A minimization problem: a function of frequency that is linear in its unknowns."""
 
     @property
     def title(self) -> str:
@@ -170,7 +170,7 @@ def _start(problem: Problem, band: Fraction) -> list[Any]:
 
 
 def orthonormal(answers: Responses) -> tuple[list[list[float]], list[float]]:
-    """Return orthonormal columns and what they leave of the right side, scaled to at most 1, in double precision."""
+    """Return orthonormal columns and the residual of the right side, scaled to at most 1, in double precision."""
     basis: list[list[int]] = []
     for column in [*answers.columns, answers.right]:
         for other in basis * 2:

@@ -88,7 +88,7 @@ class Algorithm(Protocol):
         """Return the certified drift of the fixed-point code with as little error feedback as meets a limit."""
 
     def cost(self, carry: str) -> ProcessorCost:
-        """Return what the fixed-point code costs on the processor of the brief."""
+        """Return the cost of the fixed-point code on the processor of the brief."""
 
     def steady(self) -> Any:
         """Return the algorithm as `random_runs` runs it."""

@@ -62,7 +62,7 @@ def truncation(choice: Choice, brief: DesignBrief) -> float:
             step_length(choice, brief.gyro)
         )
         sample = [mpmath.mpf(0), mpmath.mpf(0), angle / choice.increments]
-        row = sample * backend.samples
+        row = sample * backend.samples_per_step
         *_, c = exact.attitudes(backend, [row])
         lost = angle - mpmath.atan2(c[3] - c[1], c[0] + c[4])
         turns = 2 * mpmath.pi

@@ -72,7 +72,7 @@ class SelectionResult(Result):
 
 
 def _table(brief: DesignBrief, ordered: Sequence[Judgement], refused: bool) -> TextTable:
-    """Return what a reader compares: drifts by cause, and costs."""
+    """Return the table for a reader: drifts by cause, and costs."""
     measured = brief.processor.is_measured
     columns = [
         Column("algorithm", "<"),

@@ -225,7 +225,7 @@ def _record(step: Fraction, steps: int) -> Fraction:
 
 
 def _slope(run: Run) -> float:
-    """Return the slope of the error in deg/h; records in the middle weigh most, so that what swings cancels."""
+    """Return the slope of the error in deg/h; records in the middle weigh most, so that oscillations cancel."""
     time = run.time - run.time.mean()
     weights = np.hanning(len(time) + 2)[1:-1]
     time = time - np.average(time, weights=weights)

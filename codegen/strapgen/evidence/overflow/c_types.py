@@ -1,4 +1,4 @@
-"""The integer types of C on two kinds of processors, and the type of what an operator returns."""
+"""The integer types of C on two kinds of processors, and the result types of operators."""
 
 from __future__ import annotations
 

@@ -170,7 +170,7 @@ class ExpressionFormulas:
         return number.as_type(self.model.promoted(number.kind))
 
     def converted(self, number: Number, kind: IntegerType) -> Number:
-        """Return a number as another type has it: the same one, which must fit; without a sign, what remains of it."""
+        """Convert a number to another type: it must fit a signed type; an unsigned type keeps the low bits."""
         if kind.signed or number.low >= 0:
             if kind.low <= number.low and number.high <= kind.high:
                 return number.as_type(kind)

@@ -106,7 +106,7 @@ class BitVectorFunction:
         self.safe: list[Any] = []
 
     def result(self, arguments: Mapping[str, Bits]) -> Bits:
-        """Return what a call returns."""
+        """Return the result of a call."""
         known = dict(arguments)
         for statement in self._function.body.block_items:
             match statement:

@@ -120,7 +120,7 @@ class ForeignResult(Result):
         return without_words(self.findings)
 
     def text(self) -> str:
-        """Return the findings, a line each, and the likely cause of what fails."""
+        """Return the findings, a line each, and the likely cause of a failure."""
         lines = [f"{self.file}: {self.function}", "", *map(finding_text, self.findings)]
         return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
 
@@ -195,7 +195,7 @@ class _Check:
         return Finding(name, False, text, measured)
 
     def calls(self, done: ForeignRun) -> Finding:
-        """Return the finding on how calls end, and on what they do to memory."""
+        """Return the finding on crashes of calls, and on writes outside of their memory."""
         if done.stopped:
             return self.failed("calls", done.stopped)
         if done.writes_beyond:

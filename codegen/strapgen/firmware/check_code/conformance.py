@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, overload
 
 import mpmath
 import numpy as np
@@ -114,7 +114,11 @@ class FindingsResult(Result):
     def __len__(self) -> int:
         return len(self.findings)
 
-    def __getitem__(self, place: int) -> Finding:
+    @overload
+    def __getitem__(self, place: int) -> Finding: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Finding]: ...
+    def __getitem__(self, place: int | slice) -> Finding | Sequence[Finding]:
         return self.findings[place]
 
     @property

@@ -205,7 +205,7 @@ def _ideals(samples: int) -> Iterator[tuple[Table, Table]]:
 
 
 def _one_by_one(samples: int) -> tuple[Table, Table]:
-    """Return the right correction of a function that turns by each sample on its own, and what it is added to."""
+    """Return the right correction of a function that rotates by each sample separately, and its base products."""
     coefficient = float(design(1, 1).pairs[0, 1])
     turned = {(older, newer): 0.5 for newer in range(samples) for older in range(newer)}
     return {(newer - 1, newer): coefficient for newer in range(samples)}, turned
@@ -220,7 +220,7 @@ def _delayed(ideal: Table, samples: int) -> Iterator[Table]:
 
 
 def _reversed(table: Table, samples: int, visible: Table) -> Table:
-    """Return what is seen of coefficients where the samples of each call are taken from the last to the first.
+    """Return the measured coefficients if the samples of each call are taken in reverse order.
 
     Of a correction that is even in this order, as that of added samples often is, it is the wrong sign.
     """
@@ -234,7 +234,7 @@ def _reversed(table: Table, samples: int, visible: Table) -> Table:
 
 
 def _is_earlier_reversed(now: Table, samples: int, noise: float) -> bool:
-    """Return whether coefficients are right if the samples from before a call stand from the newest to the oldest."""
+    """Return whether coefficients are right if the samples before a call are in order from new to old."""
     known = [(ideal, _less(now, base)) for ideal, base in _ideals(samples)]
     if any(_alike(correction, ideal, noise) for ideal, correction in known):
         return False  # those from before a call are too small to tell

@@ -60,7 +60,7 @@ class ForeignArgument:
 
     @property
     def size(self) -> int:
-        """Number of its numbers."""
+        """Number of elements."""
         return prod(self.shape)
 
 

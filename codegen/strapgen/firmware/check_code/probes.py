@@ -218,7 +218,7 @@ def convention_of(step: ForeignStep, declared: Directions) -> tuple[Convention |
 
 
 def fits(response: Array) -> bool:
-    """Return whether rotations about the axes come out as they are fed."""
+    """Return whether the computed rotations about the axes equal the input."""
     return bool(np.abs(response - np.eye(3)).max() < DIRECTION_WITHIN)
 
 
@@ -271,7 +271,7 @@ def in_words(step: ForeignStep, response: Array) -> str:
 
 
 def _factor(step: ForeignStep, factor: float) -> str:
-    """Return in words why rotations come out so many times as large as they are fed."""
+    """Return in words the cause of rotations that are too large by a factor."""
     interval = float(step.interval)
     known = {
         math.degrees(1): "degrees for radians, it turns radians into degrees",

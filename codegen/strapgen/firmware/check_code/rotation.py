@@ -231,7 +231,7 @@ def _exponential(generators: Array, terms: int) -> Array:
 
 
 def _replace(transitions: Array, states: Array, reads: _Reads) -> Array:
-    """Return states (N, E) after an update whose elements read what is replaced already."""
+    """Return states (N, E) after an update in place whose elements read elements replaced before."""
     after = states.copy()
     elements = range(states.shape[1])
     for k in reversed(elements) if reads.downwards else elements:

@@ -26,6 +26,11 @@ class MotionEntry(NamedTuple):
     #: Parameters in SI units that can be left out as long as another one is set
     defaults: Mapping[str, float] = {}
 
+    @property
+    def title(self) -> str:
+        """Its parameters with their units."""
+        return ", ".join(f"{name} in {unit}" for name, unit in self.parameters.items())
+
 
 #: The motions of strapgen: those in closed form, then those that only runs know.
 TABLE = {
@@ -54,7 +59,7 @@ MOTIONS = Registry("motions", MotionEntry)
 
 
 def is_file(name: str) -> bool:
-    """Tell whether the name of a motion is that of a file."""
+    """Return whether the name of a motion is that of a file."""
     return name.endswith(".py")
 
 

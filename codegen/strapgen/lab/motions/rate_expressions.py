@@ -171,7 +171,7 @@ class Jets:
         return _Jet(value, [_largest(value) if self.bounds else value, *rest])
 
     def divisor(self, value: Any) -> Any:
-        """Return what a quotient is divided by."""
+        """Return the divisor of a quotient."""
         if not self.bounds:
             if value == 0:
                 raise UnboundedError

@@ -110,7 +110,7 @@ def _number(time: float) -> Any:
 
 @dataclass(frozen=True)
 class _Piece:
-    """An interval of time with the Taylor coefficients of what is integrated over it."""
+    """An interval of time with the Taylor coefficients of rate and attitude."""
 
     #: Middle and half the length, in s
     middle: Any
@@ -296,7 +296,7 @@ def _integrate(rate: list[list[Any]]) -> list[list[Any]]:
 
 
 def _series_at(series: list[list[list[Any]]], x: Any) -> list[list[Any]]:
-    """Return a matrix of Taylor series at a time from where they begin."""
+    """Evaluate a matrix of Taylor series at a time after their origin."""
     powers = [mp.mpf(1)]
     for _ in range(ATTITUDE_DEGREE):
         powers.append(powers[-1] * x)

@@ -156,7 +156,7 @@ def _found_places(cells: Sequence[_HeaderCell] | None, width: int, has_time: boo
 
 
 def _is_other(cell: _HeaderCell) -> bool:
-    """Tell whether a column is one of another sensor, or of an attitude."""
+    """Return whether a column is one of another sensor, or of an attitude."""
     match = _AXIS.fullmatch(cell.name)
     return match is not None and _OTHER.fullmatch(match[1].strip("_")) is not None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import mmap
 import re
@@ -24,6 +25,7 @@ from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.units import TIMES
 from strapgen.lab.recordings.recorded_header import ColumnLayout
+from strapgen.storage import streams
 
 Array = NDArray[np.float64]
 
@@ -358,7 +360,7 @@ def line_blocks(path: Path) -> Iterator[list[str]]:
     """Yield the lines of a file, some thousands at a time."""
     count = 0
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with io.TextIOWrapper(streams.opened(path), encoding="utf-8-sig", newline="") as file:
             while block := list(islice(iter(lambda: file.readline(MOST_CHARACTERS + 1), ""), _BLOCK)):
                 if max(map(len, block)) > MOST_CHARACTERS:
                     number = (

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
+from strapgen.ir.renamed import renamed
 from strapgen.lab.recordings.recorded_header import (
     ColumnLayout,
     known_unit,
@@ -53,6 +54,7 @@ _EVEN = 1e-3
 GAP = 10
 
 
+@renamed(increments="samples")
 @dataclass(frozen=True)
 class Recording:
     """Angle increments at even intervals.
@@ -63,7 +65,7 @@ class Recording:
         Time in s at which the first increment begins.
     interval : float
         Sampling interval in s.
-    increments : array, (N, 3)
+    samples : array, (N, 3)
         Angle increments in rad, body axes.
     remarks : tuple of str, optional
         What was left out of the file or taken in place of what it lacks, a sentence each.
@@ -71,21 +73,25 @@ class Recording:
 
     start: float
     interval: float
-    increments: Array
+    samples: Array
     remarks: tuple[str, ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
 
+    def __post_init__(self) -> None:
+        hold_arrays(self)
+
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"
-        return f"of {len(self.increments)} increments of {times}, up to {self.largest:.4g} rad"
+        return f"of {len(self.samples)} increments of {times}, up to {self.largest:.4g} rad"
 
     @property
     def largest(self) -> float:
         """Largest magnitude of an element of the increments, in rad."""
-        return largest_magnitude(self.increments)
+        return largest_magnitude(self.samples)
 
 
+@renamed(increments="samples")
 @dataclass(frozen=True)
 class InertialRecording(Recording):
     """Angle and velocity increments at even intervals.
@@ -156,7 +162,7 @@ def read_increments(path: str | Path) -> Recording:
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
     >>> _ = log.write_text("t,dx,dy,dz\n0.1,0,0,1e-3\n0.2,0,0,2e-3\n")
-    >>> read_increments(log).increments[:, 2]
+    >>> read_increments(log).samples[:, 2]
     array([0.001, 0.002])
     """
     start, interval, values = _even_increments(checks.path("path", path), _INCREMENT_COLUMNS)
@@ -247,9 +253,9 @@ def read_rates(
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
     >>> _ = log.write_text("t [s],x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n")
-    >>> read_rates(log, "rad/s").increments[:, 2]
+    >>> read_rates(log, "rad/s").samples[:, 2]
     array([2., 3.])
-    >>> read_rates(log, "rad/s", resample_hz=2).increments[:, 2]
+    >>> read_rates(log, "rad/s", resample_hz=2).samples[:, 2]
     array([0.75, 1.25, 1.5 , 1.5 ])
     """
     path = checks.path("path", path)
@@ -337,11 +343,11 @@ def propagate(
     backend.need_increments()
     step = recording.interval * backend.increments
     steps, unused = divmod(
-        max(0, len(recording.increments) - backend.samples + backend.increments), backend.increments
+        max(0, len(recording.samples) - backend.samples_per_step + backend.increments), backend.increments
     )
     if steps < 1:
         raise InputError(
-            f"the recording holds {len(recording.increments)} increments; a step needs {backend.samples}"
+            f"the recording holds {len(recording.samples)} increments; a step needs {backend.samples_per_step}"
         )
     record_every = 1 if record is None else record_interval("record", record, step)
     every = None if orthonormalize is None else record_interval("orthonormalize", orthonormalize, step)
@@ -349,8 +355,8 @@ def propagate(
         raise InputError(f"record {record} s is longer than the recording, {steps * step:.6g} s")
 
     def read(first: int, stop: int) -> Array:
-        release(recording.increments)  # what was read of a long one before
-        return recording.increments[first:stop]
+        release(recording.samples)  # what was read of a long one before
+        return recording.samples[first:stop]
 
     parts_of_run = StepWindows(read, backend.increments, backend.previous + backend.ahead, pulse)
     states = backend.propagate_parts(parts_of_run, steps, record_every, every)
@@ -413,7 +419,7 @@ def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, flo
 
 
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
-    """Return how many steps an interval in s is, to a hundredth of a step."""
+    """Return the number of steps in an interval in s, to a hundredth of a step."""
     ratio = float(checks.number(what, value, positive=True)) / step
     if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")

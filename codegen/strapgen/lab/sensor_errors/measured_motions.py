@@ -168,7 +168,7 @@ def measured_recording(recording: Recorded, errors: InstrumentErrors, run: int =
         raise InputError(
             "the errors of the gyros depend on acceleration, and the recording has no velocity increments"
         )
-    angle = np.empty(recording.increments.shape)
+    angle = np.empty(recording.samples.shape)
     velocity = np.empty(angle.shape if inertial else (0, 3))
     unit = MeasurementUnit(errors, recording.interval, run)
     for first in range(0, len(angle), _PART):
@@ -178,10 +178,10 @@ def measured_recording(recording: Recorded, errors: InstrumentErrors, run: int =
             if isinstance(recording, InertialRecording)
             else None
         )
-        angle[part], sensed = unit(np.asarray(recording.increments[part]), of_part)
+        angle[part], sensed = unit(np.asarray(recording.samples[part]), of_part)
         if inertial:
             velocity[part] = sensed
-    changes: dict[str, Any] = {"increments": angle} | ({"velocity_increments": velocity} if inertial else {})
+    changes: dict[str, Any] = {"samples": angle} | ({"velocity_increments": velocity} if inertial else {})
     return replace(recording, **changes)
 
 

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from strapgen.ir import checks
+from strapgen.storage import streams
 
 _FOLDER = Path(__file__).parent / "built_in_files"
 
@@ -24,13 +25,19 @@ def names() -> dict[str, str]:
 
 def _title(path: Path) -> str:
     """Return the title that a built-in file states."""
-    return next(line.split('"')[1] for line in path.read_text().splitlines() if line.startswith("title"))
+    return next(
+        line.split('"')[1]
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if line.startswith("title")
+    )
 
 
 def is_system(name: object) -> bool:
-    """Tell whether a name stands for a described system: a built-in one, or a file that ends with .toml."""
+    """Return whether a name stands for a described system: a built-in one, a file that ends with .toml, or -."""
     text = os.fspath(name) if isinstance(name, os.PathLike) else name
-    return isinstance(text, str) and (text.endswith(".toml") or (_FOLDER / f"{text}.toml").is_file())
+    return isinstance(text, str) and (
+        text == "-" or text.endswith(".toml") or (_FOLDER / f"{text}.toml").is_file()
+    )
 
 
 def file_of(name: str | Path) -> Path:
@@ -40,7 +47,7 @@ def file_of(name: str | Path) -> Path:
     ('two-speed-dcm.toml', 'mine.toml')
     """
     path = checks.path("system", name)
-    if path.suffix or len(path.parts) != 1 or path.exists():
+    if path == streams.STANDARD or path.suffix or len(path.parts) != 1 or path.exists():
         return path
     checks.choice("system", str(name), names(), "a TOML file")
     return _FOLDER / f"{name}.toml"

@@ -26,7 +26,7 @@ from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
 
 @dataclass(frozen=True)
 class GeneratedStages:
-    """The generated stages of a system, and in fixed point the formats of what passes between them."""
+    """The generated stages of a system, and in fixed point the formats between them."""
 
     description: Description
     #: Target of the stages

@@ -66,7 +66,7 @@ class Ports:
         return next((state for state, output in self.states.items() if output == signal), None)
 
     def start(self, signal: Signal) -> tuple[Fraction, ...]:
-        """Return what a signal is before the first cycle if the file does not say so: no rotation, or zero."""
+        """Return the default value of a signal before the first cycle: no rotation, or zero."""
         step = self.program.attitude_step
         if step is not None and signal.name == self.program.inputs[0].name:
             return step.identity

@@ -15,6 +15,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import CARRIES
 from strapgen.ir.formats import LONGEST_WORD, SHORTEST_WORD
 from strapgen.ir.signals import ANY, FRAMES
+from strapgen.storage import streams
 from strapgen.targets.names import PYTHON, C
 
 #: Most stages of a system, and most cycles from one call of a stage to the next.
@@ -280,7 +281,9 @@ SYSTEM = UserFile("a system", SystemFile, 1 << 20)
 
 def read(path: str | Path, sample_hz: Fraction | None = None) -> SystemText:
     """Read the file of a system."""
-    name = re.sub(r"[^a-z0-9]+", "_", checks.path("path", path).stem.lower()).strip("_")
+    place = checks.path("path", path)
+    stem = "system" if place == streams.STANDARD else place.stem
+    name = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
     return SYSTEM.convert(path, lambda file: file.described(name, sample_hz))
 
 

@@ -253,7 +253,7 @@ class _CPrinter(_Printer):
         yield from [*(f"    {line}" for line in after), "}"]
 
     def _differs(self, stage: SystemStage, name: str, cell: str) -> bool:
-        """Tell whether an argument of a stage has another format or type than the cell on its wire."""
+        """Return whether an argument of a stage has another format or type than the cell on its wire."""
         argument, held = self._argument(stage, name), self.arguments.get(cell)
         return argument is not None and held is not None and argument.format != held.format
 

@@ -176,14 +176,14 @@ def system_course(
     runner: SystemRunner, recording: Recording, memory: SystemMemory | None = None
 ) -> SystemCourse:
     """Run a system along a recording, one increment of the sensors for each cycle of the samples."""
-    cycles, unused = divmod(len(recording.increments), runner.system.cycle)
+    cycles, unused = divmod(len(recording.samples), runner.system.cycle)
     if not cycles:
         raise InputError(
-            f"the recording holds {len(recording.increments)} increments; a cycle of the slowest rate needs "
+            f"the recording holds {len(recording.samples)} increments; a cycle of the slowest rate needs "
             f"{runner.system.cycle}"
         )
     count = cycles * runner.system.cycle
-    angle = np.asarray(recording.increments[:count])
+    angle = np.asarray(recording.samples[:count])
     velocity = np.asarray(getattr(recording, "velocity_increments", np.zeros_like(angle))[:count])
     run = runner.run(samples(runner.fit.description, angle, velocity), memory)
     return SystemCourse(runner.system, recording.start, recording.interval, dict(run.values), unused)

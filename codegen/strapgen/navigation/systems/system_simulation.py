@@ -97,7 +97,7 @@ def recorded(source: SampleSource) -> Recording:
         return data
     from strapgen.run.increments import pulses
 
-    return replace(data, increments=pulses(data.increments[:, None], source.pulse)[:, 0])
+    return replace(data, samples=pulses(data.samples[:, None], source.pulse)[:, 0])
 
 
 def refuse_options(method: MethodOptions | None, fixed: FixedOptions, others: list[str]) -> None:
@@ -180,7 +180,7 @@ def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDA
     if source.motion is None:
         data = recorded(source)
         description = described_along(name, data)
-        angle = np.asarray(data.increments)
+        angle = np.asarray(data.samples)
         return description, samples(description, angle, np.zeros_like(angle)), Path(source.file).name
     description, profile = described_at(name, source), source.profile()
     assert source.duration is not None, "a motion has a duration"

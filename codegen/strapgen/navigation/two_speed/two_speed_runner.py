@@ -172,8 +172,8 @@ class TwoSpeed:
         InputError, InputTypeError
             If a shape, a dtype or a value does not fit.
         """
-        checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
-        checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
+        fast_cycles = checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
+        slow_cycles = checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
         angles, velocities = _samples(increments, velocity_increments, fast_cycles * slow_cycles)
         ends = len(angles) // fast_cycles + 1
         rates = np.zeros((ends, 3)) if turns is None else turns

@@ -297,7 +297,7 @@ class TwoSpeedLoops:
         return self
 
     def runner(self) -> TwoSpeedLoops:
-        """Return what has `propagate` and `matrices`, see `random_runs.SteadyRuns`."""
+        """Return the object with `propagate` and `matrices`, see `random_runs.SteadyRuns`."""
         return self
 
     def propagate(self, increments: Any, record_every: int = 1, initial: Any = None) -> Any:

@@ -69,7 +69,7 @@ def description(algorithm: str, sculling: int = 2) -> Description:
 def _text(algorithm: str, sculling: int) -> system_file.SystemText:
     """Return the file of the built-in system with the loops of an algorithm."""
     checks.choice("algorithm", algorithm, ALGORITHMS)
-    checks.count("sculling", sculling, largest=len(SCULLING))
+    sculling = checks.count("sculling", sculling, largest=len(SCULLING))
     return _read(f"two-speed-{algorithm}" if sculling == 2 else f"two-speed-{algorithm}-{sculling}")
 
 
