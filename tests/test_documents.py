@@ -149,9 +149,9 @@ def test_the_commands_of_the_readme_run_in_a_new_clone(new_clone):
 
 
 def missing(excerpt: str, text: str) -> list[str]:
-    """Return which parts of an excerpt, between lines of three dots, do not stand in a text in this order."""
+    """Return which parts of an excerpt, between three dots at ends of lines, do not stand in a text in this order."""
     place, lost = 0, []
-    for part in re.split(r"^\.\.\.\n", excerpt, flags=re.MULTILINE):
+    for part in re.split(r"\.\.\.\n", excerpt):
         start = text.find(part, place)
         if start < 0:
             lost.append(part)
@@ -173,6 +173,7 @@ def test_an_excerpt_that_differs_is_seen():
     assert missing("a\nb\n...\nd\n", "a\nb\nc\nd\n") == []
     assert missing("a\nc\n", "a\nb\nc\n") == ["a\nc\n"]
     assert missing("c\n...\na\n", "a\nb\nc\n") == ["a\n"]
+    assert missing("a, ...\nc\n", "a, b\nc\n") == [] and missing("a, ...\nc\n", "a b\nc\n") == ["a, "]
 
 
 def test_readme_is_short_and_begins_with_the_essentials():
@@ -435,6 +436,30 @@ def test_a_command_of_a_page(command, workplace, capsys, monkeypatch):
     if "--variant" in command or command.startswith("strapgen build"):
         shutil.copy(ROOT / "examples/variants/strapgen.toml", workplace)
     run(with_less(command), capsys)
+
+
+def shown_outputs() -> Iterator[tuple[str, str]]:
+    """Yield the commands of the pages that stand above what they print, and that; of several, the last command."""
+    for text in DOCS.values():
+        for above, output in re.findall(r"((?:^    .*\n)+)\n```text\n((?:(?!```).*\n)*)", text, re.MULTILINE):
+            if commands := shown_commands(above):
+                yield commands[-1], output
+
+
+@pytest.mark.parametrize(
+    ("command", "output"),
+    [
+        pytest.param(*pair, marks=pytest.mark.long if pair[0].startswith(LONG_COMMANDS) else (), id=pair[0])
+        for pair in shown_outputs()
+    ],
+)
+def test_a_command_prints_what_the_page_shows(command, output, workplace, capsys):
+    if "--cpu cortex" in command and shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("arm-none-eabi-gcc is not on this machine")
+    printed = run(command, capsys)
+    if (compiler := re.search(r"^compiled by .*", output, re.MULTILINE)) and compiler[0] not in printed:
+        pytest.skip(f"{compiler[0]} on the page, another compiler here")
+    assert missing(output, printed) == []
 
 
 def with_less(command: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import inspect
+import json
 import os
 import re
 import stat
@@ -135,7 +136,32 @@ def test_the_formulas_of_a_notebook_are_formulas_on_its_page():
     assert "```{math}\n:no-wrap:\n\n\\begin{align*}" in text and "```text\n" in text
 
 
+def test_long_output_of_a_notebook_is_folded_and_all_output_is_in_a_fixed_font():
+    def page(lines: int) -> str:
+        output = {"text": [f"line {k}\n" for k in range(lines)]}
+        cell = {"cell_type": "code", "source": ["run()"], "outputs": [output]}
+        return repository_pages.notebook(json.dumps({"cells": [cell]}))
+
+    short, long = page(repository_pages.OPEN_LINES), page(repository_pages.OPEN_LINES + 1)
+    assert "<details>" not in short and short.count("```text\nline 0\n") == 1
+    assert re.search(r"<details>\n<summary>9 lines of output</summary>\n\n```text\nline 0\n", long)
+    assert long.endswith("line 8\n```\n\n</details>\n")
+
+
+def test_examples_and_notebooks_are_pages_and_folders_of_many_files_are_copies(staged):
+    notebooks = {path.name for path in (ROOT / "examples" / "notebooks").glob("*.ipynb")}
+    assert {path.stem for path in (staged / "repository/examples/notebooks").glob("*.md")} == notebooks
+    assert (staged / "repository/generated/c_fixed/euler_rk4_2_w32.c.txt").is_file()
+
+
 # Reference
+
+
+def test_the_reference_opens_with_a_map(staged):
+    text = (staged / "reference" / "index.md").read_text()
+    assert text.startswith("# Reference\n\n| you look up | it is in |\n")
+    targets = set(re.findall(r"\]\(/([^)]+)\)", text.split("\n\n## ")[0]))
+    assert {"reference/commands/index.md", "reference/python/index.rst", "user-files.md"} < targets
 
 
 def test_every_public_name_is_in_the_reference():
@@ -313,6 +339,39 @@ def test_the_built_reference_has_every_name_and_every_command(site):
 @pytest.mark.parametrize("part", range(4))
 def test_pages_fit_a_telephone_and_a_desk_and_ask_nothing_of_others(site, browser, part):
     assert [fault for path in sorted(read(site))[part::4] for fault in faults(browser, path)] == []
+
+
+#: Code that is wider than its box and has no shade at its edge, and pictures that are drawn too small.
+UNREADABLE = """() => {
+  const wide = [...document.querySelectorAll("article pre")].filter(box => box.scrollWidth > box.clientWidth + 1);
+  const bare = wide.filter(box => getComputedStyle(box).backgroundImage.split("linear-gradient").length !== 5);
+  const small = [...document.querySelectorAll("article img")]
+    .filter(image => image.getBoundingClientRect().width < 0.7 * Math.min(image.naturalWidth, 800));
+  const hidden = [...document.querySelectorAll("article img")]
+    .filter(image => image.parentElement.scrollWidth > image.parentElement.clientWidth + 20)
+    .filter(image => getComputedStyle(image.parentElement, "::after").position !== "sticky");
+  return {wide: wide.length, faults: [...bare.map(box => box.textContent.slice(0, 60)),
+    ...[...small, ...hidden].map(image => image.src.split("/").pop())]};
+}"""
+
+
+@pytest.mark.long
+def test_on_a_telephone_wide_code_is_marked_and_pictures_can_be_read(site, browser):
+    found = {}
+    for page in ("index", "paths/firmware", "paths/paper", "conventions", "vibration", "rate-gyro"):
+        with opened(browser, site / f"{page}.html", 390) as window:
+            found[page] = window.page.evaluate(UNREADABLE)
+    assert {page: one["faults"] for page, one in found.items() if one["faults"]} == {}
+    assert {page: one["wide"] for page, one in found.items() if not one["wide"]} == {}
+
+
+@pytest.mark.long
+def test_pages_typeset_their_equations(site, browser):
+    for page in ("navigation", "canonical-form", "rate-gyro", "coning"):
+        with opened(browser, site / f"{page}.html", 390) as window:
+            window.page.wait_for_selector("mjx-container svg")
+            assert window.page.locator("[data-mjx-error]").count() == 0
+            assert window.view().faults() == []
 
 
 @pytest.mark.long

@@ -20,7 +20,7 @@ _EDGE = 22
 _STEP = _BOX[0] + _GAP
 _WIDTH = round(2 * _EDGE + 5 * _BOX[0] + 4 * _GAP)
 #: Applications in a row, the height of their boxes, and the gap between them.
-_COLUMNS, _ROOM, _SPACE = 4, 92, 14
+_COLUMNS, _ROOM, _SPACE = 5, 112, 14
 #: Upper edges of the storeys, of the rows in them, and the lower edge of all.
 _APPLICATIONS, _FIRST_ROOM = 8, 40
 _COMPILER = _FIRST_ROOM + 2 * (_ROOM + _SPACE) + 36

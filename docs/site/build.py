@@ -22,8 +22,8 @@ import mathjax  # noqa: E402
 import reference_commands  # noqa: E402
 import reference_python  # noqa: E402
 import vendor  # noqa: E402
-from repository_pages import MOST_PAGES, file_page, folder_page, tracked  # noqa: E402
-from site_navigation import GENERATED, SECTIONS, site_file  # noqa: E402
+from repository_pages import COPIED, file_page, folder_page, tracked  # noqa: E402
+from site_navigation import GENERATED, MAP, SECTIONS, site_file  # noqa: E402
 from staging import IMAGES, Stage, home, landing, rewritten, with_program  # noqa: E402
 
 #: The page that runs strapgen in the browser, and its part of the page that is not Markdown.
@@ -119,9 +119,7 @@ class Site:
 
     def _is_copy(self, path: str) -> bool:
         """Tell whether a file is handed out as it is, because there are many like it."""
-        top = path.split("/")[0]
-        crowded = sum(name.startswith(f"{top}/") for name in self.files) > MOST_PAGES
-        return path in self.files and crowded and not path.endswith(".md")
+        return path in self.files and path.split("/")[0] in COPIED and not path.endswith(".md")
 
 
 def _image(path: str) -> str:
@@ -146,7 +144,9 @@ def stage_pages(folder: Path, runs: bool = True) -> None:
     Site(stage, runs).write_pages()
     reference = next(section for section in SECTIONS if section.title == "Reference")
     site = Site(stage)
-    stage.write("reference/index.md", rewritten(landing(ROOT, reference, ""), reference.landing, site.target))
+    stage.write(
+        "reference/index.md", rewritten(landing(ROOT, reference, MAP), reference.landing, site.target)
+    )
     for name, text in reference_commands.pages().items():
         stage.write(f"reference/commands/{name}.md", text)
     for name, text in reference_python.pages().items():

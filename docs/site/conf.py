@@ -41,7 +41,6 @@ default_role = "autolink"
 autosummary_generate = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 toc_object_entries_show_parents = "hide"
 add_module_names = False
@@ -81,6 +80,13 @@ def colour_commands(app: Any, document: nodes.document) -> None:
             block["language"] = "bash"
 
 
+def mark_pictures(app: Any, document: nodes.document) -> None:
+    """Give the paragraph of a picture a class of its own: on a telephone it scrolls in it."""
+    for image in document.findall(nodes.image):
+        if isinstance(image.parent, nodes.paragraph) and len(image.parent) == 1:
+            image.parent["classes"].append("scrolls")
+
+
 @cache
 def titles_of_pages(environment: Any) -> dict[str, nodes.bullet_list]:
     """Return what pages contain without their sections, which a navigation of titles leaves out in the end."""
@@ -110,5 +116,6 @@ def navigate_by_titles(app: Any, page: str, template: str, context: dict[str, An
 def setup(app: Any) -> dict[str, bool]:
     """Register what this file adds to Sphinx."""
     app.connect("doctree-read", colour_commands)
+    app.connect("doctree-read", mark_pictures)
     app.connect("html-page-context", navigate_by_titles, priority=400)  # before the theme calls it
     return {"parallel_read_safe": True, "parallel_write_safe": True}

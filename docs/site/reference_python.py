@@ -14,7 +14,7 @@ GROUPS = {
     "run": "Back ends, which run generated code",
     "catalogue": "Algorithms, methods and windows",
     "lab": "Motions, runs, recordings and comparisons",
-    "analysis": "Algorithms as objects",
+    "attitude_algorithm": "Algorithms as objects",
     "design": "Windows that answer late and now",
     "navigation": "Two speeds, described systems and courses",
     "firmware": "Checks of code",
@@ -147,6 +147,16 @@ def _entry(full: str, value: Any = None) -> list[str]:
     if isinstance(value, types.FunctionType):
         return [f".. autofunction:: {full}", ""]
     if isinstance(value, type):
+        short = value.__name__
+        if name != short and getattr(strapgen, short, None) is value:  # a name has one description
+            outside = [".. py:currentmodule:: None", ""]  # which would stand before the name once more
+            return [
+                *outside,
+                f".. py:class:: {full}",
+                "",
+                f"   The same as :py:class:`strapgen.{short}`.",
+                "",
+            ]
         kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
         return [f".. {kind}:: {full}", "   :members:", ""]
     text = comment(f"strapgen.{strapgen._EXPORTS[name]}", name)

@@ -7,8 +7,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-#: A folder with more files than this is listed, but its files are plain copies in place of pages.
-MOST_PAGES = 70
+#: Folders whose many files are plain copies in place of pages.
+COPIED = ("codegen", "generated", "tests")
+#: Lines of a notebook's output that stand open on its page; longer ones are folded.
+OPEN_LINES = 8
 _LEXERS = {
     **{
         ".py": "python",
@@ -101,6 +103,15 @@ def notebook(text: str) -> str:
     return "\n\n".join(_cell(cell) for cell in json.loads(text)["cells"]) + "\n"
 
 
+def _output(plain: str) -> str:
+    """Return an output in a fixed font, folded where it is long."""
+    block, count = f"```text\n{plain}\n```", plain.count("\n") + 1
+    if count <= OPEN_LINES:
+        return block
+    summary = f"<details>\n<summary>{count} lines of output</summary>\n"
+    return f"{summary}\n{block}\n\n</details>"
+
+
 def _cell(cell: dict[str, Any]) -> str:
     source = "".join(cell["source"])
     if cell["cell_type"] == "markdown":
@@ -112,5 +123,5 @@ def _cell(cell: dict[str, Any]) -> str:
         if "text/latex" in data:
             parts.append(f"```{{math}}\n:no-wrap:\n\n{''.join(data['text/latex'])}\n```")
         elif plain:
-            parts.append(f"```text\n{plain.rstrip()}\n```")
+            parts.append(_output(plain.rstrip()))
     return "\n\n".join(parts)

@@ -45,7 +45,15 @@ SECTIONS = (
         "docs/paths/firmware.md",
         "You need C for a processor, with bounds that you can sign and tests that come with it.",
         _docs(
-            *("variants", "fixed-point", "design", "generated-code", "microcontrollers", "evidence"),
+            *(
+                "rate-gyro",
+                "variants",
+                "fixed-point",
+                "design",
+                "generated-code",
+                "microcontrollers",
+                "evidence",
+            ),
             *("check-foreign-code", "sensor-data", "redundancy"),
         ),
     ),
@@ -78,13 +86,13 @@ SECTIONS = (
     Section(
         "The thesis",
         "docs/thesis.md",
-        "You want to see the tables and statements of the thesis beside runs of today.",
+        "You compare the MIT thesis that began this project, its tables and statements, with runs of today.",
         (),
     ),
     Section(
         "Navigation",
         "docs/two-speed.md",
-        "You follow the lectures of 1984 equation by equation, up to a whole navigator in C.",
+        "You follow NATO's lectures on strapdown systems, AGARD 133 of 1984, up to a whole navigator in C.",
         _docs("navigation", "compensation", "ahrs", "systems"),
     ),
     Section(
@@ -103,6 +111,23 @@ SECTIONS = (
     Section("Glossary", "docs/glossary.md", "You met a word that you do not know.", ()),
     Section("Changelog", "CHANGELOG.md", "You want to know what a release brings.", ()),
 )
+
+#: What the first page of the reference says: where each kind of fact is.
+MAP = """# Reference
+
+| you look up | it is in |
+|---|---|
+| a command with its options | [Commands](commands/index.md); at work in [the command line](../command-line.md) |
+| a Python name with its arguments | [Python](python/index.md); at work in [the Python API](../python-api.md) |
+| a key of a TOML file that you write | [Files that you write](../user-files.md) |
+| a key of JSON that a command prints | [the schemas](../schemas), or `strapgen schema NAME` |
+| an error code, a macro or a comment of generated C | [Review generated C](../generated-code.md) |
+| a frame, a unit, a sign, an order of elements | [Conventions](../conventions.md) |
+| a term | [Glossary](../glossary.md) |
+| what a kernel of the catalogue costs | [COST.md](../../generated/COST.md) |
+| what independent tools say of its C | [EVIDENCE.md](../../generated/EVIDENCE.md) |
+| the page that answers a question | [Documentation by question](../README.md) |
+"""
 
 #: Pages that a step of the build writes; all others are files of the repository.
 GENERATED = ("docs/reference/index.md", "docs/reference/commands/index.md", "docs/reference/python/index.md")

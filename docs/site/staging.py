@@ -47,7 +47,7 @@ def rewritten(text: str, page: str, target: Callable[[str, str], str]) -> str:
 
 
 def home(text: str) -> str:
-    """Return the home page: the readme with a card for each section below its first picture.
+    """Return the home page: the readme with a card for each section where it says where to start.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def home(text: str) -> str:
         link = f"[{section.title}]({section.landing})"
         cards += ["::::{container} card", f"**{link}**", "", section.invitation, "::::"]
     cards += [":::::", ""]
-    first = re.search(r"^!\[.*\n\n", text, re.MULTILINE)
-    place = first.end() if first else len(text)
+    start = re.search(r"^## Where to start\n\n", text, re.MULTILINE)
+    place = start.end() if start else len(text)
     return (
         text[:place]
         + "\n".join(cards)
