@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import sys
@@ -245,3 +246,24 @@ def test_the_command_of_every_file_makes_it_again(command, tmp_path):
     for path in files:
         copy = tmp_path / str(commands.index(generated_by(path))) / path.name
         assert copy.read_bytes() == path.read_bytes()
+
+
+def test_kernels_are_listed_in_groups_with_the_same_names_in_json(capsys):
+    with pytest.raises(SystemExit):
+        main(["list", "kernels"])
+    groups, heading = {}, ""
+    for line in capsys.readouterr().out.splitlines():
+        if line.startswith("  "):
+            groups[heading].append(line.split()[0])
+        else:
+            heading = line
+            groups[heading] = []
+    with pytest.raises(SystemExit):
+        main(["list", "kernels", "--format", "json"])
+    data = json.loads(capsys.readouterr().out)
+    assert data["groups"] == groups
+    assert sorted(name for names in groups.values() for name in names) == sorted(data["kernels"])
+    assert "dcm-orthonormalize" in groups["orthonormal"] and "erection" in groups["loop"]
+    with pytest.raises(SystemExit):
+        main(["list", "methods", "--format", "json"])
+    assert "groups" not in json.loads(capsys.readouterr().out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from collections.abc import Callable
@@ -238,3 +239,13 @@ def test_axioms_beyond_real_numbers_are_reported():
 @pytest.mark.parametrize("subject", [Subject(PRODUCT), Subject(choose_step("dcm", "rk4", 2))])
 def test_coq_examines_no_other_kernel(subject, tmp_path):
     assert gappa.check_by_coq(subject, tmp_path) == []
+
+
+def test_where_processor_time_has_no_limit_a_proof_is_given_up_too(tmp_path, monkeypatch):
+    program = tmp_path / "gappa"
+    program.write_text("#!/bin/sh\nexec sleep 60\n", encoding="utf-8")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setattr(gappa, "resource", None)
+    monkeypatch.setattr(gappa, "SECONDS", 0.2)
+    assert gappa.proved_bounds(tmp_path / "script.g") == ([], "no answer in 0.2 s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import shutil
 import sys
 import tomllib
@@ -89,8 +90,69 @@ def test_the_example_is_used_by_its_name_alone(toy, tmp_path, monkeypatch, capsy
 
 
 def test_the_example_is_short():
-    files = [path for path in (TOY / "toy_target").iterdir() if path.is_file()]
-    assert len(files) == 2 and sum(len(path.read_text().splitlines()) for path in files) < 150
+    files = {path.name: path for path in (TOY / "toy_target").iterdir() if path.is_file()}
+    lines = {name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in files.items()}
+    assert lines.keys() == {"__init__.py", "module.py.j2", "julia.py", "function.jl.j2"}
+    assert lines["__init__.py"] + lines["module.py.j2"] < 150 and sum(lines.values()) < 250
+
+
+class FromOne(list):
+    """A vector whose first element has the index 1."""
+
+    def __getitem__(self, place):
+        assert place >= 1
+        return super().__getitem__(place - 1)
+
+
+def of_julia(text: str) -> dict[str, Any]:
+    """Return the functions of a text in Julia, of which Python reads all but the lines that begin and end them."""
+    lines = text.partition('"""\nfunction')[1:]
+    code = "".join(lines).removeprefix('"""\n')
+    code = re.sub(r"^function (.*)$", r"def \1:", code, flags=re.MULTILINE)
+    code = re.sub(r"^end$", "", code, flags=re.MULTILINE)
+    code = re.sub(r"^(_\w+\(x\)) = (.*)$", r"def \1: return \2", code, flags=re.MULTILINE)
+    scope: dict[str, Any] = {
+        name: getattr(np, name) for name in ("sin", "cos", "sqrt", "pi", "copysign", "abs")
+    }
+    scope |= {"atan": np.arctan2, "ifelse": lambda which, yes, no: yes if which else no, "max": max}
+    exec(code, scope)
+    return scope
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [
+        EULER,
+        Choice("dcm", "rk4", 2),
+        Choice("rotation-vector", "coning-compressed", 4),
+        catalogue.choose("dcm-from-euler"),
+        catalogue.choose("euler-update"),
+        catalogue.choose("heading-from-dcm"),
+        catalogue.choose("euler-from-dcm"),
+    ],
+    ids=str,
+)
+def test_the_example_in_julia_agrees_with_numpy(toy, rng, choice):
+    sources = strapgen.generate(program(choice), "julia")
+    ((name, text),) = sources.files.items()
+    assert name == f"{sources.function.name}.jl" and text.count("\nend\n") == 1
+    inputs = [rng.uniform(0.1, 0.3, signal.shape) for signal in sources.function.inputs]
+    vectors = [FromOne(values.reshape(-1)) if values.ndim else np.float64(values) for values in inputs]
+    results = of_julia(text)[sources.function.name](*vectors)
+    expected = strapgen.evaluator(choice)(*inputs)
+    if len(sources.function.outputs) == 1:
+        results, expected = [results], [expected]
+    for result, array in zip(results, expected, strict=True):
+        np.testing.assert_allclose(result, np.ravel(array), rtol=0, atol=1e-14)
+
+
+def test_julia_changes_names_that_it_reserves(toy):
+    from toy_target.julia import JULIA
+
+    assert not JULIA.allows("end") and not JULIA.allows("function") and JULIA.allows("lambda")
+    assert JULIA.scopes(['"""text"""\nfunction f(a)\n    b = sin(a)  # c\nend\n']) == [
+        {"function", "f", "a", "b", "sin", "end"}
+    ]
 
 
 def test_sources_are_cached_until_a_file_of_the_package_changes(toy, monkeypatch):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -56,7 +56,8 @@ def list_names(
     if kind is None:
         short["methods"] = _with_one_line_for_taylor(parts["methods"])
         short["kernels"] = _with_one_line_for_updates(parts["kernels"])
-    output.show(NamesResult(shown, short, kind is None))
+    groups = _groups_of_kernels(shown["kernels"]) if kind == "kernels" else None
+    output.show(NamesResult(shown, groups, short, kind is None))
 
 
 def _parts() -> dict[str, dict[str, str]]:
@@ -86,6 +87,18 @@ def _parts() -> dict[str, dict[str, str]]:
         "targets": titles(),
         "backends": {**Titles(BACKENDS), **BACKENDS.taken()},
     }
+
+
+def _groups_of_kernels(names: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return the names of kernels by the modules that derive them, in words; those of packages come last."""
+    from strapgen import catalogue
+
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        recipe = catalogue.KERNELS.own.get(name) or catalogue.LAYOUT_KERNELS.get(name)
+        module = recipe.module.rpartition(".")[2] if recipe else "installed_packages"
+        groups.setdefault(module.removesuffix("_kernels").replace("_", " "), []).append(name)
+    return dict(sorted(groups.items(), key=lambda group: group[0] == "installed packages"))
 
 
 def _with_one_line_for_taylor(methods: dict[str, str]) -> dict[str, str]:
@@ -120,6 +133,8 @@ class NamesResult(Result):
     """Names with their meanings, by kind."""
 
     kinds: Mapping[str, Mapping[str, str]] = field(metadata=entry(spread=True))
+    #: Of kernels alone: their names by purpose
+    groups: Mapping[str, Sequence[str]] | None = field(metadata=entry(optional=True))
     #: The same with series of names on one line, for the text
     short: Mapping[str, Mapping[str, str]] = field(metadata=INTERNAL)
     #: Whether these are all kinds
@@ -138,14 +153,22 @@ class NamesResult(Result):
         names = [*(["kind"] if self.every else []), "name", "meaning"]
         return TextTable([Column(name, "<") for name in names], self.rows())
 
+    def _headings(self) -> Mapping[str, Mapping[str, str]]:
+        """Return what the text shows: the kernels by group, or the kinds."""
+        if self.groups is None:
+            return self.short
+        titles = self.short["kernels"]
+        return {group: {name: titles[name] for name in names} for group, names in self.groups.items()}
+
     def text(self) -> str:
-        """Return the names of each kind."""
+        """Return the names of each kind, or of each group of kernels."""
         width = max(len(name) for part in self.short.values() for name in part)
         columns = (Column(align="<", least=width), Column(align="<"))
         lines = []
-        for kind, part in self.short.items():
-            lines += [kind] if self.every else []
-            lines += TextTable(columns, list(part.items())).lines("  " if self.every else "")
+        headed = self.every or self.groups is not None
+        for heading, part in self._headings().items():
+            lines += [heading] if headed else []
+            lines += TextTable(columns, list(part.items())).lines("  " if headed else "")
         return "\n".join(lines)
 
 

@@ -161,7 +161,9 @@ def _links() -> bool:
     with temporary_folder() as folder:
         text = "int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size);\n"
         text += "int LLVMFuzzerTestOneInput(const unsigned char *data, unsigned long size)\n"
-        (folder / "empty.c").write_text(f"{text}{{\n    return (data != 0) && (size > 9u) && 0;\n}}\n")
+        (folder / "empty.c").write_text(
+            f"{text}{{\n    return (data != 0) && (size > 9u) && 0;\n}}\n", encoding="utf-8", newline="\n"
+        )
         done = subprocess.run(
             ["clang", *_FLAGS, "empty.c", "-o", _PROGRAM], cwd=folder, capture_output=True, check=False
         )

@@ -8,19 +8,24 @@ what is left of hypotheses are the ranges of the inputs.
 from __future__ import annotations
 
 import re
-import resource
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from strapgen.evidence.collection import Result, Subject, Tool, Verdict, verdict
 from strapgen.evidence.gappa_scripts import DEGREES, CannotFollowError, Script, fixed_script, floating_script
 from strapgen.fixedpoint.floating.bounds import rounding_bounds
 from strapgen.fixedpoint.floating.errors import NUMBERS
 
-#: Processor time after which a proof is given up, and bits of the ends of intervals.
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
+#: Processor time, or where it has no limit time, after which a proof is given up, and bits of the ends of intervals.
 SECONDS, PRECISION = 60, 256
 #: What a bound may differ from the header's before the difference is told.
 _CLOSE = Fraction(1, 20)
@@ -58,7 +63,11 @@ def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Sc
         outcome: tuple[Result, str] = "fails", "no script"
         try:
             for script in write():
-                file.write_text(f"# Run: gappa -Eprecision={PRECISION} {file.name}\n{script.question()}")
+                file.write_text(
+                    f"# Run: gappa -Eprecision={PRECISION} {file.name}\n{script.question()}",
+                    encoding="utf-8",
+                    newline="\n",
+                )
                 outcome = compare_bounds(script, *proved_bounds(file))
                 if outcome[0] == "proved":
                     break
@@ -124,13 +133,14 @@ def _exactly(text: str) -> Fraction:
 
 
 def _run(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        ["gappa", *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1)),
-    )
+    limits: dict[str, Any] = {"timeout": SECONDS}
+    if resource is not None:
+        limits = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))}
+    words = ["gappa", *arguments]
+    try:
+        return subprocess.run(words, capture_output=True, text=True, check=False, **limits)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(words, -1, "", "")
 
 
 #: Proves that two expressions are equal, whatever the rounded values in them are.
@@ -174,14 +184,14 @@ def check_by_coq(subject: Subject, folder: Path) -> list[Verdict]:
 def checked(script: Script, file: Path) -> tuple[Result, str]:
     """Have Coq check the proof that Gappa finds of the claim of a script."""
     claim = file.with_suffix(".claim.g")
-    claim.write_text(script.claim())
+    claim.write_text(script.claim(), encoding="utf-8", newline="\n")
     said = subprocess.run(
         ["gappa", "-Bcoq", claim.name], cwd=file.parent, capture_output=True, text=True, check=False
     )
     if said.returncode:
         return "fails", "Gappa finds no proof"
     text, count = without_hypotheses(said.stdout)
-    file.write_text(f"(* Run: coqc {file.name} *)\n{text}")
+    file.write_text(f"(* Run: coqc {file.name} *)\n{text}", encoding="utf-8", newline="\n")
     proof = subprocess.run(["coqc", file.name], cwd=file.parent, capture_output=True, text=True, check=False)
     if proof.returncode:
         return "fails", " ".join(proof.stderr.split())[-200:]

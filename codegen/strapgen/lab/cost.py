@@ -80,7 +80,7 @@ def cost(sources: Sources, cpu: str) -> Cost:
     processor = PROCESSORS[cpu]
     with drafts.temporary_folder() as folder:
         for file, text in sources.step_files.items():
-            (folder / file).write_text(text)
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
         source = folder / next(file for file in sources.step_files if file.endswith(".c"))
         flags = [*FLAGS, *_library(processor.compiler)]
         run_tool(
@@ -161,7 +161,7 @@ def _section_bytes(sizes: str, section: str) -> int:
 
 def _stack(usage: Path, function: str) -> int:
     """Return the stack of a function and the deepest of the others in its file, which it calls."""
-    rows = [line.split("\t") for line in usage.read_text().splitlines()]
+    rows = [line.split("\t") for line in usage.read_text(encoding="utf-8").splitlines()]
     depths = {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
     depth = depths.pop(function)
     return depth + max(depths.values(), default=0)
@@ -263,7 +263,7 @@ def code_size(sources: Sources) -> int | None:
     if size is not None:
 
         def note(draft: Path) -> None:
-            (draft / _SIZE).write_text(str(size))
+            (draft / _SIZE).write_text(str(size), encoding="utf-8", newline="\n")
 
         disk_cache.entry(_SIZES, key, note)
     return size
@@ -273,7 +273,7 @@ def _measure_size(sources: Sources, words: list[str], counter: str) -> int | Non
     """Return the size of compiled sources, measured by a program."""
     with drafts.temporary_folder() as folder:
         for name, text in sources.files.items():
-            (folder / name).write_text(text)
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
         code = next(name for name in sources.files if name.endswith(".c"))
         compiling = [*words, *C_FLAGS, "-c", code, "-o", "code.o"]
         if subprocess.run(compiling, cwd=folder, capture_output=True, check=False).returncode:

@@ -26,12 +26,7 @@ from typing import IO, Any
 
 from strapgen.ir.exceptions import InputError, MissingExtraError, StrapgenError
 from strapgen.run.processes import begin_worker
-from strapgen.storage import cache
-
-try:
-    import fcntl
-except ImportError:  # no POSIX system
-    fcntl = None  # type: ignore[assignment]
+from strapgen.storage import cache, locks
 
 #: Longest results file that is read, in bytes.
 _MOST_BYTES = 1 << 28
@@ -116,12 +111,8 @@ def _open(path: Path) -> Iterator[IO[bytes]]:
     with os.fdopen(descriptor, "r+b", buffering=0) as file:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise InputError(f"{path} is no ordinary file; only those are written")
-        if fcntl is not None:
-            try:
-                # Unlike that of flock, this lock is not passed on to the processes of the pool.
-                fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise InputError(f"{path} is being written by another process") from None
+        if not locks.lock(descriptor):
+            raise InputError(f"{path} is being written by another process")
         yield file
 
 

@@ -174,8 +174,12 @@ def write_start(processor: Processor, folder: Path, rest: str, name: str = START
     """
     address, word = processor.stop
     start = _VECTORS if processor.start == "vectors" else _ENTRY
-    (folder / name).write_text(_START.format(start=start, address=address, word=word) + rest)
-    (folder / "layout.ld").write_text(_LAYOUT.format(code=processor.code, data=processor.data))
+    (folder / name).write_text(
+        _START.format(start=start, address=address, word=word) + rest, encoding="utf-8", newline="\n"
+    )
+    (folder / "layout.ld").write_text(
+        _LAYOUT.format(code=processor.code, data=processor.data), encoding="utf-8", newline="\n"
+    )
 
 
 def run_tool(command: Sequence[str], folder: Path) -> str:
@@ -227,7 +231,7 @@ def _count(log: Path, places: dict[str, tuple[int, int]], function: str) -> int:
     """Return how many instructions of a trace lie between the entry of a function and the next one of its caller."""
     (entry, _), (first, size), (refused, _) = places[function], places["start"], places["refuse"]
     count, inside, back = 0, False, False
-    with log.open() as lines:
+    with log.open(encoding="utf-8", errors="replace") as lines:
         for line in lines:
             match = re.match(r"Trace \d+: \S+ \[[0-9a-f]+/([0-9a-f]+)/", line)
             if match is None:
@@ -283,7 +287,9 @@ class Runner:
             parts += [START, "-lgcc"]
         build = [*self.compiler, *flags, *parts, "-o", _PROGRAM]
         start = [*self.emulator, _PROGRAM]
-        (folder / "run.sh").write_text(f"{shlex.join(build)} &&\n{shlex.join(start)}\n")
+        (folder / "run.sh").write_text(
+            f"{shlex.join(build)} &&\n{shlex.join(start)}\n", encoding="utf-8", newline="\n"
+        )
         run_tool(build, folder)
         try:
             done = subprocess.run(

@@ -192,7 +192,7 @@ def compile_together(many: Iterable[Sources]) -> None:
 
 
 def _point(together: str, draft: Path) -> None:
-    (draft / _POINTER).write_text(together)
+    (draft / _POINTER).write_text(together, encoding="utf-8", newline="\n")
 
 
 def _language(sources: Sources) -> str:
@@ -284,7 +284,7 @@ def _build(many: Sequence[Sources], name: str, key: str) -> Path:
                 included = "".join(f'#include "{header}"\n' for header in headers)
                 reasons = compile_module(draft, name, files, cdef, included, chosen.flags_in_effect())
             else:
-                (draft / _DECLARATIONS).write_text(cdef)
+                (draft / _DECLARATIONS).write_text(cdef, encoding="utf-8", newline="\n")
                 command = [*chosen.command(), *chosen.flags_in_effect()]
                 reasons = _compile(command, files, chosen.ending, draft / _library(name))
             if reasons:
@@ -328,7 +328,7 @@ def _compile(
         if ending == ".rs":
             text = _CRATE + "".join(f"pub mod {Path(file).stem};\n" for file in parts)
         for file, content in {**files, f"{name}_root{ending}": text}.items():
-            Path(folder, file).write_text(content)
+            Path(folder, file).write_text(content, encoding="utf-8", newline="\n")
         words = [*command, "-o", library.name, f"{name}_root{ending}"]
         if wrapper is not None:
             wrapper.emit_c_code(str(Path(folder, f"{name}_wrapper.c")))

@@ -83,7 +83,7 @@ class _Process:
         self.command = command()
         self._pid = os.getpid()
         self._folder = Path(tempfile.mkdtemp(prefix="strapgen-octave-"))
-        (self._folder / "strapgen_call.m").write_text(_CALL)
+        (self._folder / "strapgen_call.m").write_text(_CALL, encoding="utf-8", newline="\n")
         self._places: dict[str, str] = {}  # the folder on the path by the files in it
         self._process = subprocess.Popen(
             [*self.command, "--norc", "--no-history", "--quiet", "--no-line-editing"],
@@ -149,7 +149,7 @@ class _Process:
         if not folder.is_dir():
             folder.mkdir()
             for file, text in sources.files.items():
-                (folder / file).write_text(text)
+                (folder / file).write_text(text, encoding="utf-8", newline="\n")
         return name
 
     def _answer(self, request: str) -> str:

@@ -145,7 +145,7 @@ def _fill(kind: str, key: str, fill: Callable[[Path], None]) -> Path:
         with drafts.draft_folder(place.parent, _DRAFT) as draft:
             advice = ""
             fill(draft)
-            (draft / _MANIFEST).write_text(json.dumps(_hashes(draft)))
+            (draft / _MANIFEST).write_text(json.dumps(_hashes(draft)), encoding="utf-8", newline="\n")
             for path in draft.iterdir():  # the user's alone, whatever the umask
                 path.chmod(stat.S_IMODE(path.stat().st_mode) & ~0o022)
             with suppress(OSError):  # another process was first: its entry is the same

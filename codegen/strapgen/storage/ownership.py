@@ -138,10 +138,10 @@ def _is_alone(group: int, user: int) -> bool:
 def _is_outside(owner: int) -> bool:
     """Return whether an owner is nobody of this user namespace, as the administrator is in a container without one."""
     with suppress(OSError, ValueError):
-        lines = Path("/proc/self/uid_map").read_text().splitlines()
+        lines = Path("/proc/self/uid_map").read_text(encoding="utf-8").splitlines()
         mapped = [
             range(first, first + count) for first, _, count in (map(int, line.split()) for line in lines)
         ]
-        overflow = int(Path("/proc/sys/kernel/overflowuid").read_text())
+        overflow = int(Path("/proc/sys/kernel/overflowuid").read_text(encoding="utf-8"))
         return owner == overflow and not any(user in users for users in mapped for user in (0, owner))
     return False

@@ -160,7 +160,7 @@ def _same_vectors(variant: Variant, words: list[str]) -> Step:
     with temporary_folder() as folder:
         command = ["vectors", *words, *_count(variant)]
         status, output = _output([*command, "--out", str(folder)])
-        new = {path.name: path.read_text() for path in sorted(folder.iterdir())}
+        new = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.iterdir())}
     difference = standard_tree.difference(Path(_folder(variant)), new)
     shown = f"files of {shlex.join(['strapgen', *command])}"
     return Step(variant.name, shown, not (status or difference), output if status else difference)

@@ -29,13 +29,15 @@ FUNCTIONS = {
 class PlainPrinter(Printer):
     """Prints expressions; sums, products, signs and parentheses come from `Printer`."""
 
+    functions = FUNCTIONS
+
     def constant(self, value: Fraction) -> str:
         """Return the shortest decimal that reads as the nearest double."""
         return repr(float(value))
 
     def function(self, kind: str, arguments: list[str]) -> str:
         """Return a call."""
-        return FUNCTIONS[kind].format(*arguments)
+        return self.functions[kind].format(*arguments)
 
 
 def emit(program: Program, target: str) -> Sources:
@@ -45,16 +47,22 @@ def emit(program: Program, target: str) -> Sources:
     return Sources.of(program, target, named.name, files)
 
 
-def text(program: Program, target: str) -> str:
-    """Return the module of a program whose names are free."""
-    printer = PlainPrinter()
+def text(
+    program: Program,
+    target: str,
+    printer: Printer | None = None,
+    template: str = "module.py.j2",
+    first: int = 0,
+) -> str:
+    """Return the module of a program whose names are free; arrays begin at the index `first`."""
+    printer = printer or PlainPrinter()
     return (
         environment(Path(__file__).parent)
-        .get_template("module.py.j2")
+        .get_template(template)
         .render(
             program=program,
             target=target,
-            loads=[load for signal in program.inputs for load in loads(signal, program.used())],
+            loads=[load for signal in program.inputs for load in loads(signal, program.used(), first)],
             body=[(assignment, printer.text(assignment.value)) for assignment in program.body],
             outputs=[
                 (result.signal.name, ", ".join(map(printer.text, result.nodes))) for result in program.outputs
@@ -63,9 +71,9 @@ def text(program: Program, target: str) -> str:
     )
 
 
-def loads(signal: Signal, used: set[str]) -> Iterator[str]:
+def loads(signal: Signal, used: set[str], first: int = 0) -> Iterator[str]:
     """Yield a statement for every element of an input that is used; a scalar is there already."""
-    for number, element in enumerate(signal.elements):
+    for number, element in enumerate(signal.elements, first):
         if signal.shape and element in used:
             yield f"{element} = {signal.name}[{number}]"
 

@@ -216,7 +216,7 @@ def _store(key: str, data: bytes, head: bytes | None, record: Record) -> None:
     def fill(draft: Path) -> None:
         (draft / _KERNEL).write_bytes(data)
         (draft / _HEAD).write_bytes(head or b"")
-        (draft / _RECORD).write_text(json.dumps(asdict(record)))
+        (draft / _RECORD).write_text(json.dumps(asdict(record)), encoding="utf-8", newline="\n")
 
     cache.discard(_KIND, key)
     cache.entry(_KIND, key, fill)

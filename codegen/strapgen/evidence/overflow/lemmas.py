@@ -53,7 +53,7 @@ class ParsedSource:
     def _preprocess(self) -> str:
         with temporary_folder() as folder:
             for file, text in {**self._files, "stdint.h": _STDINT, "stddef.h": ""}.items():
-                (folder / file).write_text(text)
+                (folder / file).write_text(text, encoding="utf-8", newline="\n")
             macros = [f"-D{macro}=1" for macro in self._defined]
             command = ["cc", "-E", "-P", "-undef", "-nostdinc", "-I.", *_EXTENSIONS, *macros, self._source]
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)

@@ -35,7 +35,7 @@ Z3 = Tool(
 def prove_by_z3(subject: Subject, folder: Path) -> list[Verdict]:
     """Have z3 prove that no operation of a kernel overflows and that every output lies in its stated range."""
     for name, text in subject.sources.step_files.items():
-        (folder / name).write_text(text)
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
     return [
         verdict(
             subject.name,
@@ -83,7 +83,7 @@ def write_harness(sources: Sources, folder: Path) -> None:
     """Write the C of a kernel and the harness that calls it into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in {**sources.step_files, f"{sources.function.name}_eva.c": harness(sources)}.items():
-        (folder / name).write_text(text)
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 def harness(sources: Sources) -> str:
@@ -185,7 +185,7 @@ def _run(name: str, folder: Path, model: str) -> str:
     except subprocess.TimeoutExpired:
         return f"stopped after {_SECONDS} s"
     log = done.stdout + done.stderr
-    (folder / f"{name}_eva_{machine}.log").write_text(log)
+    (folder / f"{name}_eva_{machine}.log").write_text(log, encoding="utf-8", newline="\n")
     return log
 
 

@@ -245,7 +245,7 @@ def compile_foreign(source: ForeignSource) -> Path:
     bridge, of = bridge_text(source), compiler.COMPILERS["C++"] if source.is_cpp else compiler.C
     with drafts.temporary_folder() as folder:
         text = folder / f"bridge{of.ending}"
-        text.write_text(bridge)
+        text.write_text(bridge, encoding="utf-8", newline="\n")
         preprocessed = _preprocess(source, text)
     key = cache.digest([preprocessed, bridge, compiler.C.identity(_FLAGS), of.identity()])
 
@@ -291,14 +291,14 @@ def run_foreign(module: Path, identity: Any, rows: Any) -> ForeignRun:
             return ForeignRun(nothing, f"{len(values)} calls have not come to an end in {PATIENCE} s")
         unloaded = folder / "unloaded"
         if unloaded.is_file():
-            reason = unloaded.read_text().rpartition(path)[2].strip(": ")
+            reason = unloaded.read_text(encoding="utf-8").rpartition(path)[2].strip(": ")
             raise CompilerError(
                 f"the function cannot be linked: {reason}; include the file that defines it in the one to check"
             )
         flags = folder / "flags"
         if done.returncode or not flags.is_file():
             return ForeignRun(nothing, _reason(done.returncode))
-        bits = int(flags.read_text())
+        bits = int(flags.read_text(encoding="utf-8"))
         outputs = np.frombuffer((folder / "output").read_bytes()).reshape(len(values), start.size)
     return ForeignRun(outputs, "", bool(bits & 1), bool(bits & 2))
 

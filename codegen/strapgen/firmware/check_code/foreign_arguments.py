@@ -387,7 +387,9 @@ def _after(arguments: ForeignArguments, arrays: list[ForeignArgument]) -> list[s
 
 def definitions(file: Path) -> dict[str, str]:
     """Return the functions that a file defines, each with the text of its parameters; "" for none."""
-    text = re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(errors="replace"), flags=re.DOTALL)
+    text = re.sub(
+        r"/\*.*?\*/|//[^\n]*", "", file.read_text(errors="replace", encoding="utf-8"), flags=re.DOTALL
+    )
     pattern = r"^[A-Za-z_][\w\s*&:<>]*?[\s*&]([A-Za-z_]\w*)\s*\(((?:[^;{}()]|\([^;{}()]*\))*)\)\s*\{"
     functions = {
         name: " ".join(parameters.split())

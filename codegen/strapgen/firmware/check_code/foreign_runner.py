@@ -23,7 +23,7 @@ def main(module_path: str, folder_name: str, calls: int) -> None:
         module = importlib.util.module_from_spec(spec)
         loader.exec_module(module)
     except ImportError as error:  # a function that the file calls is defined nowhere
-        (folder / "unloaded").write_text(str(error))
+        (folder / "unloaded").write_text(str(error), encoding="utf-8", newline="\n")
         return
     identity, rows = (folder / "identity").read_bytes(), (folder / "input").read_bytes()
     output = bytearray(calls * len(identity))
@@ -34,7 +34,7 @@ def main(module_path: str, folder_name: str, calls: int) -> None:
         module.ffi.from_buffer("double[]", output, require_writable=True),
     )
     (folder / "output").write_bytes(output)
-    (folder / "flags").write_text(str(flags))
+    (folder / "flags").write_text(str(flags), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":
