@@ -121,6 +121,17 @@ def test_every_public_name_has_a_docstring():
     assert undocumented == []
 
 
+def test_every_public_function_and_class_has_an_example():
+    """`pytest` runs the examples of all docstrings."""
+    missing = [
+        name
+        for name in strapgen.__all__
+        if isinstance(value := getattr(strapgen, name), types.FunctionType | type)
+        and ">>>" not in (inspect.getdoc(value) or "")
+    ]
+    assert missing == []
+
+
 def test_every_public_name_is_on_the_page_of_the_api():
     page = (ROOT / "docs" / "python-api.md").read_text()
     assert [name for name in strapgen.__all__ if not re.search(rf"\b{name}\b", page)] == []
@@ -149,7 +160,14 @@ SCRIPT = """
     reveal_type(kernel)  # strapgen.kernel.kernel.Kernel
     reveal_type(backend)  # strapgen.run.backends.Backend
     reveal_type(run)  # strapgen.lab.runs.Run
-    reveal_type(strapgen.compare)  # def (
+    reveal_type(strapgen.compare)  # strapgen.lab.comparison.Comparisons
+    alg = strapgen.algorithm("euler", "rk4", increments=2)
+    reveal_type(alg.formulas.latex)  # strapgen.results.display.formulas._Text
+    reveal_type(alg.generate("c-fixed", word=16, step="0.01"))  # strapgen.ir.sources.Sources
+    reveal_type(alg.quantize(word=16))  # strapgen.ir.integer_program.FixedProgram
+    reveal_type(strapgen.check(alg).holds)  # bool
+    reveal_type(alg.compare()[0])  # strapgen.lab.comparison.Comparison
+    reveal_type(strapgen.METHODS["rk4"])  # str
     reveal_type(gyro.pulses)  # def (
     reveal_type(tableaux.read("heun.toml"))  # strapgen.catalogue.methods.tableaux.Tableau
     reveal_type(KernelBuilder().input(Signal.vector("rate", "w")))  # Any
@@ -161,6 +179,7 @@ WRONG = """
     strapgen.derve("euler")  # [attr-defined]
     strapgen.lower("euler")  # [arg-type]
     strapgen.build(strapgen.derive("euler"))  # [arg-type]
+    strapgen.algorithm("euler").generate("c-fixed", word="16")  # [arg-type]
 """
 
 

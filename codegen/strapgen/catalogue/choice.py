@@ -51,6 +51,11 @@ class Choice:
         attitude steps.
     layout : Description, optional
         What a file describes for the kernel, such as the gyros whose rate and acceleration it separates.
+
+    Examples
+    --------
+    >>> Choice("euler", "rk4", 2).kernel
+    'euler-rk4-2'
     """
 
     name: str

@@ -248,7 +248,13 @@ def choose_step(
     ahead: int | None = None,
     constants: Mapping[str, Any] | None = None,
 ) -> Choice:
-    """Check a choice of attitude step; parameters and errors are those of `choose`."""
+    """Check a choice of attitude step; parameters and errors are those of `choose`.
+
+    Examples
+    --------
+    >>> choose_step("dcm", "magnus4", 2).kernel
+    'dcm-magnus4-2'
+    """
     if isinstance(name, str):
         if name in KERNELS or name in VECTORS or name in LAYOUT_KERNELS:
             raise InputError(

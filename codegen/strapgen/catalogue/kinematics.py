@@ -49,6 +49,12 @@ class Kinematics:
     orthonormalize, attitude : str, str or None
         Names of the kernels that restore the constraint of the state and that convert it to a direction cosine
         matrix; the latter is None if the state is one.
+
+    Examples
+    --------
+    >>> from strapgen import EULER
+    >>> EULER.state.name, EULER.state.shape
+    ('state', (4,))
     """
 
     name: str

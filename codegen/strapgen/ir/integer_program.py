@@ -160,6 +160,13 @@ class FixedProgram:
         The code.
     operations : dict of str to int
         Integer operations of one call.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> fixed = algorithm("euler").quantize(word=16)
+    >>> fixed.name, str(fixed.formats["state"])
+    ('euler_rk4_2_w16', 'Q1.14')
     """
 
     program: Program

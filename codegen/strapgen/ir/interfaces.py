@@ -276,6 +276,13 @@ class RoundingBounds:
         Their accumulation over a run; None for other kernels.
     reason : str
         The reason why no bound is known; "" where there is one.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm, rounding_bounds
+    >>> bounds = rounding_bounds(algorithm("euler").program(), "float")
+    >>> bounds.number, max(bounds.errors["next"]) < 5e-7
+    ('float', True)
     """
 
     number: str

@@ -34,6 +34,12 @@ class KernelInfo:
         Order of an attitude step.
     recursion : Recursion or None
         The pairs of an output and the input that it becomes in the next call.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> algorithm("euler").program().info.name
+    'euler-rk4-2'
     """
 
     name: str
@@ -112,6 +118,12 @@ class AttitudeStep:
     nodes : tuple of Fraction
         Of a user's step that takes the rate at nodes, these as fractions of the step; empty for one that takes
         increments.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> derive("euler").attitude_step.orthonormalize
+    'euler-normalize'
     """
 
     product: str | None

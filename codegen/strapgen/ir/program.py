@@ -190,6 +190,13 @@ class Program:
     ------
     ValueError
         If a name is used before it is assigned, or assigned twice.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> program = algorithm("euler", "rk4", 2).program()
+    >>> program.operations["multiply"], program.temporaries
+    (38, 14)
     """
 
     info: KernelInfo

@@ -53,6 +53,13 @@ class Sources:
         Names of the files that hold loops over samples and runs, which a host calls and firmware does not need.
     rounding : RoundingBounds or None
         Error bounds of C in floating point; None for every other target.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> sources = algorithm("euler", "rk4", 2).generate("c")
+    >>> list(sources.step_files), sources.kernel
+    (['euler_rk4_2.h', 'euler_rk4_2.c'], 'euler-rk4-2')
     """
 
     info: KernelInfo

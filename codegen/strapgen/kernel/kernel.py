@@ -43,6 +43,12 @@ class Stage:
         Name, elements, unit and meaning.
     expressions : tuple of Expr
         One for each element, in row-major order.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> derive("euler", "rk4", 2).stages[0].expressions[0]
+    3*d1_x/2 - d2_x/2
     """
 
     signal: Signal
@@ -97,6 +103,13 @@ class Kernel(KernelInfo):
     previous, ahead : int
         Of a step of velocity and position, numbers of samples from before it and from after it that it takes in
         addition; `attitude_step` has those of an attitude step.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> kernel = derive("euler", "rk4", 2)
+    >>> kernel.name, [signal.name for signal in kernel.inputs]
+    ('euler-rk4-2', ['state', 'increments'])
     """
 
     inputs: tuple[Signal, ...]

@@ -91,6 +91,12 @@ class Convergence(Record):
         Name and options of the kernel on the command line; they tell kernels of one name apart.
     label : str, optional
         Name beside others, see `labels`.
+
+    Examples
+    --------
+    >>> ladder = converge(catalogue.choose("euler", "rk1", 1), steps=["1/16", "1/32", "1/64"])
+    >>> ladder.predicted, [rung.step_s for rung in ladder.rungs]
+    (1, [0.0625, 0.03125, 0.015625])
     """
 
     kernel: str

@@ -67,6 +67,13 @@ class Run(Records):
         Error matrices in reference axes: computed times transposed true matrix, minus the identity.
     scale, skew, drift : array, (N, 3)
         Their parts on the axes x, y, z; scale dimensionless, skew and drift in rad.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> run = algorithm("euler").simulate("constant", "0.1", 1, z_deg_s=90)
+    >>> run.time.shape, run.computed.shape
+    ((11,), (11, 3, 3))
     """
 
     time: Array

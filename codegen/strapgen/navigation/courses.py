@@ -44,6 +44,13 @@ class Course(Records):
         Names of the elements of a state.
     unused : int
         Number of increments at the end that do not fill a navigation cycle.
+
+    Examples
+    --------
+    >>> from strapgen import InertialRecording, course
+    >>> rest = InertialRecording(0.0, 0.01, np.zeros((20, 3)), np.full((20, 3), 0.01))
+    >>> course("euler", rest, fast_cycles=2).time.shape
+    (10,)
     """
 
     time: Array

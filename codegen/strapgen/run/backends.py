@@ -105,6 +105,13 @@ class Backend:
         Sources of the step.
     interface : Interface
         Formats, ranges and error bounds of the step; an attribute in fixed point alone.
+
+    Examples
+    --------
+    >>> from strapgen import backend
+    >>> made = backend("euler", "rk4", 2)
+    >>> made.step(made.identity, np.zeros((2, 3)))
+    array([0., 0., 0., 1.])
     """
 
     interface: Interface

@@ -171,6 +171,14 @@ def compile_together(many: Iterable[Sources]) -> None:
     ------
     CompilerError
         If there is no C compiler, or it fails.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm, build
+    >>> many = [algorithm(name, "rk2").generate("c") for name in ("euler", "dcm")]
+    >>> compile_together(many)
+    >>> [build(sources).name for sources in many]
+    ['c', 'c']
     """
     # Of one language each, in which no file has its name twice: so often has a file had its name before.
     groups: dict[tuple[str, int], dict[str, Sources]] = {}

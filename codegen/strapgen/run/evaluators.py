@@ -56,6 +56,12 @@ class Evaluator(ABC):
         Name, inputs and outputs of the function.
     interface : Interface
         Formats, ranges and error bounds; an attribute in fixed point alone.
+
+    Examples
+    --------
+    >>> from strapgen import evaluator
+    >>> evaluator("dcm-from-euler")([0.0, 0.0, 0.0, 1.0]).shape
+    (3, 3)
     """
 
     #: Whether its loop takes the product of transitions.

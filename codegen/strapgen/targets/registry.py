@@ -53,6 +53,12 @@ class Target:
     ------
     InputError
         If a value is of another type.
+
+    Examples
+    --------
+    >>> from strapgen import TARGETS
+    >>> TARGETS["c-fixed"].fixed, TARGETS["c-fixed"].language
+    (True, 'C')
     """
 
     title: str

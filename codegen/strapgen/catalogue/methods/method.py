@@ -155,6 +155,11 @@ def increments_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
         Increments of the step.
     previous, ahead : int, optional
         Increments from before the step, and increments from after it.
+
+    Examples
+    --------
+    >>> increments_signal(2, previous=1).elements[:4]
+    ('past1_x', 'past1_y', 'past1_z', 'd1_x')
     """
     return Signal(
         "increments",
@@ -170,7 +175,13 @@ def increments_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
 
 
 def velocities_signal(count: int, previous: int = 0, ahead: int = 0) -> Signal:
-    """Return the signal of the velocity increments that a step takes, oldest first, as `increments_signal`."""
+    """Return the signal of the velocity increments that a step takes, oldest first, as `increments_signal`.
+
+    Examples
+    --------
+    >>> velocities_signal(1).elements, velocities_signal(1).unit
+    (('v1_x', 'v1_y', 'v1_z'), 'm/s')
+    """
     return Signal(
         "velocity_increments",
         (previous + count + ahead, 3),
@@ -190,7 +201,13 @@ def beside(previous: int, ahead: int = 0) -> str:
 
 
 def node_rotations_signal(nodes: Sequence[Number]) -> Signal:
-    """Return the signal of the body rates of one step, each times the step length, in the order of the nodes."""
+    """Return the signal of the body rates of one step, each times the step length, in the order of the nodes.
+
+    Examples
+    --------
+    >>> node_rotations_signal([Fraction(0), Fraction(1)]).shape
+    (2, 3)
+    """
     return Signal(
         "node_rotations",
         (len(nodes), 3),
@@ -240,6 +257,12 @@ class Samples:
     fit : callable, optional
         ``fit(increments, previous, ahead)`` returns the rate in terms of the increments; by default the polynomial
         through them.
+
+    Examples
+    --------
+    >>> from strapgen import KernelBuilder
+    >>> Samples(KernelBuilder(), 2).increments
+    2
     """
 
     __repr__ = short_repr

@@ -29,6 +29,11 @@ class SampleKind(IntEnum):
     """The kind of a sample: regular, lost, or merged with a lost one.
 
     A `MERGED` sample follows a lost one, and is the sum of both.
+
+    Examples
+    --------
+    >>> SampleKind(1).name
+    'LOST'
     """
 
     GOOD = 0
@@ -37,7 +42,15 @@ class SampleKind(IntEnum):
 
 
 class GapError(InputError):
-    """A lost sample that cannot be restored; the state is that before the call."""
+    """A lost sample that cannot be restored; the state is that before the call.
+
+    Examples
+    --------
+    >>> raise GapError("sample 3 is lost")
+    Traceback (most recent call last):
+        ...
+    strapgen.design.commit_late.late_unit.GapError: sample 3 is lost
+    """
 
 
 def refusal(kind: int, gap: int, count: int) -> str:

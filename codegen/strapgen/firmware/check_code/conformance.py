@@ -58,6 +58,11 @@ class Finding(Record):
         The measurement in words.
     measured, allowed : float or None
         The measured figure, and the largest that passes.
+
+    Examples
+    --------
+    >>> Finding.within("norm", "the length is off by 1e-9", 1e-9, 1e-6).holds
+    True
     """
 
     name: str

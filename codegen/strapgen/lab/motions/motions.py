@@ -77,6 +77,13 @@ class Motion:
         Name of the motion.
     parameters : dict of str to float
         Its parameters in SI units.
+
+    Examples
+    --------
+    >>> motion("constant", z_deg_s=90).attitude(1.0).round(3) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
     """
 
     name: str

@@ -69,6 +69,11 @@ class Recording:
         Angle increments in rad, body axes.
     remarks : tuple of str, optional
         What was left out of the file or taken in place of what it lacks, a sentence each.
+
+    Examples
+    --------
+    >>> Recording(0.0, 0.01, np.full((4, 3), 1e-3)).largest
+    0.001
     """
 
     start: float
@@ -100,6 +105,11 @@ class InertialRecording(Recording):
     ----------
     velocity_increments : array, (N, 3)
         Integrals of the specific force in m/s, body axes.
+
+    Examples
+    --------
+    >>> InertialRecording(0.0, 0.01, np.full((4, 3), 1e-3), np.zeros((4, 3))).largest
+    0.001
     """
 
     velocity_increments: Array
@@ -123,6 +133,13 @@ class History(Records):
         Number of increments at the end that do not fill a step.
     elements : tuple of str
         Names of the elements of a state, row-major; empty where they are not known.
+
+    Examples
+    --------
+    >>> from strapgen import backend
+    >>> history = propagate(backend("euler"), Recording(0.0, 0.01, np.zeros((20, 3))))
+    >>> history.states.shape, history.step
+    ((11, 4), 0.02)
     """
 
     time: Array

@@ -47,6 +47,12 @@ class SystemRunner:
         Its generated stages.
     backend : str
         Name of the back end.
+
+    Examples
+    --------
+    >>> from strapgen import read_system, system_runner
+    >>> system_runner(read_system("two-speed-euler"))
+    <SystemRunner two_speed_euler on numpy: fast, slow, nav>
     """
 
     __repr__ = short_repr
@@ -438,6 +444,12 @@ def system_runner(
         If a name is not known, or a stage does not go with the settings.
     CompilerError
         If the back end needs a C compiler and there is none.
+
+    Examples
+    --------
+    >>> from strapgen import read_system
+    >>> system_runner(read_system("two-speed-euler"))
+    <SystemRunner two_speed_euler on numpy: fast, slow, nav>
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
     chosen = fit_settings(backend, settings)

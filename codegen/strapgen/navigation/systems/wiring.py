@@ -67,6 +67,11 @@ def read_system(path: str | Path, sample_hz: Fraction | None = None) -> Descript
     ------
     InputError
         If anything in the file is wrong; the message names the stage and the wire.
+
+    Examples
+    --------
+    >>> read_system("two-speed-euler")
+    <Description two_speed_euler: fast, slow, nav>
     """
     text = system_file.read(built_in.file_of(path), sample_hz)
     try:
