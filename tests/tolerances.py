@@ -24,7 +24,7 @@ def roundoff(backend: Backend, steps: int, orthonormalizations: int = 0) -> floa
         return UNITS_A_STEP * steps * backend.unit / 2
     total = interface.accumulation.bound(steps, rounded_inputs=True, stretch=1.0)
     if orthonormalizations:
-        (result,) = backend.beside(backend._orthonormalization).interface.outputs
+        (result,) = backend.companion(backend._orthonormalization).interface.outputs
         width = result.signal.shape[-1]
         total += orthonormalizations * float(max(result.errors)) * np.sqrt(width)
     # The start and the state at the end are rounded to their format too.

@@ -38,7 +38,7 @@ _FOLDERS = ("tableaux", "windows", "coning_shapes")
 
 
 class Command(NamedTuple):
-    """A command: "module:function", where ``strapgen --help`` lists it and with what; a hidden one is not listed.
+    """A command: "module:function", and its heading and summary in ``strapgen --help``.
 
     With a summary, which is the first sentence of its help, the list does not import it.
     """
@@ -50,7 +50,7 @@ class Command(NamedTuple):
 
 
 class Schema(NamedTuple):
-    """A JSON Schema: that of a "result", or of a "file" of a user's, and what has it."""
+    """A JSON Schema of a "result" or of a user's "file", and its place."""
 
     kind: str
     #: "module:name" of a class with a method `schema`, or of a function that returns the schema
@@ -69,7 +69,7 @@ class Schema(NamedTuple):
 
 @dataclass(frozen=True)
 class Registration:
-    """What a folder or a package brings; every place is a text "module:name", imported when it is used.
+    """The registration of a folder or a package; every place is a text "module:name", imported when used.
 
     Parameters
     ----------

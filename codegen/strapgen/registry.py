@@ -56,7 +56,7 @@ class Names(Mapping[str, T], Generic[T]):
         return list(self)
 
 
-class _Own(Names[T]):
+class _BuiltIn(Names[T]):
     """The objects of a kind that strapgen itself registers, by name."""
 
     def __init__(self, kind: str, keep: Callable[[Any], bool] | None, first: str) -> None:
@@ -114,7 +114,7 @@ class Registry(Names[T]):
         group: str = "",
         first: str = "",
     ) -> None:
-        self.own: _Own[T] = _Own(kind, keep, first)
+        self.own: _BuiltIn[T] = _BuiltIn(kind, keep, first)
         self._kind, self._record, self._keep, self._group = kind, record, keep, group
 
     def _in_words(self) -> str:

@@ -209,7 +209,7 @@ def test_the_bound_of_two_speeds_holds_in_a_run(word, loops):
         bound = rounded.rounding(0.0).deg_h
         assert bound is not None
         for motion in (strapgen.motion("constant", z_deg_s=190), vibration(brief.environment.lines(), brief)):
-            lost = rounded.rounded_apart(motion, 50, "none")
+            lost = rounded.rounding_drift(motion, 50, "none")
             assert 0 < lost <= bound, (state, motion.name)
 
 

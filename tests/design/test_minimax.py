@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from strapgen.design.filters import exchange
 from strapgen.design.filters.band_grid import BITS, REAL
-from strapgen.design.filters.exchange import Answers
+from strapgen.design.filters.exchange import Responses
 from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
 from strapgen.ir.exceptions import InputError, MissingExtraError
 
@@ -168,7 +168,7 @@ def integers(values) -> list[int]:
 def test_the_sum_is_that_of_a_linear_programme(count, seed):
     rng = np.random.default_rng(seed)
     matrix, right, weights = rng.normal(size=(60, count)), rng.normal(size=60), rng.uniform(1e-6, 1, 60)
-    answers = Answers([integers(column) for column in matrix.T], integers(right))
+    answers = Responses([integers(column) for column in matrix.T], integers(right))
     solution = exchange.least_absolute(answers, [REAL.mpf(w) for w in weights])
     errors = np.abs(right - matrix @ np.array([float(x) for x in solution]))
     ones = np.eye(60)
@@ -185,7 +185,7 @@ def test_the_sum_is_that_of_a_linear_programme(count, seed):
 
 
 def test_one_unknown_is_the_weighted_median():
-    answers = Answers([integers([1] * 5)], integers([5, 1, 2, 9, 3]))
+    answers = Responses([integers([1] * 5)], integers([5, 1, 2, 9, 3]))
     (plain,) = exchange.least_absolute(answers, [1] * 5)
     (weighted,) = exchange.least_absolute(answers, [1, 1, 1, 5, 1])
     assert (float(plain), float(weighted)) == (3, 9)
@@ -193,4 +193,4 @@ def test_one_unknown_is_the_weighted_median():
 
 def test_fewer_points_than_unknowns_are_refused():
     with pytest.raises(InputError, match="1 lines do not determine 2 coefficients"):
-        exchange.least_absolute(Answers([integers([1]), integers([2])], integers([3])), [1])
+        exchange.least_absolute(Responses([integers([1]), integers([2])], integers([3])), [1])

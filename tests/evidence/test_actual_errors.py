@@ -70,7 +70,7 @@ def test_balls_that_are_too_wide_prove_nothing(monkeypatch):
 def test_runs_stay_within_their_bound(step, settings):
     subject = Subject(choose_step(*step, 2), Settings(**settings))
     angles = subject.fixed.interface.angle_accumulation
-    run = actual_errors.run_of(subject, angles, 400)
+    run = actual_errors.random_run_angle(subject, angles, 400)
     assert run.proper
     assert 0 < run.angle <= run.bound
     if step == ("dcm", "rk4"):
@@ -85,7 +85,7 @@ def test_a_run_that_drifts_is_noticed(monkeypatch):
         return ((results := model(words, *others))[0][0] + 40, *results[0][1:]), *results[1:]
 
     monkeypatch.setattr(actual_errors, "_models", lambda _: (drifting, normalization))
-    run = actual_errors.run_of(EULER, angles, 200)
+    run = actual_errors.random_run_angle(EULER, angles, 200)
     assert run.angle > run.bound
 
 

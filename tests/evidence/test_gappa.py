@@ -231,9 +231,9 @@ def test_axioms_beyond_real_numbers_are_reported():
     text, count = gappa.without_hypotheses("Hypothesis a1 : r1 = r2.\nVariable x : R.\n")
     assert (count, "Hypothesis" in text) == (1, False)
     real = "ClassicalDedekindReals.sig_not_dec : forall P : Prop, {~ ~ P} + {~ P}"
-    assert gappa.strange_axioms(f"Axioms:\n{real}\na7 : (r1 = r2)%R\nClassical_Prop.classic\n") == ["a7"]
-    assert gappa.strange_axioms(f"Axioms:\n{real}\n") == []
-    assert gappa.strange_axioms("")
+    assert gappa.extra_axioms(f"Axioms:\n{real}\na7 : (r1 = r2)%R\nClassical_Prop.classic\n") == ["a7"]
+    assert gappa.extra_axioms(f"Axioms:\n{real}\n") == []
+    assert gappa.extra_axioms("")
 
 
 @pytest.mark.parametrize("subject", [Subject(PRODUCT), Subject(choose_step("dcm", "rk4", 2))])

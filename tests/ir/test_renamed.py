@@ -38,3 +38,12 @@ def test_old_fields_of_a_step_and_its_kernel():
             assert one.companions == kernel.attitude_step
         with pytest.warns(DeprecationWarning, match="own is now bundled_"):
             assert one.own == ()
+
+
+def test_old_names_of_companions_and_extra_increments():
+    algorithm = strapgen.backend("euler", "rk1")
+    with pytest.warns(DeprecationWarning, match="Backend.beside is now companion"):
+        assert algorithm.beside("dcm-from-euler") is algorithm.companion("dcm-from-euler")
+    step = strapgen.derive("euler", "coning-compressed", 1, previous=1).attitude_step
+    with pytest.warns(DeprecationWarning, match="AttitudeStep.beside is now extra_increments"):
+        assert step.beside == step.extra_increments == 1

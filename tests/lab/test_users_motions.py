@@ -19,7 +19,7 @@ from strapgen.analysis.series.series import series
 from strapgen.cli import main
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.rate_expressions import Jets, UnboundedError, operations_of, time_symbol
-from strapgen.lab.motions.rate_motion import DIGITS, RATE_DEGREE, Integrated
+from strapgen.lab.motions.rate_motion import DIGITS, RATE_DEGREE, IntegratedRate
 from strapgen.lab.motions.users_motions import any_motion, read_motion, require_consistent
 from strapgen.run.exact import interpreter
 
@@ -272,7 +272,7 @@ def test_the_motions_of_the_catalogue_pass_the_check(name, settings):
 def test_increments_have_forty_digits_and_the_attitude_is_within_its_bound():
     a, b, g = sp.pi / 10, sp.Integer(3), sp.Rational(1, 7)
     rate = [a * sp.sin(b * T), g, a * sp.cos(b * T)]
-    integrated = Integrated("coning", *operations_of("coning", rate))
+    integrated = IntegratedRate("coning", *operations_of("coning", rate))
     with mp.workdps(DIGITS):
         truth = interpreter("coning-truth")
         for time in (mp.mpf(7) / 3, mp.mpf(10)):
@@ -290,7 +290,7 @@ def test_increments_have_forty_digits_and_the_attitude_is_within_its_bound():
 def test_the_truncated_term_of_a_rate_is_within_its_bound():
     """A power of the time leaves out one term, which is known: of a longer piece it would be above the tolerance."""
     power = RATE_DEGREE + 1
-    integrated = Integrated(
+    integrated = IntegratedRate(
         "power", *operations_of("power", [2**60 * T**power, sp.Integer(0), sp.Integer(0)])
     )
     with mp.workdps(DIGITS):
@@ -302,7 +302,7 @@ def test_the_truncated_term_of_a_rate_is_within_its_bound():
 
 
 def test_negative_times_are_integrated():
-    integrated = Integrated("odd", *operations_of("odd", [sp.exp(T), T**3, sp.sqrt(4 + T)]))
+    integrated = IntegratedRate("odd", *operations_of("odd", [sp.exp(T), T**3, sp.sqrt(4 + T)]))
     with mp.workdps(DIGITS):
         piece = integrated.piece(mp.mpf(-2))
         true = [mp.exp(-2) - 1, mp.mpf(4), (mp.sqrt(2) ** 3 - 8) * 2 / 3]

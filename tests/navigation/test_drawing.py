@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from navigation.described_files import ATTITUDE, description
 
 from strapgen.ir.signals import Signal
-from strapgen.navigation.systems.drawing_routing import Box, Link, Placement, Port, Way
+from strapgen.navigation.systems.drawing_routing import Box, Link, Placement, Port, WirePath
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Rate, SystemStage, Wire
 from strapgen.navigation.systems.system_drawing import drawing, plan
 from strapgen.navigation.systems.wiring import read_system
@@ -169,7 +169,7 @@ def test_faults_of_a_drawing_are_noticed():
         (first, Port("out", "1", "", x=100, y=10)), (second, Port("in", "1", "", x=0, y=20)), "forward"
     )
     other = Link((first, Port("more", "1", "", x=100, y=10)), (second, Port("in", "1", "")), "forward")
-    ways = [Way(one, ((100, 10), (-20, 14), (-20, 30), (5, 30))) for one in (link, other)]
+    ways = [WirePath(one, ((100, 10), (-20, 14), (-20, 30), (5, 30))) for one in (link, other)]
     texts = " ".join(faults(Placement([first, second], [link, other], ways=ways, width=50, height=50)))
     for words in ("lies on", "in no lane", "outside", "end at its port", "slanting", "passes through"):
         assert words in texts

@@ -16,7 +16,7 @@ from strapgen.ir.formats import Format
 from strapgen.ir.signals import Signal
 from strapgen.kernel.kernel import KernelBuilder
 from strapgen.navigation.systems import system_bounds as pass_bounds
-from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
+from strapgen.navigation.systems.fitting import GeneratedStages, clipped, fitted
 from strapgen.navigation.systems.system_bounds import bounds, moved
 from strapgen.navigation.systems.system_file import parsed
 from strapgen.navigation.systems.system_runner import system_runner
@@ -51,7 +51,7 @@ def matrix(word: int, **more: object) -> dict[str, object]:
     return {"name": "matrix", "kernel": "dcm-from-euler", "every": 2, "word": word, "wires": wires} | more
 
 
-def own(fit: Fitted, stage: str) -> tuple[Fraction, ...]:
+def own(fit: GeneratedStages, stage: str) -> tuple[Fraction, ...]:
     """Return the error bounds of a stage's last output by itself."""
     interface = fit.sources[stage].fixed
     assert interface is not None
@@ -112,7 +112,7 @@ def test_half_a_unit_is_lost_on_a_wire_and_the_bound_is_that_of_its_loss(words):
         assert loss <= limit - rounding < loss + GRID
 
 
-def writing(step: int, norm: int) -> Fitted:
+def writing(step: int, norm: int) -> GeneratedStages:
     """Return a normalization at half the rate that replaces the state of a step."""
     stage = {
         "name": "norm",

@@ -19,7 +19,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.signals import Signal
-from strapgen.navigation.systems.fitting import Fitted, fitted
+from strapgen.navigation.systems.fitting import GeneratedStages, fitted
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.system_comparison import agreement
 from strapgen.navigation.systems.system_file import parsed
@@ -183,13 +183,13 @@ def _kind(argument: Argument) -> type:
     return object if argument.format.word > 32 else np.int64
 
 
-def two_speeds(algorithm: str, sculling: int, settings: Settings) -> Fitted:
+def two_speeds(algorithm: str, sculling: int, settings: Settings) -> GeneratedStages:
     """Return the loops of an algorithm in two speeds as the stages of a system; no wire is rescaled."""
     description = two_speed_sources.description(algorithm, sculling)
     stages = description.system.stages
     loops = two_speed_sources.loops(algorithm, sculling, "fixed-model", settings)
     names = (stage.name for stage in stages)
-    fit = Fitted(description, "fixed-model", settings, dict(zip(names, loops, strict=True)))
+    fit = GeneratedStages(description, "fixed-model", settings, dict(zip(names, loops, strict=True)))
     arguments: dict[str, Argument] = {}
     for stage in stages:
         known = fit.arguments_of(stage)

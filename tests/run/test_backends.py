@@ -307,7 +307,7 @@ def test_every_orthonormalization_restores_the_constraint(make, rng):
         after = np.linalg.norm(np.swapaxes(restored, 1, 2) @ restored - np.eye(3), ord=2, axis=(1, 2))
         # 100 units: some dozens of operations on numbers near 1, all well conditioned. An error of the elements is
         # one of twice its spectral norm, at most six times as much, in C'C.
-        allowed = one_call(backend.beside(scheme), 100 / 6)
+        allowed = one_call(backend.companion(scheme), 100 / 6)
         assert np.all(after <= residue(excess) + 6 * allowed), scheme
 
 

@@ -95,7 +95,7 @@ def _draw_over_time(axes: Any, rung: StepAgreement) -> None:
 
 
 def _draw_against_step(axes: Any, agreements: Sequence[Agreement]) -> None:
-    """Draw the simulated drift against the step, and what is left of it after each prediction."""
+    """Draw the simulated drift against the step, and its residual after each prediction."""
     rungs = agreements[0].rungs
     steps = [rung.step_s for rung in rungs]
     drifts = [rung.drift or math.nan for rung in rungs]

@@ -153,7 +153,7 @@ def series_text(analysis: ErrorAnalysis) -> str:
 
 @dataclass(frozen=True)
 class SeriesResult(Result):
-    """What one step loses, as power series in its length, with the drift of a run; expressions are text for SymPy."""
+    """The errors of one step as power series in its length, with the drift of a run; expressions are text for SymPy."""
 
     each = ErrorAnalysis
     drawn_by = "strapgen.analysis.analysis_plots:agreement_image"

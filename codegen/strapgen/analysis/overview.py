@@ -88,7 +88,7 @@ class OverviewRow(Record):
 
     @property
     def drift_at_equal_work_deg_h(self) -> float | None:
-        """That drift rate if the step is so long that it takes as many operations a second as all others."""
+        """That drift rate at the step with which all algorithms need the same number of operations a second."""
         return _deg_h(self.coning_rate(self.operations / WORK))
 
 
@@ -192,7 +192,7 @@ class OverviewResult(Result):
     algorithms: Sequence[OverviewRow]
 
     def reader(self) -> TextTable:
-        """Return what fits side by side."""
+        """Return the columns that fit side by side."""
         return reader_table(self.algorithms, OverviewRow, *_COLUMNS)
 
     def text(self) -> str:

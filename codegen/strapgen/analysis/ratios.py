@@ -150,7 +150,7 @@ def quotient(first: Terms, second: Terms, terms: int = 2) -> dict[int, sp.Expr] 
 
 
 def _parallel(vector: Sequence[sp.Expr], direction: Sequence[sp.Expr], place: int) -> bool:
-    """Tell whether all elements are to one of them as those of a direction are, without a quotient of long sums."""
+    """Return whether the elements are proportional to a direction, without quotients of long sums."""
     return all(
         sp.expand(x * direction[place] - vector[place] * d) == 0
         for k, (x, d) in enumerate(zip(vector, direction, strict=True))

@@ -118,7 +118,7 @@ class DriftPlot:
 
 @dataclass(frozen=True)
 class SeriesOutput(Output):
-    """Where the series go, and in which format."""
+    """Options for the output of the series."""
 
     plot: Annotated[
         Path | None,

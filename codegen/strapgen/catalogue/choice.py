@@ -204,7 +204,7 @@ def orthonormalizations(algorithm: str) -> list[str]:
 
 
 @dataclass(frozen=True)
-class _Head:
+class _KernelProperties:
     """The properties of a kernel that need none of its formulas."""
 
     name: str
@@ -217,7 +217,7 @@ class _Head:
     beside: tuple[int, int] | None = None
 
     @classmethod
-    def of(cls, kernel: Kernel) -> _Head:
+    def of(cls, kernel: Kernel) -> _KernelProperties:
         shape = kernel.inputs[-1].shape if kernel.inputs else ()
         brought = tuple(other.name for other in kernel.bundled_kernels)
         text = _text(replace(kernel, arguments=""))
@@ -229,7 +229,9 @@ class _Head:
 class UserKernel:
     """A user's kernel, loaded from the cache when needed; equal to one with the same formulas and arguments."""
 
-    def __init__(self, head: _Head, restore: Callable[[], Kernel], arguments: str | None = None) -> None:
+    def __init__(
+        self, head: _KernelProperties, restore: Callable[[], Kernel], arguments: str | None = None
+    ) -> None:
         self.head, self.arguments = head, arguments
         self._restore = restore
         self._kernel: Kernel | None = None
@@ -237,7 +239,7 @@ class UserKernel:
     @classmethod
     def of(cls, kernel: Kernel) -> UserKernel:
         """Return a kernel that is at hand."""
-        return cls(_Head.of(kernel), lambda: kernel, kernel.arguments)
+        return cls(_KernelProperties.of(kernel), lambda: kernel, kernel.arguments)
 
     def with_arguments(self, arguments: str) -> UserKernel:
         """Return the same kernel with other arguments."""
@@ -273,7 +275,7 @@ class UserKernel:
 
 def packed(kernel: Kernel) -> bytes | None:
     """Return the head of a kernel as bytes; None if it has SymPy objects, which are slow to import."""
-    head = _Head.of(kernel)
+    head = _KernelProperties.of(kernel)
     if b"sympy" in pickle.dumps(replace(head, text="")):
         return None
     return pickle.dumps(head)

@@ -17,7 +17,7 @@ from strapgen.catalogue.choice import (
     named,
     read_constants,
 )
-from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS, Asked, MethodSpec
+from strapgen.catalogue.methods.method_spec import MOST_INCREMENTS, MethodSpec, RequestedSamples
 from strapgen.catalogue.methods.tableaux import TABLEAUX
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import EXACT
@@ -101,7 +101,7 @@ def choose(
                 raise InputError(f"{option} is {value!r}, but the choice of {name.kernel} has its own")
         return name
     name = os.fspath(name)
-    asked = Asked(increments, rates, previous, ahead)
+    asked = RequestedSamples(increments, rates, previous, ahead)
     if name.endswith(".py") or (name not in reserved() and name in loading.installed()):
         choice = _choose_users(name, method, asked)
     elif name in ALGORITHMS or name in VECTORS:
@@ -167,7 +167,7 @@ def _with_layout(choice: Choice, layout: str | Path | Description | None) -> Cho
     return replace(choice, layout=layout)
 
 
-def _choose_method(name: str, method: AnyMethod | None, asked: Asked) -> Choice:
+def _choose_method(name: str, method: AnyMethod | None, asked: RequestedSamples) -> Choice:
     """Return the choice of an attitude step of the catalogue, or of a vector of one."""
     vector = VECTORS.get(name)
     if method is None:
@@ -208,7 +208,7 @@ def _require_vector(
             raise InputError(f"{name} goes with no tableau; allowed methods: {allowed}")
 
 
-def _choose_users(name: str, method: AnyMethod | None, asked: Asked) -> Choice:
+def _choose_users(name: str, method: AnyMethod | None, asked: RequestedSamples) -> Choice:
     """Load a user's algorithm with the options that the user chose."""
     if asked.rates:
         raise InputError(

@@ -7,7 +7,13 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
-from strapgen.catalogue.methods.method_spec import Asked, Integrator, MethodSpec, StepSamples, through_samples
+from strapgen.catalogue.methods.method_spec import (
+    Integrator,
+    MethodSpec,
+    RequestedSamples,
+    StepSamples,
+    through_samples,
+)
 from strapgen.catalogue.methods.shaped_coning import SHAPE_TITLES, SHAPES
 from strapgen.catalogue.methods.tableaux import TABLEAUX, TITLES
 from strapgen.catalogue.methods.windows import EXACT, WINDOW_TITLES, named_window
@@ -63,13 +69,13 @@ class _NamedTableau:
         """Largest residual of a condition that the rounding of published coefficients explains."""
         return TABLEAUX[self.name].tolerance
 
-    def select(self, asked: Asked) -> tuple[_NamedTableau, StepSamples]:
-        """Return the samples that are asked for."""
+    def select(self, asked: RequestedSamples) -> tuple[_NamedTableau, StepSamples]:
+        """Return the requested samples."""
         return self, through_samples(self.name, asked)
 
 
 def named_method(method: str | MethodSpec) -> MethodSpec | None:
-    """Return the method of a name, None where there is none; what is a method already is returned as it is.
+    """Return the method of a name, None for an unknown name; return a method unchanged.
 
     Examples
     --------
@@ -87,7 +93,7 @@ def named_method(method: str | MethodSpec) -> MethodSpec | None:
 
 
 def is_built_in(method: str) -> bool:
-    """Tell whether a name is none of an installed package's file of coefficients, which is then part of a choice."""
+    """Return whether a name is not that of an installed package's coefficient file."""
     name = method.removesuffix(EXACT)
     return not any(name in table and name not in table.own for table in (TITLES, SHAPE_TITLES, WINDOW_TITLES))
 

@@ -77,7 +77,7 @@ class Key:
 
     @property
     def described(self) -> dict[str, str]:
-        """What a JSON Schema says of the key, with its unit."""
+        """The description of the key in a JSON Schema, with its unit."""
         if not self.unit:
             return {"description": self.text}
         return {"description": f"{self.text} [{self.unit}]", "unit": self.unit}
@@ -325,7 +325,7 @@ class _Either(_Form):
         return {"anyOf": [form.schema() for form in self.forms]}
 
 
-class _Own(_Form):
+class _Custom(_Form):
     """A class that reads itself, a `Readable`."""
 
     def __init__(self, kind: Any) -> None:
@@ -419,7 +419,7 @@ def _form_of(hint: Any, key: Key) -> _Form:
     if hint is bool:
         return _Flag()
     if hasattr(hint, "from_toml"):
-        return _Own(hint)
+        return _Custom(hint)
     return _table(hint) if hasattr(hint, "__dataclass_fields__") else _Number(hint, key)
 
 

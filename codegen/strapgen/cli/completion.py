@@ -36,7 +36,7 @@ _NAMES = {
 
 
 def is_asked() -> bool:
-    """Tell whether a shell asks for the words that may follow."""
+    """Return whether a shell asks for the words that may follow."""
     return _ASKS in os.environ
 
 
@@ -71,7 +71,7 @@ def _line() -> list[str]:
 
 
 def of(words: Words) -> Complete:
-    """Return what completes a word by names, in a list with commas the last of them."""
+    """Return a function that completes a word by names; of a comma-separated list it completes the last."""
 
     def complete(incomplete: str) -> list[tuple[str, str] | str]:
         before, comma, _ = incomplete.rpartition(",")
@@ -86,7 +86,7 @@ def of(words: Words) -> Complete:
 
 
 def of_parameter(spelling: str, words: Words | None) -> Complete | None:
-    """Return what completes the values of an option or an argument; None where they have no names."""
+    """Return a function that completes the values of an option or argument; None for values without names."""
     known = words or _NAMES.get(spelling.removesuffix("..."))
     return None if known is None else of(known)
 

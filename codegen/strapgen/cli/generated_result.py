@@ -158,7 +158,7 @@ class StepCheck(Result):
     difference: str
 
     def text(self) -> str:
-        """Return what differs."""
+        """Return the differences."""
         return self.difference
 
 

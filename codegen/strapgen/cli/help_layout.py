@@ -67,7 +67,7 @@ _JOBS = {
 
 
 def first_steps() -> str:
-    """Return what strapgen does in five jobs, for a command line without words."""
+    """Return the five main jobs of strapgen, for a command line without words."""
     lines = [*_fill(PROGRAM.paragraphs[0], "", "")]
     for name, (what, command) in _JOBS.items():
         lines += ["", *_fill(f"{name}: {what}", "", "  "), *_command_lines(command)]

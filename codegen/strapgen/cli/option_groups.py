@@ -74,7 +74,7 @@ class Shown(NamedTuple):
 
 
 class Option(NamedTuple):
-    """An option or an argument of a command: what Typer reads, and what makes a typed value of it."""
+    """An option or an argument of a command: its declaration for Typer, and the reader of its values."""
 
     spellings: tuple[str, ...]  # on the command line; of an argument its metavar
     kind: Any  # of its values, without None
@@ -93,7 +93,7 @@ class Option(NamedTuple):
 
     @property
     def help(self) -> str:
-        """What the option is, in a line."""
+        """The help of the option, in a line."""
         return next(
             (one.help or "" for one in self.parameter.annotation.__metadata__ if hasattr(one, "help")), ""
         )

@@ -35,7 +35,7 @@ def format_option(formats: tuple[str, ...], default: str = "") -> Any:
 
 
 def plot_option(what: str) -> Any:
-    """Return the option --plot for a picture of something."""
+    """Return the option --plot with a help text on its picture."""
     return option("--plot", metavar="FILE", help=f"Image file for {what}; its ending says the type.")
 
 

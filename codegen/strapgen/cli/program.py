@@ -62,7 +62,7 @@ class PlainGroup(TyperGroup):
 
 
 def _words_of_variant(command: Any, context: Any, name: str, words: Sequence[str]) -> dict[str, Any]:
-    """Return what a variant states for the parameters of a command, as the parser takes it."""
+    """Return the values of a variant for the parameters of a command, as the parser takes them."""
     stated = registration.extension("cli.variant", "--variant")(
         name, context.command_path.partition(" ")[2], words
     )

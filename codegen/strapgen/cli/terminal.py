@@ -1,4 +1,4 @@
-"""What commands say: results with verdicts in colour on a terminal, and remarks on stderr, which --quiet leaves out."""
+"""Output of commands: results with verdicts in colour on a terminal, and remarks on stderr unless --quiet."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def silence() -> Callable[[], None]:
 
 
 def is_quiet() -> bool:
-    """Tell whether remarks and progress are left out."""
+    """Return whether remarks and progress are left out."""
     return _quiet
 
 
 def is_coloured(stream: TextIO) -> bool:
-    """Tell whether a stream takes colour: a terminal does, unless NO_COLOR is set; any does with FORCE_COLOR."""
+    """Return whether a stream takes colour: a terminal does, unless NO_COLOR is set; any does with FORCE_COLOR."""
     if os.environ.get("NO_COLOR"):
         return False
     if os.environ.get("FORCE_COLOR"):

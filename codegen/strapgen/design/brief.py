@@ -364,7 +364,7 @@ def read_brief(path: str | Path) -> DesignBrief:
 
 
 def files_of(path: str | Path) -> list[Path]:
-    """Return the files that a brief is read from: its own, and that of its vibration."""
+    """Return the files of a brief: its own, and that of its vibration."""
     vibration = BRIEF.read(path).vibration
     named = [name for name in (vibration.psd, vibration.recording) if name is not None]
     return [Path(path), *(Path(path).parent / name for name in named)]

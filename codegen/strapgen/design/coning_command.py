@@ -99,7 +99,7 @@ class ConingDesign(BandOptions):
     ] = None
 
     def brief(self, samples: int, previous: int) -> ConingBrief:
-        """Return what the options say."""
+        """Return the requirements from the options."""
         from strapgen.analysis.vibration.spectrum import read_spectrum
         from strapgen.design.coning_design import ConingBrief, of_spectrum
 
@@ -129,7 +129,7 @@ class ConingDesign(BandOptions):
 
 @dataclass(frozen=True)
 class ConingOutput(Output):
-    """Where the coefficients go, and in which format."""
+    """Options for the output of the coefficients."""
 
     format: Annotated[_Text, format_option((*Output.formats, _FILE_FORMAT))] = "text"
     formats: ClassVar[tuple[str, ...]] = (*Output.formats, _FILE_FORMAT)

@@ -26,7 +26,7 @@ from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.design.family import number
 from strapgen.design.filters import exchange
 from strapgen.design.filters.band_grid import BITS, REAL, integer
-from strapgen.design.filters.exchange import Answers
+from strapgen.design.filters.exchange import Responses
 from strapgen.design.filters.filter_taps import TABLE_BITS, nearest
 from strapgen.design.filters.mean_square import solve
 from strapgen.ir.exceptions import InputError
@@ -44,7 +44,7 @@ _LEVEL_DIGITS = 6
 
 @dataclass(frozen=True)
 class ConingBrief:
-    """What coning coefficients are to do."""
+    """The requirements on coning coefficients."""
 
     #: N samples of the step, and samples from before it
     samples: int
@@ -69,7 +69,7 @@ class ConingBrief:
 
     @property
     def shape(self) -> ConingShape:
-        """What determines the drift beside the coefficients."""
+        """The samples and the gyro, which determine the drift beside the coefficients."""
         return ConingShape(self.samples, self.previous, self.gyro)
 
     @property
@@ -167,11 +167,11 @@ class ConingProblem:
 
     @cached_property
     def directions(self) -> list[list[Fraction]]:
-        """What a unit of each free coefficient adds to all of them, (free, unknowns)."""
+        """The derivatives of all coefficients by the free ones, (free, unknowns)."""
         units = [[Fraction(int(i == j)) for j in range(self.free)] for i in range(self.free)]
         return [[a - b for a, b in zip(self.complete(unit), self.base, strict=True)] for unit in units]
 
-    def answers(self, points: Sequence[Any]) -> Answers:
+    def answers(self, points: Sequence[Any]) -> Responses:
         """Return the answers at frequencies in rad a sample."""
         directions = [[integer(x) for x in direction] for direction in self.directions]
         base = [integer(x) for x in self.base]
@@ -183,7 +183,7 @@ class ConingProblem:
             for column, direction in zip(columns, directions, strict=True):
                 column.append(sum(map(mul, direction, row)) >> BITS)
             right.append(integer(rest) - (sum(map(mul, base, row)) >> BITS))
-        return Answers(columns, right)
+        return Responses(columns, right)
 
     def rounded(self, free: Sequence[Any], bits: int = TABLE_BITS) -> tuple[Fraction, ...]:
         """Return all coefficients as rationals: the free ones as nearest multiples of 2^-bits, the rest exactly."""
@@ -215,7 +215,7 @@ def _reduce(
     return pivots, table[: len(pivots)]
 
 
-def _mean_square(problem: ConingProblem, answers: Answers, brief: ConingBrief) -> list[Any]:
+def _mean_square(problem: ConingProblem, answers: Responses, brief: ConingBrief) -> list[Any]:
     """Return the free coefficients of the least mean square of the drift, with that of noise and of pulses.
 
     A line of random phase, with the amplitude product S df, has a drift of the mean square (S df E / (N T))^2/2. The

@@ -173,7 +173,7 @@ class ShapedDrift:
         return [(b, float(x), float(y)) for b, x, y in zip(points, *both, strict=True)]
 
     def figures(self) -> dict[str, float]:
-        """Return what the coefficients reach, and what those reach that annul powers.
+        """Return the drift of the coefficients, and of those that annul powers.
 
         Returns: over a band the largest drift in rad a step; under a spectrum the drift in deg/h for the worst
         phases, and its root mean square for lines of random phases.
@@ -202,7 +202,7 @@ class ShapedDrift:
 
 
 def figure_lines(drift: ShapedDrift) -> list[str]:
-    """Return what the coefficients reach as lines of text."""
+    """Return the drift of the coefficients as lines of text."""
     figures = drift.figures()
     if drift.shape.band is not None:
         return [
@@ -219,7 +219,7 @@ def figure_lines(drift: ShapedDrift) -> list[str]:
 
 @dataclass(frozen=True)
 class ReachedDrift:
-    """What coefficients reach, and what those reach that annul powers; over a band, or under a spectrum."""
+    """The drift of coefficients, and of those that annul powers, over a band or under a spectrum."""
 
     #: Largest drift over the band
     largest_rad_step: float | None = field(metadata=entry(optional=True))
@@ -269,7 +269,7 @@ class ShapedResult(Result):
 
     @staticmethod
     def of(drift: ShapedDrift) -> ShapedResult:
-        """Return coefficients with what they reach."""
+        """Return coefficients with their drift."""
         shape = drift.shape
         gyro = None if shape.gyro is None else {key: float(one) for key, one in vars(shape.gyro).items()}
         same = (
@@ -293,7 +293,7 @@ class ShapedResult(Result):
         )
 
     def text(self) -> str:
-        """Return the coefficients, and what they reach."""
+        """Return the coefficients and their drift."""
         drift, shape = self.shaped, self.shaped.shape
         names = sample_names(shape.samples, shape.previous)
         rows = [

@@ -1,4 +1,4 @@
-"""Plots of designs: the errors of filters, and the drift of algorithms over what they cost."""
+"""Plots of designs: the errors of filters, and the drift of algorithms over their cost."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ _LABEL_GAIN = 0.2
 
 
 def selection_image(result: SelectionResult, path: str | Path) -> bytes:
-    """Return a picture of judgements: what the software adds to the drift, over its operations a second."""
+    """Return a plot of judgements: the drift due to software over its operations a second."""
     brief, ordered = result.brief, result.ordered
     figure, grid = figures.grid_of_axes(1, 1, (9.0, 5.4))
     axes = grid[0, 0]
@@ -225,7 +225,7 @@ def _is_whole(one: Judgement) -> bool:
 
 
 def _drift(one: Judgement) -> float:
-    """Return what is known of the software's drift, 0 before its coning is looked at."""
+    """Return the known part of the software's drift, 0 before its coning is computed."""
     if one.drift_deg_h["coning"] is None and one.binding != "truncation":
         return 0.0
     return sum(one.drift_deg_h[cause] or 0.0 for cause in SOFTWARE)

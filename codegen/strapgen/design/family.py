@@ -23,7 +23,7 @@ ONE_SIDED_NOISE = Fraction(3, 10000)
 
 @dataclass(frozen=True)
 class FamilyBrief:
-    """What a family of filters is to do.
+    """The requirements on a family of filters.
 
     Parameters
     ----------

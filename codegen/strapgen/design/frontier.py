@@ -1,4 +1,4 @@
-"""Compares attitude algorithms by their drift on many motions and by what they cost, at one sampling rate.
+"""Compares attitude algorithms by drift on many motions and by cost, at one sampling rate.
 
 Every algorithm takes the same samples. The cost of a step is counted from its program, and divided by the samples
 of the step.
@@ -160,7 +160,7 @@ class RunSpec:
 
 
 def candidates(names: Iterable[str] | None = None) -> list[Candidate]:
-    """Return the algorithms that are asked for, checked.
+    """Return the requested algorithms, checked.
 
     >>> [candidate.name for candidate in candidates(["magnus6", "rk2:1+1"])]
     ['magnus6:3', 'magnus6:4', 'magnus6:3+3', 'rk2:1+1']
@@ -201,7 +201,7 @@ def _of_method(method: str) -> list[Candidate]:
 
 
 def identity(sample_hz: str, duration: str, motions: Motions = MOTIONS) -> dict[str, Any]:
-    """Return what the results of a study belong to: the code, the sampling, and the motions."""
+    """Return the identity of a study: the code, the sampling, and the motions."""
     return {
         "study": "frontier",
         "version": VERSION,

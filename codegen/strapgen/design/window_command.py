@@ -205,7 +205,7 @@ def design(
 
 
 def _brief(size: WindowSize, band: Band, name: str | None) -> FamilyBrief:
-    """Return what the options say."""
+    """Return the requirements from the options."""
     from strapgen.catalogue.methods import windows
     from strapgen.design.family import FamilyBrief
 
@@ -330,7 +330,7 @@ def generate(
     output: Annotated[SourceOptions, Shown(only=("out", "name", "check", "force"))],
     format: Format = "text",
 ) -> None:
-    """Generate C that commits an attitude late and answers it now.
+    """Generate C that commits an attitude late, and estimates the present one.
 
     Each sample is passed to a function, which commits the attitude a few samples late, by filters on both sides of it;
     another function answers the attitude of now. A lost sample is restored.
@@ -358,7 +358,7 @@ def generated(
     fixed: FixedOptions,
     name: str | None,
 ) -> Sources:
-    """Return the sources that the options ask for."""
+    """Return the sources for the options."""
     from strapgen.design.commit_late import commit_late_sources
 
     rated = sample_hz if (fixed.max_rate_deg_s, fixed.lsb) != (None, None) else None

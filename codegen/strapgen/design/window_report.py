@@ -36,7 +36,7 @@ class FilterRow:
 
 @dataclass(frozen=True)
 class WindowSide:
-    """What differs from filters to filters of a family."""
+    """The properties of one set of filters of a family."""
 
     #: Samples before the step
     previous: int
@@ -220,7 +220,7 @@ def _tap_table(window: Window) -> TextTable:
 
 
 def window_warnings(window: Window) -> list[str]:
-    """Return what a user of filters should know: errors and gains that are large, a sentence each."""
+    """Return warnings of large errors and gains, a sentence each."""
     warnings = []
     level = responses.level(window, 1)
     if level > _HIGH_LEVEL:

@@ -1,1 +1,1 @@
-"""Evidence by independent tools for what the generated code promises: proofs, runs on processors, fuzzing."""
+"""Verification of generated code by external tools: proofs, runs on processors, fuzzing."""

@@ -1,4 +1,4 @@
-"""Certifies in ball arithmetic how far single calls and runs in fixed point are from exact arithmetic.
+"""Certifies in ball arithmetic the errors of single calls and runs in fixed point.
 
 The integer model computes what the C computes; the exact program is evaluated on the same integers in balls, numbers
 with a radius in which the exact value is certain to lie. Radii grow with every operation. Products of transitions are
@@ -119,7 +119,7 @@ def _judge_run(subject: Subject) -> tuple[Result, str]:
     if angles is None:
         return "not examined", "the header's bound of a run grows beyond all numbers"
     try:
-        run = run_of(subject, angles, COUNT)
+        run = random_run_angle(subject, angles, COUNT)
     except InputError as error:
         return "fails", str(error)
     detail = f"{run.normalizations} normalizations, {run.angle:.3g} rad, the bound is {run.bound:.3g} rad"
@@ -128,8 +128,8 @@ def _judge_run(subject: Subject) -> tuple[Result, str]:
     return "agrees" if run.angle <= run.bound else "fails", detail
 
 
-def run_of(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 1) -> CertifiedRun:
-    """Return how far a run of random increments turns from the exact one.
+def random_run_angle(subject: Subject, angles: AngleAccumulation, steps: int, seed: int = 1) -> CertifiedRun:
+    """Return the angle of a run of random increments from the exact one.
 
     Where the state is proved to stay proper for some steps, the increments fill their range and the state is normalized
     as often as that; elsewhere they are small.
@@ -230,7 +230,7 @@ def _nearest_rotation(matrix: Any) -> Any:
 
 
 def _is_proper(values: Sequence[float], angles: AngleAccumulation) -> bool:
-    """Tell whether a state is so near a proper one that the bound holds."""
+    """Return whether a state is so near a proper one that the bound holds."""
     shortest = float(angles.shortest)
     if len(values) == 4:
         return float(np.linalg.norm(values)) >= shortest

@@ -1,4 +1,4 @@
-"""What clang finds in generated C: warnings, findings of clang-tidy, and calls that its fuzzer breaks under sanitizers.
+"""Checks of generated C by clang: warnings, findings of clang-tidy, and fuzzing under sanitizers.
 
 Every check and warning is on but those that are named here. The fuzzer runs a driver that checks every call against the
 contract: ranges of inputs and outputs, range checks, error feedback, and the loops over samples and runs.
@@ -48,7 +48,7 @@ _PROGRAM = "./fuzz"
 
 
 def style(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell what two tools find in the C of a kernel."""
+    """Run two tools on the C of a kernel, and return their verdicts."""
     verdicts = []
     for case, files in _cases(subject).items():
         place = folder / "style" / case.replace(" ", "_")
@@ -113,7 +113,7 @@ def found_by_clang_tidy(folder: Path) -> list[str]:
 
 
 def found_by_clang(folder: Path) -> list[str]:
-    """Return what clang warns of in all C files below a folder, a line each; see `found_by_clang_tidy`."""
+    """Return the warnings of clang for all C files below a folder, a line each; see `found_by_clang_tidy`."""
     sources, include = _sources(folder)
     version = int(_clang_version().partition(".")[0])
     silent = [f"-Wno-{name}" for name, first in UNWARNED.items() if version >= first]
@@ -174,7 +174,7 @@ FUZZER = Tool("libFuzzer", ("clang",), "clang libclang-rt-14-dev", _clang_versio
 
 
 def fuzzing(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell whether a fuzzer finds a call that does not what the header says, or that a sanitizer reports."""
+    """Return whether a fuzzer finds a call that violates the contract, or that a sanitizer reports."""
     place = folder / "fuzzing"
 
     def judge() -> tuple[Result, str]:
@@ -211,14 +211,14 @@ def compile_driver(folder: Path, sources: Sources) -> str:
 
 
 def run_fuzzer(folder: Path, options: Sequence[str]) -> str:
-    """Let the fuzzer run; return what it reports, with the input that it reports it of, otherwise nothing."""
+    """Run the fuzzer; return its report with the input, or nothing."""
     command = [_PROGRAM, f"-max_len={LONGEST}", "-len_control=0", "-timeout=10", *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, check=False)
     return fuzzer_report(done.stderr.decode(errors="replace")) if done.returncode else ""
 
 
 def fuzzer_report(said: str) -> str:
-    r"""Return what a fuzzer's messages report: the contract's line, or that of a sanitizer, and the input.
+    r"""Return the report in a fuzzer's messages: the line of the contract or of a sanitizer, and the input.
 
     >>> fuzzer_report("f: an input is changed\nartifact_prefix='./'; Test unit written to ./crash-1\nBase64: AQ==\n")
     'f: an input is changed; input in base 64: AQ=='

@@ -39,7 +39,7 @@ REFERENCE_STEP = "euler-rk4-2"
 
 @dataclass(frozen=True)
 class Subject:
-    """A kernel whose C in fixed point is to be examined."""
+    """A kernel whose C in fixed point is verified."""
 
     choice: Choice
     #: Word, ranges and rounding; by default 32 bits and 1/8 rad
@@ -106,7 +106,7 @@ Result = Literal["proved", "agrees", "fails", "not examined", "not installed"]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What an independent tool says of one promise of a kernel's code."""
+    """The verdict of an external tool on one claim of a kernel's code."""
 
     #: Name of the kernel with its word, as the files have it: "euler_rk4_2_w32"
     kernel: str = field(metadata=entry("kernel", align="<"))
@@ -147,7 +147,7 @@ class Tool:
 
 
 def verdict(kernel: str, claim: str, tool: Tool, judge: Callable[[], tuple[Result, str]]) -> Verdict:
-    """Return what a tool says, or that it is not installed."""
+    """Return the verdict of a tool, or that it is not installed."""
     if not tool.installed():
         return Verdict(kernel, claim, tool.name, "", "not installed", 0.0, f"install {tool.package}")
     begun = time.perf_counter()

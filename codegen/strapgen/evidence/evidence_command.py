@@ -1,4 +1,4 @@
-"""The command ``strapgen evidence`` has independent tools examine what generated C in fixed point promises."""
+"""The command ``strapgen evidence`` verifies generated C in fixed point with external tools."""
 
 from __future__ import annotations
 

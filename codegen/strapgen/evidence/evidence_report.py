@@ -1,4 +1,4 @@
-"""Lays out what independent tools say of generated code: a list, or a page with a table for each promise."""
+"""Reports verdicts of external tools on generated code: a list, or a page with a table for each claim."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ _RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
 
 @dataclass(frozen=True)
 class EvidenceResult(Result):
-    """What independent tools say of generated code: a row for each promise, kernel and tool."""
+    """Verdicts of external tools on generated code: a row for each claim, kernel and tool."""
 
     row = Verdict
 
     verdicts: Sequence[Verdict]
 
     def rows(self) -> list[Verdict]:
-        """Return what tools say of the claims that they can examine; the text and the page name the others too."""
+        """Return the verdicts on claims that tools can examine; the text and the page name the others too."""
         return [verdict for verdict in self.verdicts if verdict.result != "not examined"]
 
     def reader(self) -> TextTable:
-        """Return all that they say."""
+        """Return all verdicts."""
         return reader_table(self.rows(), Verdict)
 
     def text(self) -> str:
-        """Return a table, and what is said beside it."""
+        """Return a table, and the remarks on it."""
         notes = [
             f"{verdict.kernel}, {verdict.claim}, {verdict.tool} {verdict.version}: {verdict.detail}"
             for verdict in self.verdicts
@@ -74,7 +74,7 @@ def evidence_page(verdicts: Sequence[Verdict], digests: Mapping[str, str]) -> st
 
 @dataclass(frozen=True)
 class EvidencePage:
-    """What a page of evidence says of its kernels."""
+    """The verdicts of a page of evidence."""
 
     #: By the name of the function, then by the claim: a result and its tools, as in "proved, Gappa"
     results: dict[str, dict[str, str]]
@@ -85,7 +85,7 @@ class EvidencePage:
 
 
 def read_page(page: str) -> EvidencePage:
-    """Return what the text of `evidence_page` says.
+    """Return the content of a text from `evidence_page`.
 
     >>> proof = Verdict("a_w32", "no overflow: AVR", "z3", "4.16", "proved", 0.1)
     >>> read_page(evidence_page([proof], {"a_w32": "0123"})).results
@@ -159,7 +159,7 @@ def _matrix(verdicts: Sequence[Verdict]) -> TextTable:
 
 
 def _reasons(verdicts: Sequence[Verdict]) -> list[str]:
-    """Return what is said beside the results, a line for each text with the kernels that it stands for."""
+    """Return the remarks on the results, a line for each with its kernels."""
     said: dict[str, dict[str, None]] = {}
     for verdict in verdicts:
         if verdict.detail:

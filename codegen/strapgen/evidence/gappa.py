@@ -1,4 +1,4 @@
-"""Has Gappa prove the error bounds of a call, and Coq check its proof, so that nobody has to trust Gappa.
+"""Proves the error bounds of a call with Gappa, and checks the proof with Coq, so that Gappa need not be trusted.
 
 A bound says how far the outputs are from exact arithmetic on the same inputs. Gappa takes the rules of a script as
 hypotheses of the theorem that it writes for Coq. Here they are lemmas, which Coq proves as identities of polynomials:
@@ -57,7 +57,7 @@ def _floating(subject: Subject, number: str) -> Iterator[Script]:
 
 
 def _verdict(kernel: str, case: str, file: Path, write: Callable[[], Iterable[Script]]) -> Verdict:
-    """Return what Gappa says of the first script with which it proves the bounds, or of the last."""
+    """Return the verdict of Gappa on the first script with which it proves the bounds, or on the last."""
 
     def judge() -> tuple[Result, str]:
         outcome: tuple[Result, str] = "fails", "no script"
@@ -195,15 +195,15 @@ def checked(script: Script, file: Path) -> tuple[Result, str]:
     proof = subprocess.run(["coqc", file.name], cwd=file.parent, capture_output=True, text=True, check=False)
     if proof.returncode:
         return "fails", " ".join(proof.stderr.split())[-200:]
-    if strange := strange_axioms(proof.stdout):
+    if strange := extra_axioms(proof.stdout):
         return "fails", f"the proof needs {', '.join(strange)}"
     return "proved", f"Gappa's proof and the {count} identities in it; axioms of the real numbers alone"
 
 
-def strange_axioms(said: str) -> list[str]:
-    r"""Return what a theorem needs beside the axioms of the real numbers, from what Coq says of its assumptions.
+def extra_axioms(said: str) -> list[str]:
+    r"""Return the assumptions of a theorem beside the axioms of the real numbers, from the messages of Coq.
 
-    >>> strange_axioms("Axioms:\nClassical_Prop.classic : forall P : Prop, P\na1 : (x = y)%R\n")
+    >>> extra_axioms("Axioms:\nClassical_Prop.classic : forall P : Prop, P\na1 : (x = y)%R\n")
     ['a1']
     """
     _, told, axioms = said.partition("Axioms:\n")

@@ -1,4 +1,4 @@
-"""Scripts for Gappa: what a program computes with roundings, beside the same program in exact numbers.
+"""Scripts for Gappa: a program with its roundings, and the same program in exact numbers.
 
 Gappa follows sums, products, quotients and square roots; it checks that the rules by which a script rewrites one
 expression as another are identities. In fixed point ``c_x`` is the number that the integer in the C stands for, ``e_x``
@@ -27,7 +27,7 @@ SIGNS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 
 
 class CannotFollowError(Exception):
-    """A program has what Gappa has no theorem for; the message says what."""
+    """A program has an operation for which Gappa has no theorem; the message names it."""
 
 
 @dataclass
@@ -46,7 +46,7 @@ class Script:
         return self._text([f"|{text}| <= {number(bound)}" for text, bound in self.goals.items()])
 
     def question(self) -> str:
-        """Return the script that asks Gappa for its bounds."""
+        """Return the script by which Gappa computes its bounds."""
         return self._text([f"|{text}| in ?" for text in self.goals])
 
     def define(self, name: str, text: str) -> None:
@@ -86,7 +86,7 @@ def product(coefficient: Fraction, names: Sequence[str]) -> str:
 
 
 def total(terms: Sequence[str]) -> str:
-    """Return a sum; what is less than nothing is subtracted, as programs have it.
+    """Return a sum; negative terms are subtracted, as in programs.
 
     >>> total(["a * b", "-1 * c", "1b-3"])
     'a * b - c + 1b-3'
@@ -102,7 +102,7 @@ def total(terms: Sequence[str]) -> str:
 def exact_lines(
     program: Program, name_of_input: Callable[[str], str]
 ) -> tuple[list[str], dict[str, list[str]]]:
-    """Return an exact program as definitions, and what holds its results."""
+    """Return an exact program as definitions, and the names of its results."""
     inputs = {element for signal in program.inputs for element in signal.elements}
 
     def name(reference: str) -> str:
@@ -249,7 +249,7 @@ class _FixedScriptWriter:
         self._expand(value, parts)
 
     def _added(self, value: Value, definition: IntegerSum) -> tuple[str, list[str]]:
-        """Return the fine terms of a sum as they are rounded, and what is added to them before."""
+        """Return the fine terms of a sum before rounding, and the terms added to them."""
         name, feedback = value.name, definition.residual
         if feedback is None:
             return f"s_{name}", [number(Fraction(2) ** (-value.fraction - 1))] if self.nearest else []

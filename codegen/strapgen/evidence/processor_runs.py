@@ -67,7 +67,7 @@ LARGEST_ERROR = 10
 
 @dataclass(frozen=True)
 class Part:
-    """What a part of a run reports: calls, those accepted, and the checksum of all integers."""
+    """The report of a part of a run: calls, accepted calls, and the checksum of all integers."""
 
     name: str
     calls: int
@@ -76,7 +76,7 @@ class Part:
 
 
 def same_bits(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell, for each processor, whether a kernel returns the integers of the model."""
+    """Return, for each processor, whether a kernel returns the integers of the model."""
     if subject.settings is not None and subject.settings.word > LONGEST_WORD:
         return []
     assert subject.sources.fixed is not None
@@ -105,7 +105,7 @@ def _code(subject: Subject) -> list[str]:
 
 
 def _judge(runner: Runner, place: Path, sources: Sequence[str], expected: list[Part]) -> tuple[Result, str]:
-    """Return whether what a processor reports is what the model computes."""
+    """Return whether the report of a processor agrees with the model."""
     folder = place / runner.name
     folder.mkdir(exist_ok=True)
     try:
@@ -141,7 +141,7 @@ def _text(part: Part) -> str:
 
 
 @dataclass
-class Draws:
+class XorShift32:
     """The generator of the program: xorshift of 32 bits."""
 
     state: int = SEED
@@ -195,13 +195,13 @@ class _ModelRun:
         return self.accepted < NEEDED and self.calls < MOST
 
     def part(self, name: str) -> Part:
-        """Return what the program must report."""
+        """Return the expected report of the program."""
         octets = b"".join((word & 0xFFFFFFFF).to_bytes(4, "little") for word in self.words)
         return Part(name, self.calls, self.accepted, zlib.crc32(octets))
 
 
 def model_parts(subject: Subject, run: CallRun) -> Iterator[Part]:
-    """Yield what each part of a run must report, from the model in Python integers."""
+    """Yield the expected report of each part of a run, from the model in Python integers."""
     model = ModelEvaluator(pipeline.compile(subject.choice, MODEL, subject.settings))
     yield _coning(_ModelRun(subject, run, model))
     yield _random(_ModelRun(subject, run, model))
@@ -228,7 +228,7 @@ def _coning(part: _ModelRun) -> Part:
 
 
 def _random(part: _ModelRun) -> Part:
-    run, draws = part.run, Draws()
+    run, draws = part.run, XorShift32()
     assert run.sources.fixed is not None
     words, mask = len(run.sources.fixed.residuals), (1 << run.sources.fixed.settings.word) - 1
     while part.needs_more_calls():
@@ -269,7 +269,7 @@ def _column(argument: Argument, coning: Motion, count: int) -> Any:
 
 
 def million_steps(subject: Subject, folder: Path) -> list[Verdict]:
-    """Tell how far a million steps with error feedback end from exact arithmetic."""
+    """Compare a million steps with error feedback with exact arithmetic."""
     if not subject.is_reference_step:
         return []
     runner = RUNNERS[PROCESSOR]
@@ -321,7 +321,7 @@ def read_states(said: str) -> list[list[int]]:
 
 def noisy_integers(run: LongRun) -> Iterator[list[int]]:
     """Yield the increments of each step, as the program draws them."""
-    draws, width = Draws(), 2 * run.noise + 1
+    draws, width = XorShift32(), 2 * run.noise + 1
     for _ in range(run.passes):
         for row in run.rows:
             yield [value - run.noise + draws.draw() % width for value in row]

@@ -187,7 +187,7 @@ def to_rational(number: Fraction) -> Any:
 
 
 def is_covariant(matrix: Matrix) -> bool:
-    """Tell whether rotations of all vectors turn a symmetric matrix of polynomials, and leave one element as it is."""
+    """Return whether rotations of all vectors rotate a symmetric matrix of polynomials, and keep one element."""
     gens = matrix[0][0].context().gens()
     size = len(matrix)
     for i, j in itertools.combinations(range(_SPACE), 2):
@@ -302,7 +302,7 @@ def _above(matrix: Any) -> float:
 
 
 def _exceeds(number: Any, matrix: Any) -> bool:
-    """Tell whether a number is above all eigenvalues: what they lack of it has positive leading minors."""
+    """Return whether a number is above all eigenvalues: what they lack of it has positive leading minors."""
     from flint import fmpq_mat
 
     size = matrix.nrows()

@@ -1,4 +1,4 @@
-"""Reads the command in the header of a generated file as data: nothing that it says is run or written.
+"""Reads the command in the header of a generated file as data; nothing in it is executed or written.
 
 Generated files are back ends of comparisons too: `file_backend` of one function, `runner_of_file` of a described system
 or of two speeds.
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
-    from strapgen.navigation.systems.fitting import Fitted
+    from strapgen.navigation.systems.fitting import GeneratedStages
     from strapgen.navigation.systems.system_comparison import RunsSamples
     from strapgen.navigation.systems.wiring import Description
     from strapgen.run.kernel_sources import Request
@@ -93,7 +93,7 @@ class HeaderCommand:
             )
         return self.system(algorithms)[1]
 
-    def system(self, algorithms: Iterable[str] = ()) -> tuple[Fitted, Sources]:
+    def system(self, algorithms: Iterable[str] = ()) -> tuple[GeneratedStages, Sources]:
         """Return the generated stages of a described system, and its files; see `request`."""
         from strapgen.navigation.systems import built_in, system_file
         from strapgen.navigation.systems.system_bounds import bounds
@@ -107,7 +107,7 @@ class HeaderCommand:
         return fit, system.unit(fit, needs, bounds(fit), command)
 
     def two_speed(self) -> two_speed.TwoSpeedRequest:
-        """Return what a command of two speeds generates: algorithm, form of sculling, target and settings."""
+        """Return the request of a two-speed command: algorithm, form of sculling, target and settings."""
         values = self.values
         return two_speed.request(values["algorithm"], values["sculling"], values["target"], values["fixed"])
 
@@ -212,7 +212,7 @@ def _same(one: str, other: str) -> bool:
 def runner_of_file(
     file: Path, description: Description, algorithms: Iterable[str], run_differing: bool
 ) -> tuple[RunsSamples, Settings | None]:
-    """Return what runs a file as it stands, and the settings that its header states."""
+    """Return a runner of a file, and the settings in its header."""
     header = whole_header(file)
     if header is None:
         raise InputError(f"{file} is no source or header of a described system or of two speeds")

@@ -111,7 +111,7 @@ def coning_run(sources: Sources, conversion: str) -> MotionRun:
     """Return a run of a step on coning whose increments lie well inside the range of its input."""
     assert sources.attitude_step is not None
     signal = sources.function.inputs[-1]
-    samples = signal.size // 3 - sources.attitude_step.beside
+    samples = signal.size // 3 - sources.attitude_step.extra_increments
     largest, step = LARGEST, _STEP
     if sources.fixed is not None:
         argument = sources.fixed.inputs[-1]
@@ -159,7 +159,7 @@ def step_main(sources: Sources, command: str, run: MotionRun) -> str:
     beside = sources.attitude_step
     return render(
         "project_c/main_step.c.j2",
-        samples=sources.function.inputs[-1].size // 3 - beside.beside,
+        samples=sources.function.inputs[-1].size // 3 - beside.extra_increments,
         previous=beside.previous,
         ahead=beside.ahead,
         **_values(sources, command, run, sources.attitude_step.identity),
@@ -180,7 +180,7 @@ def _formats(sources: Sources) -> dict[str, Any]:
 
 
 def _values(sources: Sources, command: str, run: MotionRun, identity: Sequence[Fraction]) -> dict[str, Any]:
-    """Return what the main programs of a step and of an algorithm in two speeds have in common."""
+    """Return the common values of the main programs of a step and of an algorithm in two speeds."""
     numbers = numbers_of(sources)
     kernels = ["coning_increments", "coning_truth", *([run.conversion] if run.conversion else [])]
     feedback = () if sources.fixed is None else sources.fixed.residuals
@@ -264,7 +264,7 @@ def call_main(table: VectorTable, command: str) -> str:
 
 
 def refuse_changed(folder: Path, files: Mapping[str, str], force: bool = False) -> None:
-    """Refuse to write over what a user has written or changed; `force` allows it.
+    """Refuse to overwrite files that a user has written or changed; `force` allows it.
 
     That is a CMakeLists.txt or a main.c that differs, and any other file that strapgen has not generated.
     """

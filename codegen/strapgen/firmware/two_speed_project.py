@@ -101,7 +101,7 @@ def _cycle_table(whole: Sources, parts: LoopSources, command: str) -> CycleTable
 
 
 def _runner(whole: Sources, parts: LoopSources) -> Loops:
-    """Return what runs the loops without their C: the integer models, or the programs in one floating-point type."""
+    """Return a runner of the loops without their C: the integer models, or programs in one floating-point type."""
     loops = parts.loops
     if loops[0].fixed is not None:
         models = tuple(

@@ -1,4 +1,4 @@
-"""Chooses test vectors of generated C, and computes what each call must return without the C.
+"""Chooses test vectors of generated C, and computes the expected results without the C.
 
 In fixed point the model in Python integers says it; in floating point the program is run operation by operation.
 """
@@ -67,7 +67,7 @@ class VectorsResult(Result):
 
 @dataclass(frozen=True)
 class _Box:
-    """The numbers that an input may have: limits of an element, the unit of a number, and what stands for no motion.
+    """The numbers that an input may have: limits of an element, the unit of a number, and the value without motion.
 
     `word` is the length of an integer in bits, 0 for a floating-point number.
     """
@@ -216,7 +216,7 @@ def _floating_rows(
 def _tolerant(
     rows: Sequence[CallVector], exact: ExactEvaluator, unit: float
 ) -> tuple[tuple[CallVector, ...], tuple[float, ...]]:
-    """Return what a library's own rounding may change in each output, from the distance to 40 digits.
+    """Return the tolerance of each output for other C libraries, from the distance to 40 digits.
 
     Vectors at which a function jumps, as an angle does from -pi to pi, are left out.
     """
@@ -240,7 +240,7 @@ def _tolerant(
 
 
 def _rest(sources: Sources, signal: Signal) -> list[float]:
-    """Return what stands for no motion: the identity of an attitude, zeros for all else."""
+    """Return the input without motion: the identity of an attitude, otherwise zeros."""
     if sources.attitude_step is not None and signal == sources.function.inputs[0]:
         return [float(element) for element in sources.attitude_step.identity]
     if signal.constraint == "rotation":

@@ -19,7 +19,7 @@ from strapgen.targets.rendering import render
 
 @dataclass(frozen=True)
 class CallVector:
-    """A call of a function: what it takes, and what it must return."""
+    """A call of a function: inputs and expected outputs."""
 
     #: The elements of every input: integers in fixed point, floating-point numbers otherwise
     inputs: tuple[tuple[Any, ...], ...]

@@ -1,4 +1,4 @@
-"""Holds generated C files to what their headers say: their text, and what the compiled files themselves compute."""
+"""Verifies generated C files against their headers: the text, and the results of the compiled files."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _VERSION = re.compile(r'_VERSION "(.*)"')
 
 @dataclass(frozen=True)
 class Verification(Result):
-    """What a generated file was found to be."""
+    """The outcome of verifying a generated file."""
 
     computed = properties(in_step=entry(), holds=entry())
 
@@ -63,24 +63,24 @@ class Verification(Result):
 
     @property
     def in_step(self) -> bool:
-        """Whether the file is what its command generates."""
+        """Whether the file equals the output of its command."""
         return not self.differences
 
     @property
     def within(self) -> bool:
-        """Whether all calls returned what the reference returns, within the bound."""
+        """Whether all calls agree with the reference, within the bound."""
         if self.max_ulp is None or self.wrong:
             return False
         return self.bound_ulp is None or self.max_ulp <= self.bound_ulp
 
     @property
     def holds(self) -> bool:
-        """Whether the file is in step and computes what it promises."""
+        """Whether the file does not differ and meets its contract."""
         return self.in_step and self.within
 
     @property
     def in_words(self) -> str:
-        """What the calls returned."""
+        """The results of the calls in words."""
         if self.max_ulp is None:
             return "not compiled, since it differs; --run-differing compiles and runs it as it stands"
         right = f"{self.calls - self.wrong} of {self.calls} calls return what they must"
@@ -88,14 +88,14 @@ class Verification(Result):
         return f"{right}; error {self.max_ulp:.4f} of the last place{bound}"
 
     def text(self) -> str:
-        """Return the differences, and what the calls returned."""
+        """Return the differences, and the results of the calls."""
         state = f"{self.file}: {'in step' if self.in_step else 'out of step'} with its command"
         return "\n".join([*self.differences, state, self.in_words])
 
 
 @dataclass(frozen=True)
 class WholeVerification(Result):
-    """What the generated files of a whole were found to be."""
+    """The outcome of verifying the files of a described system, of two speeds or of a commit-late unit."""
 
     computed = properties(holds=entry())
 
@@ -110,11 +110,11 @@ class WholeVerification(Result):
 
     @property
     def holds(self) -> bool:
-        """Whether all files are in step, and every stage computes what it promises."""
+        """Whether no file differs, and every stage meets its contract."""
         return not self.differences and all(stage.holds for stage in self.stages)
 
     def text(self) -> str:
-        """Return the differences, and what the calls of each stage returned."""
+        """Return the differences, and the results of the calls of each stage."""
         state = "out of step" if self.differences else "in step"
         lines = [*self.differences, f"{self.header}: {self.files} files, {state} with the command"]
         return "\n".join([*lines, *(f"{stage.file.stem}: {stage.in_words}" for stage in self.stages)])
@@ -230,7 +230,7 @@ def sources_of_files(header: Path, sources: Sources, *, run_differing: bool = Fa
 
 
 def _read(file: Path, request: Request) -> tuple[Sources, dict[str, str]]:
-    """Return what the command of a file generates, and the text of the file, of its header and of its loops."""
+    """Return the output of the command of a file, and the text of the file, of its header and of its loops."""
     sources = pipeline.compile(*request)
     here = {path.name: text_of(path) for path in paths_of(file)}
     if not {*here} <= {*sources.step_files}:
@@ -275,7 +275,7 @@ def _differences(folder: Path, here: dict[str, str], sources: Sources) -> Iterat
 def _whole_differences(
     header: Path, sources: Sources, here: Mapping[str, str], expected: Iterable[str]
 ) -> Iterator[str]:
-    """Yield what differs from generated files, a line of text each."""
+    """Yield the differences from generated files, a line of text each."""
     if header.name not in sources.step_files:
         first = next(name for name in sources.step_files if name.endswith(".h"))
         yield f"{header}: other options: the command in it generates {first}"
@@ -366,7 +366,7 @@ def _fixed(
 
 
 def _refused(evaluator: Evaluator, arguments: Sequence[Array], feedback: Array) -> bool:
-    """Tell whether a back end refuses its inputs."""
+    """Return whether a back end refuses its inputs."""
     try:
         evaluator.run(arguments, feedback)
     except InputError:
@@ -375,7 +375,7 @@ def _refused(evaluator: Evaluator, arguments: Sequence[Array], feedback: Array) 
 
 
 def _call(of: CEvaluator, row: CallVector) -> tuple[list[tuple[int, ...]], Any]:
-    """Return the integers of a call and what it returns; None for a refusal."""
+    """Return the inputs and outputs of a call as integers; None for a refusal."""
     inputs = [tuple(map(int, values)) for values in row.inputs]
     feedback = np.array([row.feedback], of.feedback_type).reshape(1, -1)
     try:
@@ -449,7 +449,7 @@ def _bound(sources: Sources) -> float | None:
 
 
 def _inside(row: CallVector, sources: Sources) -> bool:
-    """Tell whether the inputs of a call lie in the ranges for which the bound holds."""
+    """Return whether the inputs of a call lie in the ranges for which the bound holds."""
     assert sources.rounding is not None
     ranges = {condition.value: condition for condition in sources.rounding.inputs}
     return all(

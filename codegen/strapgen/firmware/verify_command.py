@@ -1,4 +1,4 @@
-"""The command ``strapgen verify`` holds a generated C file to the command and the contract in its header."""
+"""The command ``strapgen verify`` verifies a generated C file against the command and the contract in its header."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ OPERATIONS = frozenset(
 
 
 def can_lower(program: Program) -> bool:
-    """Tell whether a program can be lowered as it is: its operations exist here, and its inputs have known ranges."""
+    """Return whether a program can be lowered as it is: its operations exist here, and its inputs have known ranges."""
     nodes = (node for assignment in program.body for node in walk(assignment.value))
     return all(
         signal.bound is not None or signal.name in ROTATION_INPUTS for signal in program.inputs

@@ -334,7 +334,7 @@ def _polynomials(program: Program, transition: Result) -> list[Polynomial]:
 
 
 def _turns_with_vectors(elements: Sequence[Polynomial]) -> bool:
-    """Tell whether a matrix, or a quaternion, turns with its vectors: about two axes, and so about all.
+    """Return whether a matrix, or a quaternion, turns with its vectors: about two axes, and so about all.
 
     A small turn G of the vectors must change a matrix T by G T - T G, and of a quaternion the vector part by G v.
     """
@@ -424,5 +424,5 @@ def _samples(vectors: int) -> NDArray[np.float64]:
 
 
 def _is_outside(cube: Cube) -> bool:
-    """Tell whether the second vector is longer than the first anywhere in a part of the cube, in spite of rounding."""
+    """Return whether the second vector exceeds the first anywhere in a part of the cube, in spite of rounding."""
     return sum(low * low for low, _ in cube[1:]) > _LONGER

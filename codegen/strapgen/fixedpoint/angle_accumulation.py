@@ -325,7 +325,7 @@ def _products(program: Program, transition: Result) -> list[Polynomial] | None:
 
 
 def _leaves_states_alone(program: Program, terms: list[Polynomial]) -> bool:
-    """Tell whether every term is a product of state and transition, and the identity returns the state."""
+    """Return whether every term is a product of state and transition, and the identity returns the state."""
     kernels = program.attitude_step
     if kernels is None or any([name[0] for name in key] != ["s", "t"] for term in terms for key in term):
         return False
@@ -339,7 +339,7 @@ def _leaves_states_alone(program: Program, terms: list[Polynomial]) -> bool:
 
 
 def _multiplies_lengths(terms: list[Polynomial]) -> bool:
-    """Tell whether the length of a product is that of its factors: then multiplying leaves angles alone."""
+    """Return whether the length of a product is that of its factors: then multiplying leaves angles alone."""
     if len(terms) != _PARAMETERS:
         return False
     square: Polynomial = {}
@@ -354,7 +354,7 @@ def _square_of_length(name: str) -> Polynomial:
 
 
 def _multiplies_matrices(program: Program, terms: list[Polynomial]) -> bool:
-    """Tell whether a step multiplies the matrix by the transition on the right."""
+    """Return whether a step multiplies the matrix by the transition on the right."""
     places = range(_SIDE)
     return program.inputs[0].shape == (_SIDE, _SIDE) and terms == [
         {(f"s{_SIDE * i + k}", f"t{_SIDE * k + j}"): Fraction(1) for k in places}

@@ -148,7 +148,7 @@ def _output_quantities(context: DerivationContext, result: Result) -> tuple[Oper
 
 
 def _is_whole_word(quantity: Quantity) -> bool:
-    """Tell whether a quantity can be an element of an output as it is stored."""
+    """Return whether a quantity can be an element of an output as it is stored."""
     # A selection of values may be longer than a word: it is rounded to one. An input is no output.
     match quantity.definition:
         case InputElement() | ExactOperation("select"):

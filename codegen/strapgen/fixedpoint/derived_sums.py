@@ -268,7 +268,7 @@ def _split(context: DerivationContext, terms: Terms) -> tuple[Terms, Terms]:
 
 
 def _is_exact(context: DerivationContext, name: str) -> bool:
-    """Tell whether a quantity is a sum of inputs without rounding."""
+    """Return whether a quantity is a sum of inputs without rounding."""
     quantity = context.items[name]
     definition = quantity.definition
     if isinstance(definition, InputElement):

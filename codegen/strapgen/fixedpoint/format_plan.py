@@ -75,7 +75,7 @@ def carried_input(program: Program, inputs: Sequence[Argument], signal: Signal) 
 
 
 def sums_of_inputs_are_exact(plan: FormatPlan, quantities: Quantities, word: int) -> bool:
-    """Tell whether every sum of inputs that is needed as a word is one without rounding.
+    """Return whether every sum of inputs that is needed as a word is one without rounding.
 
     A rounding error of a sum of inputs would be the same in every step of a steady motion.
     """
@@ -92,7 +92,7 @@ def sums_of_inputs_are_exact(plan: FormatPlan, quantities: Quantities, word: int
 
 
 def _is_sum_of_inputs(definition: Sum, quantities: Quantities) -> bool:
-    """Tell whether a sum is one of inputs times powers of two."""
+    """Return whether a sum is one of inputs times powers of two."""
     return all(
         len(monomial) == 1
         and is_power_of_two(coefficient)

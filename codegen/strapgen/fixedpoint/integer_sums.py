@@ -144,7 +144,7 @@ def _reset(context: Quantization, quantity: Quantity) -> None:
 
 
 def _is_polynomial(quantities: Quantities, name: str) -> bool:
-    """Tell whether a quantity is a polynomial of the inputs, on which ranges of later ones may rest."""
+    """Return whether a quantity is a polynomial of the inputs, on which ranges of later ones may rest."""
     pending, seen = [name], set[str]()
     while pending:
         definition = quantities.items[pending.pop()].definition
@@ -231,7 +231,7 @@ def word_of(context: Quantization, name: str) -> str:
 
 
 def _counts_alone(context: Quantization, terms: Sequence[Placed]) -> bool:
-    """Tell whether a sum is one of a gyro's counts; it fills its word, so that its products need fewer shifts."""
+    """Return whether a sum is one of a gyro's counts; it fills its word, so that its products need fewer shifts."""
     counts = {n for a in context.plan.inputs if a.sensor is not None for n in a.signal.elements}
     return all(len(item.term.names) == 1 and counts.issuperset(item.term.names) for item in terms) and bool(
         counts
@@ -315,7 +315,7 @@ class _FineTerms:
 
 
 def _wide(context: Quantization, quantity: Quantity, terms: Sequence[Placed], followed: Fraction) -> Value:
-    """Return a sum at full precision: it is only added, compared or drawn a root from."""
+    """Return a sum at full precision, which is only added, compared, or the argument of a root."""
     fraction = max((item.place for item in terms), default=context.word - 1)
     while True:
         total = aligned(terms, fraction, context.word, context.values)
@@ -415,13 +415,13 @@ def _limit(context: Quantization, quantity: Quantity, value: Value) -> Value:
 
 
 def _is_attitude(context: Quantization, name: str) -> bool:
-    """Tell whether a quantity is an element of an output that is an attitude."""
+    """Return whether a quantity is an element of an output that is an attitude."""
     results = context.quantities.results
     return any(r.signal.constraint and name in results[r.signal.name] for r in context.program.outputs)
 
 
 def _is_stated(context: Quantization, name: str) -> bool:
-    """Tell whether the user states the format of a quantity, or of an output or the transition that it belongs to."""
+    """Return whether the user states the format of a quantity, or of an output or the transition that it belongs to."""
     signals = {signal for signal, names in context.quantities.results.items() if name in names}
     return bool({name, "state", *signals} & context.settings.formats.keys())
 

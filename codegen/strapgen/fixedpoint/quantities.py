@@ -115,7 +115,7 @@ class Quantities:
 
 
 def is_power_of_two(value: Fraction) -> bool:
-    """Tell whether a number is a power of two or its negative, so that multiplying by it is a shift."""
+    """Return whether a number is a power of two or its negative, so that multiplying by it is a shift."""
     top, bottom = abs(value.numerator), value.denominator
     return top & (top - 1) == 0 and bottom & (bottom - 1) == 0
 
@@ -130,7 +130,7 @@ def exponent(value: Fraction) -> int:
 
 
 def is_dyadic(value: Fraction) -> bool:
-    """Tell whether a number has a finite binary expansion."""
+    """Return whether a number has a finite binary expansion."""
     return value.denominator & (value.denominator - 1) == 0
 
 
@@ -182,7 +182,7 @@ class Aligned:
     error: Fraction  # bound of the error of their sum, with what shifts lose
 
     def fits(self, word: int, values: Mapping[str, Value], added: int = 0) -> bool:
-        """Tell whether every term, and every partial sum with so much added, fits into a wide number."""
+        """Return whether every term, and every partial sum with so much added, fits into a wide number."""
         return self.peak + added <= largest_wide(word) and _terms_fit(self.terms, word, values)
 
 
@@ -248,7 +248,7 @@ def aligned(terms: Iterable[Placed], place: int, word: int, values: Mapping[str,
 
 
 def _terms_fit(terms: Iterable[Term], word: int, values: Mapping[str, Value]) -> bool:
-    """Tell whether every term fits into a wide number."""
+    """Return whether every term fits into a wide number."""
     room = largest_wide(word)
     return all(_bound(term, values) <= room for term in terms)
 

@@ -120,7 +120,7 @@ def _walk(
 
 
 def _is_unused_constant(context: Quantization, quantity: Quantity, total: Sum) -> bool:
-    """Tell whether a sum is a constant that no word needs to hold, or is there already."""
+    """Return whether a sum is a constant that needs no word, or that exists already."""
     exact = not quantity.offset and not quantity.approximation_error
     constant = exact and all(not monomial for monomial, _ in total.terms)
     unused = (not total.terms or constant) and quantity.name not in context.plan.words
@@ -152,7 +152,7 @@ def _feed_back(program: Program, settings: Settings) -> list[Result]:
 
 
 def _is_worse(one: FixedProgram, other: FixedProgram) -> bool:
-    """Tell whether an output of one program has an error bound that is notably above that of another."""
+    """Return whether an output of one program has an error bound that is notably above that of another."""
     return any(
         error > other_error * _WORSE
         for output, other_output in zip(one.interface.outputs, other.interface.outputs, strict=True)

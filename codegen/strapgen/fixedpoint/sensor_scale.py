@@ -96,7 +96,7 @@ def _with_assigned_results(program: Program, angles: Mapping[str, str]) -> Progr
 
 
 def _with_angles_first(program: Program, angles: Mapping[str, str]) -> Program:
-    """Return the program with angles that it computes from the increments and goes on with."""
+    """Return the program with angles that it computes from the increments and uses further."""
     used = program.used()
     first = [Assignment(angles[name], Reference(name)) for name in angles if name in used]
     body = (replace(a, value=_rename(a.value, angles)) for a in program.body)
@@ -195,7 +195,7 @@ def _power_of(scale: Fraction, power: int) -> Fraction:
 
 
 def _is_linear(node: Node) -> bool:
-    """Tell whether a factor can go down into a node."""
+    """Return whether a factor can go down into a node."""
     return isinstance(node, Operation) and node.kind in _LINEAR
 
 

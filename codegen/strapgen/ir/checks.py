@@ -99,7 +99,7 @@ def number(what: str, value: str | float | Fraction, *, positive: bool = False) 
 
 
 def is_whole(value: Any) -> bool:
-    """Tell whether a value is a whole number, of any type: of Python, of numpy, or a float such as 2.0."""
+    """Return whether a value is a whole number, of any type: of Python, of numpy, or a float such as 2.0."""
     return isinstance(value, Real) and not isinstance(value, bool) and bool(value == value // 1)
 
 

@@ -51,7 +51,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class StatedSettings(TypedDict, total=False):
-    """What a user states of fixed point, as the keywords of `Settings.of`."""
+    """The keywords of `Settings.of`."""
 
     word: int
     max_rate_deg_s: Number | None
@@ -84,7 +84,7 @@ def with_settings(function: F) -> F:
 
 
 class _WholeStep(NamedTuple):
-    """What settings say of a whole step, until a program tells how many increments it has."""
+    """Settings of a whole step, until the program determines the number of increments."""
 
     step: str
     max_rate_deg_s: str | None

@@ -94,7 +94,7 @@ def finest(largest: Fraction, word: int) -> int:
 
 
 def _exceeds(largest: Fraction, fraction: int, top: int) -> bool:
-    """Tell whether a magnitude with so many fraction bits exceeds an integer."""
+    """Return whether a magnitude with so many fraction bits exceeds an integer."""
     if fraction >= 0:
         return largest.numerator << fraction > top * largest.denominator
     return largest.numerator > top * largest.denominator << -fraction

@@ -91,6 +91,7 @@ class Truncation:
         return first / (1 - x / (self.order + 2))
 
 
+@renamed(beside="extra_increments")
 @dataclass(frozen=True)
 class AttitudeStep:
     """The kernels and properties of an attitude step that a back end needs in addition to the step itself.
@@ -138,7 +139,7 @@ class AttitudeStep:
     __repr__ = short_repr
 
     @property
-    def beside(self) -> int:
+    def extra_increments(self) -> int:
         """Number of increments before and after the step that it also takes."""
         return self.previous + self.ahead
 

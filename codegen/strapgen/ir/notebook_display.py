@@ -145,7 +145,7 @@ def _stated(value: Any) -> list[tuple[str, Any]]:
 
 
 def _differs(content: Any, default: Any) -> bool:
-    """Tell whether a value is another than a default of its type; both may be arrays of numpy."""
+    """Return whether a value is another than a default of its type; both may be arrays of numpy."""
     if hasattr(content, "tolist"):
         return bool(content.tolist() != default.tolist())
     return bool(content != default)

@@ -86,7 +86,7 @@ class Sources:
         /,
         **rest: Any,
     ) -> Self:
-        """Return what a target prints of a program, whose function has this name; `rest` are further fields."""
+        """Return the files of a target as sources, whose function has this name; `rest` are further fields."""
         from strapgen.ir.integer_program import FixedProgram  # sources from the cache are there without it
 
         code = program.program if isinstance(program, FixedProgram) else program

@@ -164,7 +164,7 @@ class CovariantFunction:
         size = 4 if decomposition.scalar is not None else 9
         terms = []
         for covariant, weight in decomposition.vector.items():
-            written, named = self._vector(covariant), self._name_of(covariant)
+            written, named = self._vector(covariant), self._named_vector(covariant)
             if size == 9:
                 terms.append(self._term(covariant, weight, list(skew(written)), list(skew(named))))
             else:
@@ -173,7 +173,9 @@ class CovariantFunction:
             unit = [sp.Integer(0)] * 3 + [sp.Integer(1)]
             terms.append(_Term("scalar", decomposition.scalar, unit, unit))
         for covariant, weight in decomposition.symmetric.items():
-            written, named = (self._symmetric(covariant, which) for which in (self._vector, self._name_of))
+            written, named = (
+                self._symmetric(covariant, which) for which in (self._vector, self._named_vector)
+            )
             name = "_".join(map(str, ("symmetric", *covariant)))
             terms.append(_Term(name, weight, written, named))
         return terms
@@ -188,7 +190,7 @@ class CovariantFunction:
         first, *rest = (self._vectors[k] for k in covariant)
         return cross(first, rest[0]) if rest else first
 
-    def _name_of(self, covariant: Covariant) -> sp.Matrix:
+    def _named_vector(self, covariant: Covariant) -> sp.Matrix:
         """Return a vector, or the stage of a cross product."""
         if len(covariant) == 1:
             return self._vectors[covariant[0]]

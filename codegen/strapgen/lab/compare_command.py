@@ -171,7 +171,7 @@ def _of_files(requests: Mapping[Path, Request], choice: Choice, run_differing: b
 
 
 def _source_files() -> Any:
-    """Return what reads generated files."""
+    """Return the reader of generated files."""
     return registration.extension("lab.source-files", "--source")
 
 

@@ -1,4 +1,4 @@
-"""`compare` runs back ends over the same increments and shows how far each is from a reference."""
+"""`compare` runs back ends over the same increments and measures the difference of each from a reference."""
 
 from __future__ import annotations
 
@@ -237,7 +237,7 @@ def usable_backends(choice: Choice) -> tuple[str, ...]:
 
 
 def _coning(choice: Choice) -> tuple[Array, Array]:
-    """Return what the steps of a choice take of a coning motion, and its attitude."""
+    """Return the samples of a coning motion for the steps of a choice, and its attitude."""
     profile = motion("coning", **CONING_DEG_S)
     read = samples_of_steps(attitude_backend(choice), profile, STEP)
     return read(0, STEPS), profile.attitude(np.arange(1 + STEPS) * float(STEP))

@@ -140,7 +140,7 @@ def converge(
 
 
 def _within(order: Convergence, limit: NotNegative) -> bool:
-    """Tell whether the observed order is within the limit of the predicted one; False if either is missing."""
+    """Return whether the observed order is near enough to the predicted one; False if either is missing."""
     return (
         order.observed is not None
         and order.predicted is not None

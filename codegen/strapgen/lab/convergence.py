@@ -138,7 +138,7 @@ class Convergence(Record):
 
 @dataclass(frozen=True)
 class LadderCase:
-    """What a process needs to measure the order of an algorithm."""
+    """An algorithm, a motion, steps and a back end, as a worker process takes them."""
 
     choice: Choice
     backend: str
@@ -166,7 +166,7 @@ def measure_case(case: LadderCase) -> Convergence:
 def converge_all(
     cases: Sequence[LadderCase], jobs: int | None = None, cluster: Cluster | None = None
 ) -> Iterator[tuple[int, Convergence]]:
-    """Measure several algorithms side by side, and yield the place of each with its outcome when it is there."""
+    """Measure several algorithms side by side, and yield the index and the outcome of each as it is finished."""
     files = None if cluster is None else Bundle.of({case.motion for case in cases if is_file(case.motion)})
     numbered = {str(place): case for place, case in enumerate(cases)}
     for name, outcome in side_by_side(measure_case, numbered, jobs, cluster, files):

@@ -99,7 +99,7 @@ def ladder_table(*outcomes: Convergence) -> TextTable:
 
 
 def convergence_image(result: ConvergenceResult, path: str | Path) -> bytes:
-    """Return error against step, a line an algorithm, beside a line of the slope that theory says."""
+    """Return a plot of error against step, a line for each algorithm, with lines of the theoretical slope."""
     outcomes = result.outcomes
     figure, grid = figures.grid_of_axes(1, 1, (9.5, 5.6))
     axes = grid[0, 0]
@@ -122,7 +122,7 @@ def convergence_image(result: ConvergenceResult, path: str | Path) -> bytes:
 
 
 def _label(outcome: Convergence, name: str, colour: Any) -> tuple[float, str, Any] | None:
-    """Return what stands at the right end of a line: the name, the observed order and that of theory."""
+    """Return the label at the right end of a line: name, observed and theoretical order."""
     errors = [(rung.step_s, rung.error_rad) for rung in outcome.rungs if rung.error_rad]
     if not errors:
         return None

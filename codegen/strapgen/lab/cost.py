@@ -1,4 +1,4 @@
-"""Measures what generated C costs on a microcontroller: instructions, memory, and instructions executed in a call."""
+"""Measures generated C on microcontrollers: instructions, memory, and instructions executed in a call."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _SIZES, _SIZE = "sizes", "size.txt"
 
 @dataclass(frozen=True)
 class Cost:
-    """What a kernel costs on a processor."""
+    """Size, stack and executed instructions of a kernel on a processor."""
 
     kernel: str = field(metadata=entry("kernel", align="<"))
     cpu: str = field(metadata=entry("cpu", align="<"))
@@ -105,7 +105,7 @@ def cost(sources: Sources, cpu: str) -> Cost:
 
 
 def processors(cross: str | None = None, cpus: Sequence[str] = ()) -> list[str]:
-    """Return the names of the processors that are asked for, or of all whose compiler is installed."""
+    """Return the names of the requested processors, by default of all whose compiler is installed."""
     for cpu in cpus:
         checks.choice("cpu", cpu, PROCESSORS)
     if cross is not None:
@@ -208,7 +208,7 @@ def _values(signal: Signal, largest: float) -> list[float]:
 
 @dataclass(frozen=True)
 class CostResult(Result):
-    """What kernels cost on microcontrollers: a row for each kernel and processor."""
+    """Size and execution of kernels on microcontrollers: a row for each kernel and processor."""
 
     rows_in = "costs"
     row = Cost

@@ -1,4 +1,4 @@
-"""The command ``strapgen cost`` measures what generated C costs on microcontrollers."""
+"""The command ``strapgen cost`` measures generated C on microcontrollers."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Step:
     @property
     def increments_per_step(self) -> int:
         """Number of increments of the step itself."""
-        beside = self.kernel.attitude_step.beside if self.kernel.attitude_step else 0
+        beside = self.kernel.attitude_step.extra_increments if self.kernel.attitude_step else 0
         return int(self.kernel.inputs[1].shape[0]) - beside
 
     @property
@@ -63,7 +63,7 @@ class Step:
         return Fraction(f"{float(number):.{_DIGITS - 1}e}") if abs(number) > _LEAST else Fraction(0)
 
     def shares(self, terms: int) -> list[list[sp.Expr]]:
-        """Return what t^j/j! adds to each sample, j from 0 on, as a multiple of the (j + 1)-th power of the step."""
+        """Return the share of t^j/j! in each sample, j from 0 on, as a multiple of the (j + 1)-th power of the step."""
         if self.nodes is not None:
             return [sampled_motion.node_shares(node, terms) for node in self.nodes]
         return [sampled_motion.increment_shares(k, self.increments_per_step, terms) for k in self.intervals]

@@ -1,4 +1,4 @@
-"""Runs independent cases side by side, and keeps each result in a file, from which an interrupted study goes on.
+"""Runs independent cases side by side, and keeps each result in a file, from which an interrupted study resumes.
 
 A results file has a line of JSON for the study, which says what it is, and one for each result, in the order in which
 they came. A line is complete when it ends: what a killed process left of the last one is dropped.
@@ -186,7 +186,7 @@ def _short(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Bundle:
-    """Files of the user's that cases name.
+    """The user's files that cases need.
 
     Such a case has a method ``moved(begin, end)``, which returns it with its files in another folder.
     """
@@ -219,7 +219,7 @@ def moved(path: str, begin: Path, end: Path) -> str:
 
 @dataclass(frozen=True)
 class Cluster:
-    """Where the workers are."""
+    """A cluster of workers: a Dask scheduler, or processes on this machine."""
 
     #: Address of a Dask scheduler, as "tcp://10.0.0.7:8786"; empty for workers on this machine
     scheduler: str = ""

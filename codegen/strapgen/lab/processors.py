@@ -183,7 +183,7 @@ def write_start(processor: Processor, folder: Path, rest: str, name: str = START
 
 
 def run_tool(command: Sequence[str], folder: Path) -> str:
-    """Run a compiler or another of its tools in a folder, and return what it prints."""
+    """Run a compiler or another of its tools in a folder, and return its output."""
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         lines = done.stderr.splitlines()
@@ -279,7 +279,7 @@ class Runner:
         return f"{version(self.emulator[0])}, {self.compiler[0]} {version(self.compiler[0])}".strip(", ")
 
     def run(self, folder: Path, sources: Sequence[str]) -> str:
-        """Compile a program, run it and return what it reports."""
+        """Compile a program, run it and return its report."""
         flags, parts = list(_FLAGS), list(sources)
         if self.bare is not None:
             write_start(self.bare, folder, _BEGIN)

@@ -1,4 +1,4 @@
-"""Derives what the quantization of a gyro does to the attitude, through the rates that a step extracts from increments.
+"""Derives the attitude noise due to the quantization of a gyro, through the rates that a step extracts.
 
 The angle is sampled at the ends of all increments, and every sample carries an error of its own: independent of the
 others, with the variance q^2/12 on each axis for a pulse q. To the second power of the increments, a step turns by the
@@ -206,7 +206,7 @@ def _differences(weights: Sequence[sp.Expr]) -> list[sp.Expr]:
 
 
 def _ends(steady: Sequence[sp.Expr], previous: int, count: int, walk: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Return what the samples at the beginning of a run, and at its end, add beside what every step adds."""
+    """Return the shares of the samples at the beginning and the end of a run, in addition to those of every step."""
     half = len(steady) + 1  # steps of half a run, which no sample of one end leaves
     total: dict[int, sp.Expr] = defaultdict(lambda: sp.S.Zero)
     for k in range(2 * half):

@@ -38,7 +38,7 @@ _HOUR = 3600
 
 @dataclass(frozen=True)
 class Errors:
-    """What a gyro adds to its increments, and the turn in which it does."""
+    """Errors of the increments of a gyro, and the steady turn of the runs."""
 
     #: Angle of a pulse in rad. The errors of the angles of two samples have nothing to do with each other
     pulse: float
@@ -119,7 +119,7 @@ def random_runs(
     jobs: int | None = None,
     cluster: Cluster | None = None,
 ) -> Iterator[MeanSquare]:
-    """Run, and yield the mean square of each part when it is there."""
+    """Run, and yield the mean square of each part as it is finished."""
     parts = cases(runs)
     if results is None:
         finished = side_by_side(mean_square, parts, jobs, cluster)
@@ -145,7 +145,7 @@ def cases(runs: SteadyRuns) -> dict[str, SteadyRuns]:
 
 
 def _identity(runs: SteadyRuns) -> dict[str, Any]:
-    """Return what results belong to; the number of runs is not part of it, so that more can be added."""
+    """Return the identity of results, without the number of runs, so that more can be added."""
     return {
         "study": "monte-carlo",
         "version": VERSION,
@@ -188,7 +188,7 @@ def _error_free(algorithm: Any, backend_name: str, turn: float, steps: int, bloc
 
 
 def _runner(algorithm: Any, backend_name: str) -> Any:
-    """Return what has `propagate` and `matrices`."""
+    """Return the object with `propagate` and `matrices`."""
     return backend(algorithm, backend=backend_name) if isinstance(algorithm, Choice) else algorithm.runner()
 
 

@@ -1,4 +1,4 @@
-"""Options that say where the increments of a run come from: a motion, a recording of increments or one of rates."""
+"""Options for the source of increments: a motion, a recording of increments or one of rates."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class SampleSource:
-    """Options that say where a run takes its increments from."""
+    """Options for the source of the increments of a run."""
 
     panel: ClassVar[str] = "Input"
     rules: ClassVar[tuple[Rule, ...]] = (
@@ -212,7 +212,7 @@ class SampleSource:
     errors: SensorFile = None
 
     def check(self) -> None:
-        """Check what an algorithm needs that no file describes."""
+        """Check the options of an algorithm that is not a described system."""
         if self.specific_force is not None and self.errors is None:
             raise InputError("--specific-force goes with a described system or --errors")
         if self.motion is not None and self.step is None:
@@ -261,7 +261,7 @@ class SampleSource:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What a report says of the sensors: nothing, unless they have errors."""
+        """Facts on the sensors for a report; none without errors."""
         return {} if self.errors is None else {"errors": self.errors}
 
     def described(self, name: str, noun: str = "") -> str:
@@ -415,7 +415,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class RunOutput(Output):
-    """Where the result of a run goes; without --format, the attitude along a recording is CSV."""
+    """Options for the output of a run; the attitude along a recording is CSV by default."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Needs("--matrices", "--format=json"),
@@ -442,7 +442,7 @@ class RunOutput(Output):
 
 @dataclass(frozen=True)
 class WorkerOptions:
-    """Where the cases of a study run."""
+    """Options for the workers of a study."""
 
     panel: ClassVar[str] = "Run"
     rules: ClassVar[tuple[Rule, ...]] = (OneOf("--jobs --scheduler --cluster"),)
@@ -491,5 +491,5 @@ class DescribedAlgorithms(NamedTuple):
 
 
 def described(name: Any) -> DescribedAlgorithms | None:
-    """Return what runs an algorithm that another application describes; None for any other."""
+    """Return the runner of an algorithm that another application describes; None for any other."""
     return next((kind for kind in registration.extensions("lab.described") if kind.covers(name)), None)

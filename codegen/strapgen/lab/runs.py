@@ -288,7 +288,7 @@ def _node_rotations(motion: Motion, step: Fraction, nodes: Sequence[float]) -> C
 def samples_of_steps(
     backend: Backend, motion: Motion, step: Fraction, pulse: float | str | Fraction | None = None
 ) -> Callable[[int, int], Array]:
-    """Return what the steps of a run take, part by part: increments, or rates at nodes."""
+    """Return the samples of the steps of a run, part by part: increments, or rates at nodes."""
     if not backend.nodes:
         backend.need_increments()
         return _increments(motion, step, backend.increments, (backend.previous, backend.ahead), pulse)
@@ -474,7 +474,7 @@ def _of_rate(motion: RateMotion) -> tuple[_Row, _Truth]:
 
 
 def _of_functions(motion: UsersMotion, backend: Backend) -> tuple[_Steps, _Truth]:
-    """Return what the functions of a file return, whose digits are those of double."""
+    """Return the increments and the attitude of a user's functions, in double precision."""
 
     def steps_of(length: Fraction, count: int) -> Iterator[list[Any]]:
         rows = motion.increments(length, count, backend.increments, backend.previous, backend.ahead)

@@ -57,7 +57,7 @@ _MATRIX_COLUMNS = [
 
 
 def step_facts(backend: Backend, choice: Choice) -> dict[str, Any]:
-    """Return what a result states of the step that ran."""
+    """Return the facts on the step of a run."""
     facts: dict[str, Any] = {"algorithm": choice.name, "method": choice.method_name}
     facts |= {"rates_at": list(backend.nodes)} if backend.nodes else {"increments": backend.increments}
     if backend.previous:
@@ -69,7 +69,7 @@ def step_facts(backend: Backend, choice: Choice) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """What a run was made with, as far as it applies."""
+    """The settings of a run, as far as they apply."""
 
     algorithm: str | None = field(metadata=entry(optional=True))
     method: str | None = field(metadata=entry(optional=True))

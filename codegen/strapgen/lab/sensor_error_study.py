@@ -1,4 +1,4 @@
-"""Runs an algorithm many times on sensors with errors, and holds the scatter against its prediction in closed form."""
+"""Runs an algorithm many times on sensors with errors, and compares the scatter with its prediction in closed form."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def records_of(steps: int) -> int:
 
 
 def reach(path: Path, errors: InstrumentErrors) -> float:
-    """Return twice the largest magnitude of an element of the first run's increments in rad: what all runs may need."""
+    """Return a range for the increments of all runs in rad: twice the largest element of the first run."""
     interval = path.step / path.choice.increments_per_step
     angle = path.motion.samples(interval, 0, path.steps * path.choice.increments_per_step)
     velocity = velocity_increments(path.motion.attitude, path.force, interval, len(angle))

@@ -136,7 +136,7 @@ class Outcome(Record):
 
 @dataclass(frozen=True)
 class Study:
-    """What a study runs: one algorithm on one motion, in every combination of the values that are swept.
+    """A study: one algorithm on one motion, in every combination of the swept values.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 
 def run_case(case: Case) -> Outcome:
-    """Run one case, or take its outcome from the cache, so that a study that was stopped continues where it was."""
+    """Run one case, or take its outcome from the cache, so that an interrupted study resumes."""
     motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
     return cache.stored("studies", [json.dumps(asdict(case), sort_keys=True), motion], lambda: _run(case))
 
@@ -292,7 +292,7 @@ def _run(case: Case) -> Outcome:
 
 
 def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the increments of the steps themselves, without those from beside them."""
+    """Return the increments inside the steps, without those before and after."""
     return increments[:, choice.previous : choice.previous + choice.increments_per_step]
 
 

@@ -80,7 +80,7 @@ def _text(outcomes: Sequence[Outcome]) -> str:
 
 
 def _expected(outcome: Outcome) -> list[str]:
-    """Return what the pulses of a case are expected to do, in a line of text; none without pulses."""
+    """Return the expected noise of the pulses of a case in a line of text; none without pulses."""
     if outcome.expected_deg is None:
         return []
     case = outcome.case

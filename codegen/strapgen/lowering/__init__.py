@@ -48,7 +48,7 @@ def lower(kernel: Kernel) -> Program:
 
 
 def candidates(kernel: Kernel, core: canonical.Core | None) -> Iterator[Program]:
-    """Yield programs for a kernel on which no pass has run yet; without a core, of the formulas as they stand.
+    """Yield unoptimized programs for a kernel; without a core, the one of its formulas.
 
     The first shares common subexpressions; the others do not, or are one for each canonical form. Formulas of many
     elements are never shared without a core: they stand in small stages already, and the passes take less time.

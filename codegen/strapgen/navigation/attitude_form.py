@@ -1,4 +1,4 @@
-"""Forms of the attitude: what three rows, two rows or a quaternion cost a navigator, as a result and drawn."""
+"""Forms of the attitude: operations of a navigator with three rows, two rows or a quaternion, as a result and plot."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ FORMS: dict[str, tuple[str, dict[str, str]]] = {
 
 @dataclass(frozen=True)
 class PartRates:
-    """How often a navigator runs each part, in Hz."""
+    """Rates of the parts of a navigator in Hz."""
 
     #: Slow cycles: update, matrix, velocity
     update: float
@@ -161,7 +161,7 @@ class PartRates:
 
 @dataclass(frozen=True)
 class PartCost:
-    """What a part of a form costs."""
+    """Operations and instructions of a part of a form."""
 
     #: Keys of `FORMS` and `PARTS`
     form: str
@@ -181,7 +181,7 @@ class PartCost:
 
 @dataclass(frozen=True)
 class FormTotal:
-    """What a form costs in a second."""
+    """Operations and instructions of a form in a second."""
 
     form: str
     title: str
@@ -191,7 +191,7 @@ class FormTotal:
 
 @dataclass(frozen=True)
 class Truncation:
-    """What the first-order attitude in a slow cycle costs in velocity."""
+    """The velocity error due to the first-order attitude in a slow cycle."""
 
     largest_rate_rad_s: float
     #: Angle of a slow cycle at that rate
@@ -237,7 +237,7 @@ def part_costs(
 
 
 def truncation(rates: PartRates, largest_rate: float, error: float) -> Truncation:
-    """Return what (47) costs at the slow rate, and the slow rate for a stated error.
+    """Return the error of (47) at the slow rate, and the slow rate for a stated error.
 
     `largest_rate`: in rad/s.
     """
@@ -256,7 +256,7 @@ _CONCLUSION = (
 
 @dataclass(frozen=True)
 class FormResult(Result):
-    """What each form of the attitude costs in a navigator."""
+    """Operations and instructions of a navigator with each form of the attitude."""
 
     drawn_by = f"{__name__}:attitude_form_image"
 
@@ -287,7 +287,7 @@ class FormResult(Result):
         ]
 
     def text(self) -> str:
-        """Return the operations of each part and form, and what the first-order attitude costs."""
+        """Return the operations of each part and form, and the error of the first-order attitude."""
         return "\n".join(_lines(self))
 
 
@@ -311,7 +311,7 @@ def attitude_form_image(result: FormResult, path: str | Path) -> bytes:
 
 
 def _table(result: FormResult) -> TextTable:
-    """Return operations of a call for each part and form, and what they are in a second."""
+    """Return operations of each part and form, in a call and in a second."""
     columns = [Column("operations of a call", "<"), Column("Hz", spec="g")]
     columns += [Column(title, spec=",.0f") for title, _ in FORMS.values()]
     rows: list[list[Any]] = []
@@ -335,7 +335,7 @@ def _lines(result: FormResult) -> Iterator[str]:
 
 
 def _truncation_lines(loss: Truncation, hz: float) -> Iterator[str]:
-    """Tell what (47) costs."""
+    """Return the error of (47) in lines of text."""
     yield "the first-order attitude (47) in a slow cycle makes a velocity increment too large, phi = w T, by"
     yield f"  along the acceleration  {_series(along_series(3))}"
     yield f"  across it               {_series(across_series(3))}"

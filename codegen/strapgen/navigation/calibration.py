@@ -1,4 +1,4 @@
-"""What a scheme of positions tells of the coefficients of an inertial measurement unit: rank, covariance, estimates.
+"""Calibration of an inertial measurement unit by a set of positions: rank, covariance and estimates of coefficients.
 
 A unit at rest is turned into many positions; in each, the errors of its rate and of its acceleration are measured.
 They are linear in the coefficients of the error model, D = a X, and the least squares of all positions are
@@ -90,7 +90,7 @@ class Scheme:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a scheme tells of the coefficients of one quantity."""
+    """Observability and covariance of the coefficients of one quantity in a scheme of positions."""
 
     #: A key of `QUANTITIES`
     quantity: str
@@ -105,7 +105,7 @@ class Calibration:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """The coefficients that cannot be estimated: those in a combination that leaves no trace."""
+        """The coefficients that cannot be estimated: those in a combination that is not observable."""
         return tuple(name for name in self.names if any(name in one for one in self.unseen))
 
     @cached_property
@@ -144,7 +144,7 @@ class Calibration:
         return dict(zip(self.names, map(float, solution), strict=True))
 
     def error_covariance(self, rate: Sequence[float], acceleration: Sequence[float]) -> Array:
-        """Return the covariance of the compensated quantity that estimated coefficients leave, (3, 3).
+        """Return the covariance of a quantity after compensation with estimated coefficients, (3, 3).
 
         `rate, acceleration` (3,): in rad/s, and in the unit of gravity, body axes. Coefficients that rest cannot
         show are taken for exact.
@@ -158,7 +158,7 @@ class Calibration:
 
 
 def calibrated(scheme: Scheme, quantity: str) -> Calibration:
-    """Return what a scheme tells of the coefficients of a quantity.
+    """Analyse a scheme of positions for the coefficients of a quantity.
 
     >>> one = calibrated(Scheme("up and down", ((0, 0, 1), (0, 0, -1))), "rate")
     >>> one.rank, len(one.names)
@@ -202,7 +202,7 @@ Rows = tuple[tuple[float, float, float], ...]
 
 @dataclass(frozen=True)
 class PositionsFile:
-    """Positions of a unit at rest, and what was measured in them."""
+    """Positions of a unit at rest, and the errors measured in them."""
 
     positions: Annotated[
         tuple[tuple[Number, Number, Number], ...],
@@ -273,7 +273,7 @@ def _texts(unseen: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, list[
 
 @dataclass(frozen=True)
 class CoefficientRow:
-    """What a scheme of positions tells of a coefficient."""
+    """Observability, deviation and estimate of a coefficient."""
 
     quantity: str
     coefficient: str = field(metadata=entry("coefficient", align="<"))
@@ -303,7 +303,7 @@ class CoefficientRow:
 
 @dataclass(frozen=True)
 class CalibrationResult(Result):
-    """What a scheme of positions tells of the coefficients of an inertial measurement unit."""
+    """Observability, deviations and estimates of the coefficients of an inertial measurement unit."""
 
     rows_in = "coefficients"
     drawn_by = f"{__name__}:calibration_image"
@@ -332,7 +332,7 @@ class CalibrationResult(Result):
         estimates: Mapping[str, Mapping[str, float]],
         remaining: Mapping[str, Any],
     ) -> CalibrationResult:
-        """Return what the positions of a file tell of each quantity."""
+        """Return the calibration of each quantity by the positions of a file."""
         return CalibrationResult(
             file=file,
             several=several,
@@ -347,7 +347,7 @@ class CalibrationResult(Result):
         )
 
     def text(self) -> str:
-        """Return what is seen of each quantity, and how well."""
+        """Return the observable coefficients of each quantity with their deviations."""
         lines = [
             f"{self.file.scheme.name}: least squares of {3 * len(self.file.scheme.positions)} errors of each quantity"
         ]

@@ -87,7 +87,7 @@ class OutputFilter:
 
     @property
     def settling(self) -> int:
-        """Cycles after which what was before no longer counts in double precision."""
+        """Cycles after which earlier samples no longer matter in double precision."""
         return math.ceil(2 * math.log(_NEGLIGIBLE) / math.log(self.denominator[2]))
 
     @property
@@ -149,7 +149,7 @@ _SHORTEST, _LONGEST = 200, 200_000
 
 @dataclass(frozen=True)
 class Measured:
-    """What a back end makes of the filter."""
+    """The measured responses of the filter on a back end."""
 
     #: Output over input at each frequency
     responses: tuple[complex, ...] = field(metadata=INTERNAL)
@@ -381,7 +381,7 @@ class FilterResult(Result):
         return TextTable(columns, rows)
 
     def text(self) -> str:
-        """Return coefficients, responses, and what is left once settled."""
+        """Return coefficients, responses, and the error after settling."""
         return "\n".join(_lines(self))
 
 

@@ -1,4 +1,4 @@
-"""What a navigator puts on its bus: kernels of its outputs, magnetic variation, words, and the accuracy of flights."""
+"""Outputs of a navigator: kernels, magnetic variation, words of a bus, and the accuracy of flights."""
 
 from __future__ import annotations
 

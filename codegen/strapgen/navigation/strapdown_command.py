@@ -27,7 +27,7 @@ _ZERO = (Number("0"), Number("0"), Number("0"))
 
 @dataclass(frozen=True)
 class CourseOutput(Output):
-    """Where the attitude and the velocity changes along a recording go."""
+    """Options for the output of attitude and velocity changes along a recording."""
 
     plot: Annotated[Path | None, plot_option("the attitude and the velocity changes")] = None
     format: Annotated[str | None, format_option(Output.formats, "  [default: text; csv with --out]")] = None

@@ -204,7 +204,7 @@ def _change(one: Candidate) -> Choice:
 
 
 def _operations(one: Candidate) -> dict[str, float]:
-    """Return the operations for each sample."""
+    """Return the operations of an algorithm for each sample."""
     count = one.increments
     if one.method == TWO_SPEED:
         parts = [(Choice(_FAST), 1), (Choice(_SLOW), count)]

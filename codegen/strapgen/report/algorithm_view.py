@@ -1,4 +1,4 @@
-"""What the page shows of one algorithm: its interface, formulas, formats, bounds, code and evidence."""
+"""The part of the page on one algorithm: interface, formulas, formats, bounds, code and evidence."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class _SignalRow:
 
 @dataclass(frozen=True)
 class AlgorithmView:
-    """What the page shows of one algorithm."""
+    """The content of the page on one algorithm."""
 
     #: The kernel in words; `order` is "" for what is no step
     name: str
@@ -84,7 +84,7 @@ class AlgorithmView:
 
 
 def view(known: AlgorithmDossier, evidence: EvidencePage | None) -> AlgorithmView:
-    """Return what the page shows of an algorithm."""
+    """Return the content of the page on an algorithm."""
     kernel, order = known.kernel, known.kernel.order
     return AlgorithmView(
         known.choice.kernel,
@@ -226,7 +226,7 @@ def of_tables(entries: Iterable[TableEntry], backends: Sequence[str]) -> Command
 def of_frontier(
     drifts_and_costs: Sequence[DriftAndCost], methods: Sequence[str], conditions: Conditions
 ) -> CommandResult:
-    """Return what algorithms cost and how they drift as the result of `frontier`."""
+    """Return drifts and costs of algorithms as the result of `frontier`."""
     words = f"--sample-hz {conditions.sample_hz} --duration {conditions.duration}"
     names = shlex.quote(",".join(methods))
     command = f"strapgen frontier --method {names} {conditions.options} {words}"

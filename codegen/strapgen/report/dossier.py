@@ -1,4 +1,4 @@
-"""Gathers what is known of one algorithm: formulas, code, bounds, and what runs of it say."""
+"""Collects formulas, code, bounds and runs of one algorithm."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ MOST_RECORDS = 250
 
 @dataclass(frozen=True)
 class StepRuns:
-    """What runs of an attitude step say."""
+    """Results of runs of an attitude step."""
 
     schedule: Schedule
     #: What ran
@@ -69,7 +69,7 @@ class StepRuns:
 
 @dataclass(frozen=True)
 class AlgorithmDossier:
-    """What is known of one kernel."""
+    """Formulas, code, bounds and runs of one kernel."""
 
     choice: Choice
     #: Its exact formulas
@@ -92,7 +92,7 @@ def dossier(
     settings: Settings | None = None,
     backends: Sequence[str] = DEFAULT_BACKENDS,
 ) -> AlgorithmDossier:
-    """Gather what is known of an algorithm, and run it if it is an attitude step.
+    """Collect formulas, code and bounds of an algorithm, and run it if it is an attitude step.
 
     `settings`: word, largest increment and rounding of fixed point; by default 32 bits and 1/8 rad. Runs choose
     their formats for their own increments, with the same rounding.
@@ -266,7 +266,7 @@ def compared(choices: Sequence[Choice], names: Sequence[str] = (frontier.EVERY,)
 
 
 def named(several: Sequence[Candidate], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names by which `frontier.candidates` returns algorithms: those stated, and what these leave out.
+    """Return arguments of `frontier.candidates`: the stated names, and algorithms that they do not include.
 
     >>> named(frontier.candidates(["magnus4:2", "rk4:3"]), ["magnus4:2"])
     ('magnus4:2', 'rk4:3')
@@ -328,7 +328,7 @@ def _gather(case: tuple[Any, ...]) -> AlgorithmDossier:
 def drifts_and_costs(
     several: Sequence[Candidate], conditions: Conditions, jobs: int | None = None
 ) -> Iterator[DriftAndCost]:
-    """Run algorithms on the motion of some conditions, and yield what each costs and how it drifts."""
+    """Run algorithms on the motion of some conditions, and yield drift and cost of each."""
     yield from frontier.frontier(
         several, conditions.sample_hz, conditions.duration, jobs=jobs, motions=motions(conditions)
     )

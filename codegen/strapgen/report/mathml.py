@@ -110,7 +110,7 @@ class _Reader:
         return f"<{name}>{base}{script}</{name}>"
 
     def _argument(self) -> str:
-        """Return the next token, or what braces hold, as one element."""
+        """Return the next token, or the content of braces, as one element."""
         if self._peek() != "{":
             return _row(list(self._element()))
         self._next()

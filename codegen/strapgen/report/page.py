@@ -121,7 +121,7 @@ class _PageCell:
 
 @dataclass(frozen=True)
 class Content:
-    """What a page is made of."""
+    """The content of a page."""
 
     #: Heading of the page, and the command that writes it
     title: str
@@ -141,7 +141,7 @@ class Content:
 
     @cached_property
     def views(self) -> tuple[AlgorithmView, ...]:
-        """What the page shows of each algorithm."""
+        """The content of the page on each algorithm."""
         return tuple(view(known, self.evidence) for known in self.algorithms)
 
     @cached_property
@@ -156,7 +156,7 @@ class Content:
         return {"": compared, **results}
 
     def data(self) -> dict[str, Any]:
-        """Return what the page embeds: the results as plain JSON data, and what charts show beside them."""
+        """Return the embedded data: results as plain JSON data, and the data of charts."""
         return {
             "results": self.results,
             "motion": self.conditions.motion,
@@ -250,7 +250,7 @@ class Content:
 
     @cached_property
     def shared_sources(self) -> list[str]:
-        """What all algorithms that are compared come from, besides what each states."""
+        """The common source of all compared algorithms."""
         first, *others = [one.source.split(_SOURCES) for one in self.drifts_and_costs] or [[]]
         return [part for part in first if all(part in parts for parts in others)] if others else []
 
@@ -264,7 +264,7 @@ class Content:
         ]
 
     def facts(self) -> list[tuple[str, str, str]]:
-        """Return what the page shows at its head: a name, a value, and a remark."""
+        """Return the facts at the head of the page: a name, a value, and a remark."""
         facts = []
         if self.tables:
             first = self.tables[0].backend
@@ -285,7 +285,7 @@ class Content:
         return facts
 
     def claim_rows(self) -> list[list[_PageCell]]:
-        """Return what tools said by claim: of each how many kernels have it, by the kind of result."""
+        """Return the verdicts of tools by claim: the number of kernels for each kind of result."""
         kinds = ("proved", "agrees", "fails", "not examined", "not installed")
         claims = dict.fromkeys(claim for shown in self.views for claim in shown.evidence)
         rows = []
@@ -315,7 +315,7 @@ def _figure(value: float | None, spec: str = _FIGURE) -> _PageCell:
 
 
 def _evidence_cell(evidence: Mapping[str, str]) -> _PageCell:
-    """Return how many claims tools have proved, and how many agree with what ran."""
+    """Return the number of proved claims, and of those that agree with runs."""
     if not evidence:
         return _PageCell("none on this code", None, mark="note")
     proved, agrees = (

@@ -184,7 +184,7 @@ def _title(choices: list[Choice]) -> str:
 
 
 def _recorded_evidence() -> EvidencePage | None:
-    """Return what tools said of the standard catalogue, where the page about it is there."""
+    """Return the verdicts of tools on the standard catalogue, if its page exists."""
     from strapgen.evidence.evidence_report import read_page
     from strapgen.storage import resources
 

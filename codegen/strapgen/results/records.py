@@ -297,7 +297,7 @@ def _plain_type_schema(kind: Any) -> dict[str, Any]:
 
 
 def _is_number(schema: Mapping[str, Any]) -> bool:
-    """Tell whether a schema has numbers at its ends, which may have a unit."""
+    """Return whether a schema has numbers at its ends, which may have a unit."""
     kinds = schema.get("type", ())
     ends = [kinds] if isinstance(kinds, str) else kinds
     if "number" in ends or "integer" in ends:
@@ -330,7 +330,7 @@ def _annotation(kind: type, name: str) -> Any:
 
 
 def _meanings(kind: type) -> dict[str, str]:
-    """Return what is said of the fields: in the docstring as numpydoc, in comments "#:" above, or of a property."""
+    """Return the descriptions of fields: from numpydoc, comments "#:", or docstrings of properties."""
     meanings: dict[str, str] = {}
     for one in reversed(kind.__mro__):
         if not dataclasses.is_dataclass(one):

@@ -219,5 +219,5 @@ def _number(cell: str) -> str:
 
 
 def _printed(cell: str) -> str:
-    """Return about what LaTeX prints of a cell, for its width."""
+    """Return a cell roughly as LaTeX prints it, for its width."""
     return re.sub(r"\\[a-z]+(\{\})?|[\\${}^]", "", cell)

@@ -54,7 +54,7 @@ KEEP_THE_ATTITUDE = frozenset(
 _DUAL_ROWS = "dcm-orthonormalize"
 
 
-@renamed(samples="samples_per_step")
+@renamed(samples="samples_per_step", beside="companion")
 class Backend:
     """An attitude algorithm that runs.
 
@@ -133,7 +133,7 @@ class Backend:
         self.takes = samples.name
         self.samples_per_step = samples.shape[0]
         self.previous, self.ahead = kernels.previous, kernels.ahead
-        self.increments = self.samples_per_step - kernels.beside
+        self.increments = self.samples_per_step - kernels.extra_increments
         self.state_shape = state.shape
         self.elements = state.elements
         self.attitude = kernels.attitude
@@ -165,7 +165,7 @@ class Backend:
         """Nodes at which a step takes the rate, as fractions of its length; empty if it takes increments."""
         return self._parts.nodes
 
-    def beside(self, kernel: str) -> Evaluator:
+    def companion(self, kernel: str) -> Evaluator:
         """Return another kernel on the same target as the step: one that restores a state, or converts it.
 
         Parameters
@@ -257,7 +257,7 @@ class Backend:
             ):
                 return None
             count = steps // orthonormalize_every
-            error = max(self.beside(kernel).interface.outputs[0].errors)
+            error = max(self.companion(kernel).interface.outputs[0].errors)
         bound = angles.bound(steps, count, error, rounded_inputs, dual_rows)
         return bound if math.isfinite(bound) else None
 
@@ -332,7 +332,7 @@ class Backend:
         -------
         array, (..., state shape)
         """
-        return np.asarray(self.beside(self._need_orthonormalization())(state))
+        return np.asarray(self.companion(self._need_orthonormalization())(state))
 
     def _need_orthonormalization(self) -> str:
         """Return the kernel that orthonormalizes, if there is one."""
@@ -470,11 +470,11 @@ class Backend:
         return checks.real_array("initial", start, self.state_shape, self.dtype)
 
     def _begin(self, states: Array) -> Loop:
-        """Return what runs begin with, from states, (runs, state shape)."""
+        """Return the initial numbers of runs from states, (runs, state shape)."""
         return Loop(
             self.evaluator.stored(0, states.reshape(len(states), self.identity.size)),
             self.evaluator.fresh(len(states)),
-            product=None if self._product is None else self.beside(self._product),
+            product=None if self._product is None else self.companion(self._product),
         )
 
     def _schedule(self, record_every: int, orthonormalize_every: int | None) -> dict[str, Any]:
@@ -483,7 +483,7 @@ class Backend:
         if orthonormalize_every is None:
             return {"record_every": record_every}
         orthonormalize_every = checks.count("orthonormalize_every", orthonormalize_every, largest=checks.MOST)
-        restore = self.beside(self._need_orthonormalization())
+        restore = self.companion(self._need_orthonormalization())
         return {"record_every": record_every, "restore_every": orthonormalize_every, "restore": restore}
 
 

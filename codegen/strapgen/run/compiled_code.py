@@ -76,7 +76,7 @@ class CEvaluator(Evaluator):
         return outputs, feedback
 
     def refused(self, status: int, where: str = "") -> InputError:
-        """Return the error of a user's input that a status of the generated code stands for."""
+        """Return the error of a user's input for a status of the generated code."""
         if status == 1:
             limits = ", ".join(
                 f"{a.signal.name} up to {float(a.high * a.unit):.6g}" for a in self.interface.inputs

@@ -199,7 +199,7 @@ class Evaluator(ABC):
         return rows
 
     def unpack(self, packed: Any, count: int) -> Array:
-        """Return what `call` has returned as rows, of which there are so many."""
+        """Return the result of `call` as `count` rows."""
         rows: Array = packed
         return rows
 
@@ -256,7 +256,7 @@ def stored(values: Any, number: Any, argument: Argument | None = None, kernel: s
 
 
 def in_si(values: Array, argument: Argument | None = None) -> Array:
-    """Return what code stores in SI units; numbers of mpmath are rounded to double."""
+    """Return stored numbers in SI units; numbers of mpmath are rounded to double."""
     if argument is not None:
         return numbers(argument, values)
     return values.astype(np.float64) if values.dtype.kind == "O" else values

@@ -1,4 +1,4 @@
-"""The exact back end: programs in arithmetic of 40 digits, the reference for what rounding does on the others.
+"""The exact back end: programs in arithmetic of 40 digits, the reference for rounding errors of the others.
 
 Nothing is generated: the back end interprets the lowered program of a kernel on numbers of mpmath. Inputs are the exact
 numbers that doubles are, and results are rounded to double at the end. An `Interpreter` takes and returns all digits.
@@ -171,7 +171,7 @@ def attitudes(backend: Backend, samples: Iterable[Sequence[Any]]) -> Iterator[li
 
     Samples are the increments of each step in rad, row-major, as numbers of mpmath.
     """
-    step, convert = backend.evaluator, backend.attitude and backend.beside(backend.attitude)
+    step, convert = backend.evaluator, backend.attitude and backend.companion(backend.attitude)
     assert isinstance(step, ExactEvaluator), "doubles hold no further digits"
     assert backend.sources.attitude_step is not None, "a back end runs an attitude step"
     state = [number(value) for value in backend.sources.attitude_step.identity]

@@ -79,7 +79,7 @@ call in floating point.
 
 
 def write(folder: Path, files: dict[str, str]) -> list[Path]:
-    """Write the tree, return what was written, and remove generated files that no longer belong to it.
+    """Write the tree, return the written paths, and remove generated files that no longer belong to it.
 
     Files that strapgen did not generate are not touched; where one stands in the place of a file of the tree, an
     `InputError` says so, and nothing is written.

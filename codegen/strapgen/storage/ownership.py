@@ -42,7 +42,7 @@ class PrivateFolder:
         self._here = place if descriptor is None else descriptor
 
     def names(self) -> list[str]:
-        """Return the names of what the folder holds."""
+        """Return the names in the folder."""
         with os.scandir(self._here) as entries:
             return sorted(entry.name for entry in entries)
 

@@ -25,5 +25,5 @@ def _standard_input() -> bytes:
 
 
 def names_file(text: str) -> bool:
-    """Tell whether an argument is a TOML file, and no name: it ends in .toml, has a path separator, or is -."""
+    """Return whether an argument is a TOML file, and no name: it ends in .toml, has a path separator, or is -."""
     return text == str(STANDARD) or text.endswith(".toml") or any(mark in text for mark in _SEPARATORS)

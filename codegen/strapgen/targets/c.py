@@ -256,7 +256,7 @@ def _loop(program: Program, printer: CPrinter, name: str) -> dict[str, object]:
 
 
 def _in_vectors(program: Program) -> bool:
-    """Tell whether each value and output of a program can be a vector of several samples."""
+    """Return whether each value and output of a program can be a vector of several samples."""
     values = [a.value for a in program.body] + [node for result in program.outputs for node in result.nodes]
     return all(names_in(value) for value in values) and all(
         node.kind in _OF_VECTORS for value in values for node in walk(value) if isinstance(node, Operation)

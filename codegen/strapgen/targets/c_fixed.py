@@ -338,7 +338,7 @@ class StatementPrinter:
         return [self._declared(kind, value.name, self.narrow(text, value), note)]
 
     def _is_word(self, term: Term) -> bool:
-        """Tell whether a term is a word, or a small multiple of one, so that it is computed in words."""
+        """Return whether a term is a word, or a small multiple of one, so that it is computed in words."""
         return not term.names or (
             len(term.names) == 1
             and term.names[0] not in self.wide_names

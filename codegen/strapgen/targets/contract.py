@@ -212,7 +212,7 @@ _UNITS = 4
 
 
 def run_paragraphs(interface: Interface, program: Program) -> list[str]:
-    """Return the bound of a run of N steps in words, and for some N; empty for a kernel that is no step."""
+    """Return the bound of a run of N steps in words, and its values for some N; empty for other kernels than steps."""
     angles = interface.angle_accumulation
     if angles is not None:
         is_matrix = len(program.inputs[0].shape) == 2

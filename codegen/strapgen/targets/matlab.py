@@ -155,7 +155,7 @@ def _statement(name: str, value: str, indent: int = 8) -> str:
 
 
 def _continue_lines(text: str) -> str:
-    """Return a statement that goes on in the next line with the mark that says so."""
+    """Return a statement over several lines with the continuation mark."""
     return text.replace("\n", " ...\n")
 
 
@@ -172,7 +172,7 @@ _WORDS = frozenset(_WORDS_TEXT.split())
 
 
 def _allows(name: str) -> bool:
-    """Tell whether an identifier can name a quantity: it begins with a letter, and has at most 63 characters."""
+    """Return whether an identifier can name a quantity: it begins with a letter, and has at most 63 characters."""
     return name not in _WORDS and not name.startswith("_") and len(name) <= 63
 
 

@@ -82,13 +82,13 @@ class ThesisTablesResult(Result):
 
 
 def repair_notes(table: Table) -> list[str]:
-    """Return what is repaired of a table of the thesis, as lines for a reader."""
+    """Return the repairs of a table of the thesis, as lines for a reader."""
     sentences = (each.sentence for each in table.repairs)
     return [f"  {line}" for sentence in sentences for line in textwrap.wrap(sentence, _WIDTH)]
 
 
 def _printed_rows(table: Table, algorithm: str) -> list[list[Any]]:
-    """Return the figures that the thesis prints of an algorithm, and what the scan reads where they are repaired."""
+    """Return the printed figures of an algorithm, and the misread ones of the scan where they are repaired."""
     row, scan = ["thesis"], ["scan"]
     for order, figure in zip(ORDERS, table.printed[algorithm], strict=True):
         row += [table.base if (algorithm, order) == ("dcm", 1) else "", figure, ""]
@@ -107,12 +107,12 @@ def _row(entries: Sequence[TableEntry], backend: str, algorithm: str) -> list[An
 
 
 def _mark(entry: TableEntry) -> str:
-    """Return what stands behind a figure: round-off says more than that the figure is not the thesis's."""
+    """Return the mark of a figure: round-off, or else a difference from the thesis."""
     return "r" if entry.roundoff_dominates else "" if entry.agrees else "*"
 
 
 def _notes(entries: Sequence[TableEntry]) -> list[str]:
-    """Return what the marks mean that stand in the table, and what is to be said about figures of the thesis."""
+    """Return the notes of a table: the meaning of its marks, and remarks on figures of the thesis."""
     lines = []
     if not all(entry.agrees for entry in entries):
         lines.append("  * not the thesis's figure in its printed digits")
@@ -244,7 +244,7 @@ def _title(table: Table, entries: Sequence[_Figure]) -> str:
 
 
 def _place(algorithm: str, order: int) -> float:
-    """Return where the marks of an algorithm stand at an order."""
+    """Return the position of the marks of an algorithm at an order."""
     return ORDERS.index(order) + (_ASIDE if ALGORITHMS.index(algorithm) else -_ASIDE)
 
 

@@ -1,4 +1,4 @@
-"""Runs what the text of the thesis says of its results (chapter 5), and says whether the runs bear it out."""
+"""Tests the statements of the thesis on its results (chapter 5) by runs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _WIDTH = 100
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement of the thesis, and what runs say of it."""
+    """A statement of the thesis with the runs that test it."""
 
     number: int
     #: The statement in few words
@@ -410,7 +410,7 @@ def bend(time: NDArray[np.float64], values: NDArray[np.float64]) -> float:
 
 @dataclass(frozen=True)
 class StatementsResult(Result):
-    """What the text of the thesis says, and what runs say of it: a row for each statement."""
+    """Statements of the thesis and the runs that test them: a row for each statement."""
 
     rows_in = "statements"
     row = Statement
@@ -422,7 +422,7 @@ class StatementsResult(Result):
         return reader_table(self.statements, Statement)
 
     def text(self) -> str:
-        """Return what is said, what runs measure, and the verdict."""
+        """Return each statement with measurements and verdict."""
         lines: list[str] = []
         for each in self.statements:
             verdict = each.verdict if each.confirmed else f"{each.verdict} (the runs do not bear this out)"

@@ -35,7 +35,7 @@ _FRACTION_TOLERANCE = 5e-3
 
 @dataclass(frozen=True)
 class Repair:
-    """A figure of the thesis that is not what its scan reads."""
+    """A correction of a misread figure in the scan of the thesis."""
 
     #: What is read in its place
     figure: str
@@ -81,7 +81,7 @@ class Table:
         )
 
     def repairs_behind(self, algorithm: str, order: int) -> list[Repair]:
-        """Return the repairs that a figure rests on: its own, and those of the table's motion."""
+        """Return the repairs that affect a figure: its own, and those of the table's motion."""
         return [
             each for each in self.repairs if (each.algorithm, each.order) in ((algorithm, order), ("", 0))
         ]

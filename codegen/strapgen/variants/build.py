@@ -1,4 +1,4 @@
-"""Generates variants, and holds what is in their folders to what their file states."""
+"""Generates variants, and compares the files in their folders with generated ones."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _folder(variant: Variant) -> str:
 
 
 def _has_own_vectors(variant: Variant) -> bool:
-    """Tell whether vectors are written by themselves; a project has its own."""
+    """Return whether vectors are written by themselves; a project has its own."""
     return bool(variant.checks.vectors) and not variant.options.get("project")
 
 

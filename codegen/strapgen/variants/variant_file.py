@@ -209,7 +209,7 @@ def _words(
 
 
 def _is_fixed(variant: Variant, options: CommandOptions, arguments: Sequence[str]) -> bool:
-    """Tell whether the options of fixed point go with the target or the back ends of a command line."""
+    """Return whether the options of fixed point go with the target or the back ends of a command line."""
     from strapgen.run.backend_names import BACKENDS
     from strapgen.targets import TARGETS
 
@@ -323,7 +323,7 @@ _TAKES: dict[Any, tuple[tuple[type, ...], str]] = {
 
 
 def _read(option: Option, where: str, value: Any) -> None:
-    """Refuse a value that the option would refuse."""
+    """Check a value by the reader of its option."""
     kinds, words = _TAKES.get(option.kind, ((str, *_NUMBER), "a number or a text"))
     is_right = isinstance(value, kinds) and (isinstance(value, bool) == (option.kind is bool))
     inner = value if isinstance(value, list) else [*value.values()] if isinstance(value, dict) else []

@@ -155,7 +155,7 @@ def constant_rate(choice: Choice) -> ConstantRate:
     kernel, step_kernels = attitude_step.kernel, attitude_step.kernel.attitude_step
     assert step_kernels is not None, "checked by `linear_step`"
     state, samples = kernel.inputs
-    share = 1 if attitude_step.nodes is not None else samples.shape[0] - step_kernels.beside
+    share = 1 if attitude_step.nodes is not None else samples.shape[0] - step_kernels.extra_increments
     identity = {
         name: sp.Rational(x.numerator, x.denominator)
         for name, x in zip(state.elements, step_kernels.identity, strict=True)

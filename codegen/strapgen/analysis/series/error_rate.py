@@ -1,4 +1,4 @@
-"""The error rate is the rate that an algorithm in effect adds to the angular rate, as a series in the step length.
+"""The error rate: the rate that an algorithm in effect adds to the angular rate, as a series in the step.
 
 A run of an algorithm is the exact motion of a slightly different rate. If the rate of a motion has a constant length
 and rotates uniformly (constant rate, coning), all steps are equal in a frame that rotates with it. With the matrix M of

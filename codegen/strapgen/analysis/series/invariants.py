@@ -83,7 +83,7 @@ def _shares(frame: Frame, elements: Sequence[Any]) -> list[tuple[sp.Expr, list[A
 
 
 def _rational_parts(domain: Any, number: Any) -> Iterator[tuple[sp.Expr, Any]]:
-    """Yield what a number of a domain is the sum of: expressions in its generators, and their rational factors."""
+    """Yield the terms of a number of a domain: expressions in its generators, and their rational factors."""
     if domain.is_Poly:
         for exponents, coefficient in number.terms():
             product = sp.Mul(*(x**k for x, k in zip(domain.symbols, exponents, strict=True)))

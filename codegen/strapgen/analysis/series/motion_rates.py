@@ -61,7 +61,7 @@ def in_powers_of_the_step(kernel: str) -> Iterator[None]:
 
 
 def require(motion: str) -> None:
-    """Refuse what is neither a general motion, nor one of the catalogue, nor a file of a user."""
+    """Refuse a motion that is neither general, nor of the catalogue, nor a user's file."""
     if not is_file(motion):
         checks.choice("motion", motion, ("general", *catalogue.MOTIONS), "a Python file")
 
@@ -150,7 +150,7 @@ def at_start(motion: str, count: int, domain: Any = sp.QQ) -> MotionRate:
 
 
 def _polynomial(count: int, domain: Any) -> MotionRate:
-    """Return the rate about one axis, with symbols for its derivatives, since expanded products would get too long."""
+    """Return the rate about one axis with symbols for its derivatives; expanded products would be too long."""
     symbols = parameters("polynomial")
     (_, rate, _) = MOTIONS["polynomial"].rate(TIME, *symbols)
     ring, *r = sp.ring([f"r{j}" for j in range(min(count, len(symbols)))], domain)  # the others are zero

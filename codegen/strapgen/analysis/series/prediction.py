@@ -1,4 +1,4 @@
-"""Predicts the errors of a run from the series of the error rate, and sets them beside those of runs.
+"""Predicts the errors of a run from the series of the error rate, and compares them with simulated errors.
 
 An agreement runs an algorithm with smaller and smaller steps, both it and the prediction in many digits, so that
 rounding does not hide a difference.

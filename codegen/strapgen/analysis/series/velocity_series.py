@@ -210,13 +210,13 @@ def series(choice: AnyAlgorithm, terms: int = 1) -> VelocitySeries:
 
 
 def parts_of(kernel: Kernel) -> tuple[str, ...]:
-    """Return what a kernel computes, of `PARTS`."""
+    """Return which of `PARTS` a kernel computes."""
     names = {stage.signal.name for stage in kernel.outputs}
     return tuple(part for part in PARTS if f"{part}_change" in names)
 
 
 def shares(kernel: Kernel, terms: int) -> list[list[sp.Expr]]:
-    """Return what t^j/j! adds to each sample of a kernel, as a multiple of the (j + 1)-th power of the step."""
+    """Return the share of t^j/j! in each sample of a kernel, as a multiple of the (j + 1)-th power of the step."""
     count = kernel.inputs[0].shape[0] - kernel.previous - kernel.ahead
     intervals = range(-kernel.previous, count + kernel.ahead)
     return [sampled_motion.increment_shares(k, count, terms) for k in intervals]
@@ -301,7 +301,7 @@ _SYMBOLS = {"velocity": r"\delta\mathbf{v}", "position": r"\delta\mathbf{r}/h"}
 
 @dataclass(frozen=True)
 class VelocitySeriesResult(Result):
-    """What one step of velocity and position loses, as power series in its length."""
+    """The errors of one step of velocity and position, as power series in its length."""
 
     each = VelocityTerms
 

@@ -51,7 +51,7 @@ _PRODUCTS = 2
 
 @dataclass(frozen=True)
 class Demand:
-    """A motion and the order that a step is to have on it."""
+    """A motion and the required order of a step on it."""
 
     #: One of `OF_ATTITUDE` or `OF_VELOCITY`
     motion: str

@@ -104,7 +104,7 @@ class Family:
         return ()
 
     def holds(self, expression: sp.Expr) -> bool:
-        """Tell whether an expression in the unknowns is zero for all members of the family."""
+        """Return whether an expression in the unknowns is zero for all members of the family."""
         numerator = sp.numer(sp.together(expression.xreplace(self.values)))
         numerator = sp.expand(numerator)
         if numerator == 0 or not self.equations:
@@ -115,7 +115,7 @@ class Family:
 
 @dataclass(frozen=True)
 class PolynomialSolution:
-    """What equations say of their unknowns.
+    """The solutions of polynomial equations, as families.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ MOST_IN_BASIS, MOST_EQUATIONS, MOST_DEGREES = 5, 12, 40
 
 @dataclass(frozen=True)
 class _Case:
-    """A branch of the search: equations that are left, what is not zero, and what is solved.
+    """A branch of the search: remaining equations, factors that are not zero, and solved unknowns.
 
     Each of `values` is the number of an unknown with the numerator and the denominator of what it equals, in unknowns
     that later ones may replace.
@@ -338,7 +338,7 @@ class _CaseSearch:
         return [factor.monic() for factor, _ in polynomial.factor_list()[1]]
 
     def simplify(self, case: _Case) -> _Case:
-        """Return a case without what is known not to be zero, and without equations that hold."""
+        """Return a case without factors that are not zero, and without equations that hold."""
         shortest: dict[Any, tuple[str, Any]] = {}
         for label, polynomial in case.equations:
             if not polynomial:
@@ -357,7 +357,7 @@ class _CaseSearch:
         return replace(case, equations=tuple(sorted(shortest.values(), key=lambda item: len(item[1]))))
 
     def contradiction(self, case: _Case, polynomial: Any) -> str:
-        """Return why a number that is not zero is left of an equation."""
+        """Return the reason of a contradiction: an equation that is a number other than zero."""
         if all(bottom == 1 for _, _, bottom in case.values):  # as it was, but for the values
             number = self.ring.domain.to_sympy(polynomial.LC)
             return f"is {number} with the values that the others leave, and has to be 0"

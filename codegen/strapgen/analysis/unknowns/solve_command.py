@@ -24,7 +24,7 @@ _Text = str | None
 
 @dataclass(frozen=True)
 class SolutionOutput(Output):
-    """Where the families go, and in which format."""
+    """Options for the output of the families."""
 
     format: Annotated[_Text, format_option(("text", "json", "latex"))] = "text"
     formats: ClassVar[tuple[str, ...]] = ("text", "json", "latex")
@@ -117,7 +117,7 @@ def _orders(on: tuple[str, ...], order: int) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class TableauOutput(Output):
-    """Where the tableau goes, and in which format."""
+    """Options for the output of the tableau."""
 
     format: Annotated[str | None, format_option((*Output.formats, "toml"))] = "text"
     formats: ClassVar[tuple[str, ...]] = (*Output.formats, "toml")

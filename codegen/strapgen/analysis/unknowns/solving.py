@@ -1,4 +1,4 @@
-"""Solves the conditions on the unknown coefficients of a step, and says what error its families leave."""
+"""Solves the conditions on the unknown coefficients of a step, and derives the leading errors of the solutions."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _terms(terms: Sequence[Equation]) -> dict[str, sp.Expr]:
 
 @dataclass(frozen=True)
 class LeadingError:
-    """The first error that a family leaves on a motion.
+    """The leading error of a family on a motion.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def solve(choice: AnyAlgorithm, order: int | Mapping[str, int]) -> SolvedStep:
 
 
 def _statement(algorithm: AnyAlgorithm) -> tuple[Kernel, State]:
-    """Return the kernel of an algorithm, and what states the conditions on it."""
+    """Return the kernel of an algorithm, and the function that states its conditions."""
     choice = choose(algorithm)
     if choice.takes_velocity:
         kernel = pipeline.derive(choice)

@@ -60,7 +60,7 @@ class TableauResult(Result):
 
     @staticmethod
     def of(tableau: Tableau) -> TableauResult:
-        """Return a tableau with what its conditions say."""
+        """Return a tableau with its conditions, evaluated."""
         embedded = tableau.embedded_weights
         return TableauResult(
             tableau=tableau,
@@ -143,7 +143,7 @@ def _tableau_lines(data: TableauResult) -> list[str]:
 
 
 def _coefficient_lines(data: TableauResult) -> list[str]:
-    """Return what is not zero in the tableau, a coefficient a line."""
+    """Return the coefficients of the tableau that are not zero, one a line."""
     named = []
     for stage, (node, row) in enumerate(zip(data.nodes, data.matrix, strict=True), 1):
         named.append((f"c_{stage}", node))

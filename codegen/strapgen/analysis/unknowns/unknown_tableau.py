@@ -229,7 +229,7 @@ UNKNOWN_TABLEAU = UserFile("a tableau", UnknownTableauFile, tableaux.TABLEAU.mos
 
 
 def has_unknowns(path: str | Path) -> bool:
-    """Tell whether the file of a tableau declares unknowns."""
+    """Return whether the file of a tableau declares unknowns."""
     return "unknowns" in UNKNOWN_TABLEAU.content(path)
 
 

@@ -74,7 +74,7 @@ class SolvedResult(Result):
 
     @staticmethod
     def of(solved: SolvedStep, chosen: Mapping[str, sp.Expr] | None = None) -> SolvedResult:
-        """Return what a step was solved to."""
+        """Return the solution of a step as a result."""
         families = [
             SolvedFamily(family, errors)
             for family, errors in zip(solved.families, solved.leading, strict=True)

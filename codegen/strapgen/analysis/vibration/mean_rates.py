@@ -1,4 +1,4 @@
-"""Mean rates of a vibration are those that an algorithm computes, the true ones, and their difference.
+"""Mean rates under vibration: computed by an algorithm, true, and their difference.
 
 An `Assessment` holds the rates in closed form and evaluates them. Numbers come from double precision where that is
 accurate enough, and from as many digits as are needed where terms cancel.

@@ -197,7 +197,7 @@ class Sampling(NamedTuple):
 
 
 class _Term(NamedTuple):
-    """What products of one order and of the same phase add to the error of the mean rate."""
+    """A term of the error of the mean rate: products of one order and phase."""
 
     order: int
     #: How often the start phase of each tone is in that of the term; the first one that is not 0 is positive
@@ -448,7 +448,7 @@ def _axial(matrix: Array) -> Array:
 
 
 def _difference(product: Product, hertz: Sequence[Fraction], step: Fraction | None) -> complex:
-    """Return by what a product is multiplied for its difference from step to step, or for its derivative."""
+    """Return the factor of a product for its difference from step to step, or for its derivative."""
     frequency = sum((hertz[k // 2] * (-1) ** k for k in product), Fraction(0))
     if step is None:
         return 2j * math.pi * float(frequency)

@@ -241,7 +241,7 @@ class VibrationSource:
         return f"{words}, phase {self.phase} rad{self.gyro_words}"
 
     def rates(self, cases: list[AssessedCase]) -> tuple[list[CaseRates], str]:
-        """Return the mean rates of every case that the vibration moves, and what it is in words."""
+        """Return the mean rates of every case that the vibration excites, and the vibration in words."""
         from strapgen.analysis import vibration
         from strapgen.analysis.vibration.vibration_report import CaseRates
 
@@ -273,7 +273,7 @@ class VibrationSource:
 
 @dataclass(frozen=True)
 class VibrationOutput(Output):
-    """Where the mean rates go, and in which format; over frequency into an image file."""
+    """Options for the output of the mean rates, and for a plot over frequency."""
 
     plot: Annotated[Path | None, plot_option("the errors over frequency")] = None
     span: Annotated[
@@ -383,7 +383,7 @@ def _check_known(algorithm: str, names: tuple[str, ...]) -> None:
 
 
 def _assess(algorithm: str, method: MethodOptions, source: VibrationSource) -> list[AssessedCase]:
-    """Return a case for each quantity of an algorithm that the options ask for."""
+    """Return a case for each requested quantity of an algorithm."""
     from strapgen.analysis.vibration import assessment, systems
     from strapgen.analysis.vibration.vibration_report import AssessedCase
 

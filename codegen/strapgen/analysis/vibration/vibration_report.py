@@ -42,7 +42,7 @@ _REPAIRS = {
 
 @dataclass(frozen=True)
 class AssessedCase:
-    """An assessment as it stands in a report."""
+    """An assessment in a report."""
 
     assessment: Assessment
     #: Fast cycles in a step of an algorithm in two speeds; None for any other algorithm
@@ -66,7 +66,7 @@ class AssessedCase:
         return self.cycles is not None and self.assessment.kernel != _TWO_SPEED
 
     def moved(self, transfers: set[str]) -> bool:
-        """Tell whether a spectrum with these transfers moves what this case needs."""
+        """Return whether a spectrum with these transfer functions excites the channels of this case."""
         if self.assessment.unit == "rad/s":
             return {"angle_x", "angle_y"} <= transfers
         return {"angle_x", "acceleration_y"} <= transfers or {"angle_y", "acceleration_x"} <= transfers

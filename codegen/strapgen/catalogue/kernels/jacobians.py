@@ -113,7 +113,7 @@ def error_state(method: Method, increments: int, previous: int = 0, ahead: int =
 
 
 @dataclass(frozen=True)
-class _Turn:
+class _StepTransition:
     """The transition of a step under construction and its derivatives."""
 
     kinematics: Kinematics
@@ -159,7 +159,7 @@ class _Turn:
 
 def transition(
     build: KernelBuilder, kinematics: Kinematics, method: Method, counts: tuple[int, int, int]
-) -> _Turn:
+) -> _StepTransition:
     """Add stages for the transition of a step and for its derivatives by the elements of the increments."""
     count = sum(counts)
     increments = build.input(increments_signal(*counts))
@@ -190,7 +190,7 @@ def transition(
                 for vector in range(count)
                 for axis in range(3)
             ]
-            return _Turn(kinematics, value, parts, sums, build)
+            return _StepTransition(kinematics, value, parts, sums, build)
     return _stage_by_stage(build, kinematics, apart.stages, value, increments)
 
 
@@ -261,7 +261,7 @@ def _exponential(
     kinematics: Kinematics,
     function: CovariantFunction,
     sums: Sequence[Sequence[sp.Expr]],
-) -> _Turn:
+) -> _StepTransition:
     """Return the transition of a rotation vector, with its derivatives by the elements of that."""
     phi = build.stage(PHI, function.values()[:3])
     square = build.value("phi_square", algebra.dot(phi, phi), "square of the angle of the step")
@@ -290,7 +290,7 @@ def _exponential(
             meaning=f"derivative of the rotation vector by element {place}",
         )
         columns.append(list(build.stage(signal, total)))
-    return _Turn(kinematics, value, parts, columns, build)
+    return _StepTransition(kinematics, value, parts, columns, build)
 
 
 def _stage_by_stage(
@@ -299,7 +299,7 @@ def _stage_by_stage(
     stages: Sequence[Stage],
     value: sp.Matrix,
     increments: sp.Matrix,
-) -> _Turn:
+) -> _StepTransition:
     """Return the transition of any method, with its derivatives by the increments by the chain rule."""
     build.stages += stages
     parts = []
@@ -308,7 +308,7 @@ def _stage_by_stage(
         parts.append(value.applyfunc(lambda symbol, changes=changes: changes.get(symbol, sp.Integer(0))))
     count = len(parts)
     sums = [[sp.Integer(int(j == k)) for j in range(count)] for k in range(count)]
-    return _Turn(kinematics, value, parts, sums, build)
+    return _StepTransition(kinematics, value, parts, sums, build)
 
 
 def _places(kinematics: Kinematics) -> list[int]:

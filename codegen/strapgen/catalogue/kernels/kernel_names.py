@@ -30,7 +30,7 @@ _STANDARD_TWO_SPEED = (
 
 
 def _recipes(module: str) -> Callable[..., Recipe]:
-    """Return what makes a recipe of a title, a function of a module of this folder, and its arguments."""
+    """Return a function that makes recipes from a title, a function of a module in this folder, and its arguments."""
     return lambda title, function, *arguments: Recipe(title, f"{__package__}.{module}", function, arguments)
 
 

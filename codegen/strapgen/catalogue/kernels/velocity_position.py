@@ -64,7 +64,7 @@ def step(method: Method, increments: int, previous: int = 0, ahead: int = 0) -> 
     """
     build = KernelBuilder()
     rate = _Rate(build, method, (increments, previous, ahead))
-    turn = _Turn(build, rate)
+    turn = _StepRotation(build, rate)
     for part, signal in CHANGES.items():
         known = add_tangents(build, turn.stages, rate.changes[part](), part, "m/s")
         build.output(signal, turn.velocity(known, part))
@@ -149,7 +149,7 @@ def _of_coefficients(window: Window, degree: int) -> Method:
     return exponential(window.name, window.title, rotation_series.SOURCE, _POWER, rotation_vector)
 
 
-class _Turn:
+class _StepRotation:
     """The rotation over a step under construction, and the velocity that follows from its change."""
 
     def __init__(self, build: KernelBuilder, rate: _Rate) -> None:

@@ -17,7 +17,7 @@ MOST_INCREMENTS = 8
 MOST_BESIDE = 32
 
 
-class Asked(NamedTuple):
+class RequestedSamples(NamedTuple):
     """The requested numbers of samples of a step; None stands for the number of the method or the default."""
 
     increments: int | None = None
@@ -69,13 +69,13 @@ class MethodSpec(Protocol):
     def own_samples(self) -> int | None:
         """Increments in a step of a method that says so itself."""
 
-    def select(self, asked: Asked) -> tuple[MethodSpec, StepSamples]:
+    def select(self, asked: RequestedSamples) -> tuple[MethodSpec, StepSamples]:
         """Return the method and its samples for the requested ones; refuse numbers that it does not have."""
         ...
 
 
 def through_samples(
-    name: str, asked: Asked, *, takes_rates: bool = True, takes_ahead: bool = True
+    name: str, asked: RequestedSamples, *, takes_rates: bool = True, takes_ahead: bool = True
 ) -> StepSamples:
     """Return the samples of a step whose rate is the polynomial through any number of them."""
     increments, rates = asked.increments, asked.rates
@@ -129,8 +129,8 @@ class Integrator:
         """Return whether the method keeps all powers of time of the polynomial through so many samples."""
         return not self._is_taylor or samples < LEAST_WHOLE or self.order >= samples
 
-    def select(self, asked: Asked) -> tuple[Integrator, StepSamples]:
-        """Return the method for the samples that are asked for, and the samples.
+    def select(self, asked: RequestedSamples) -> tuple[Integrator, StepSamples]:
+        """Return the method and its samples for the requested ones.
 
         A Taylor series that ends before the rate's polynomial through many samples does is refused: the powers of time
         that it leaves out are of first order in the increments, and the step does not turn by their sum.

@@ -89,7 +89,7 @@ def substituted(words: Words, table: Sequence[Mapping[int, Fraction]]) -> Words:
 
 
 def in_samples(terms: Words, increments: int, previous: int = 0) -> Words:
-    """Return a term in r_0, r_1, ... as a term in the samples through which the polynomial rate goes."""
+    """Convert a term in r_0, r_1, ... to the samples of the polynomial rate."""
     fit = rate_fit.from_increments(increments, previous)
     return substituted(
         terms,

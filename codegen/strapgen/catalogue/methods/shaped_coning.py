@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar
 
 from strapgen.catalogue.methods import coefficient_files
 from strapgen.catalogue.methods.coefficient_files import Band, CoefficientFiles, Gyro, Source, Title
-from strapgen.catalogue.methods.method_spec import Asked, StepSamples
+from strapgen.catalogue.methods.method_spec import RequestedSamples, StepSamples
 from strapgen.catalogue.methods.window import GyroResponse
 from strapgen.catalogue.methods.windows import WINDOWS
 from strapgen.catalogue.toml_models import Key, UserFile
@@ -111,7 +111,7 @@ class ShapedConing:
         """Module, function and arguments that make a `Method` of it."""
         return f"{__package__}.coning", "shaped", (self,)
 
-    def select(self, asked: Asked) -> tuple[ShapedConing, StepSamples]:
+    def select(self, asked: RequestedSamples) -> tuple[ShapedConing, StepSamples]:
         """Return the coefficients and their samples; no other numbers of samples are allowed."""
         if asked.rates:
             raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")

@@ -17,7 +17,7 @@ from strapgen.catalogue import coefficients
 from strapgen.catalogue.coefficients import Number, short_text
 from strapgen.catalogue.methods import coefficient_files, order_conditions
 from strapgen.catalogue.methods.coefficient_files import CoefficientFiles, Source, Title
-from strapgen.catalogue.methods.method_spec import Asked, StepSamples, through_samples
+from strapgen.catalogue.methods.method_spec import RequestedSamples, StepSamples, through_samples
 from strapgen.catalogue.toml_models import Key, UserFile
 from strapgen.ir import checks
 from strapgen.ir.checks import counted, needed
@@ -259,8 +259,8 @@ class Tableau:
         """Module, function and arguments that make a `Method` of it."""
         return f"{__package__}.runge_kutta", "verified", (self,)
 
-    def select(self, asked: Asked) -> tuple[Tableau, StepSamples]:
-        """Return the method for the samples that are asked for, and the samples."""
+    def select(self, asked: RequestedSamples) -> tuple[Tableau, StepSamples]:
+        """Return the method and its samples for the requested ones."""
         return self, through_samples(self.name, asked)
 
     @property

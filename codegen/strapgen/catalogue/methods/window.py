@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar
 
-from strapgen.catalogue.methods.method_spec import Asked, StepSamples
+from strapgen.catalogue.methods.method_spec import RequestedSamples, StepSamples
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir import checks
 from strapgen.ir.checks import counted
@@ -125,8 +125,8 @@ class Window:
         """Module, function and arguments that make a `Method` of it."""
         return f"{__package__}.windowed", "method", (self,)
 
-    def select(self, asked: Asked) -> tuple[Window, StepSamples]:
-        """Return the filters of the family with the samples that are asked for, and the samples."""
+    def select(self, asked: RequestedSamples) -> tuple[Window, StepSamples]:
+        """Return the filters of the family for the requested samples, and the samples."""
         previous, ahead = asked.previous, asked.ahead
         if asked.rates:
             raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")

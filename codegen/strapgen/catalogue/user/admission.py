@@ -243,7 +243,7 @@ def _require_samples(kernel: Kernel, step: AttitudeStep) -> None:
         _refuse(
             kernel, f"it takes rates at {shape[0]} nodes; its attitude_step needs as many different nodes"
         )
-    if step.beside:
+    if step.extra_increments:
         _refuse(kernel, "it takes rates; previous and ahead go with increments")
 
 

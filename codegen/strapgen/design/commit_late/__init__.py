@@ -1,1 +1,1 @@
-"""The target that prints C which commits an attitude late and answers it now."""
+"""C code that commits an attitude a few samples late, and estimates the present one."""

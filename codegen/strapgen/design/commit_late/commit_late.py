@@ -1,4 +1,4 @@
-"""An attitude that is committed a few samples late, with filters of samples on both sides, and answered now.
+"""An attitude that is committed a few samples late by two-sided filters, with an estimate of the present one.
 
 The committed attitude is L samples old and has the small error of symmetric filters. The attitude of now is the
 committed one times the last intervals, by filters with fewer samples ahead; it is an answer only, so that its errors do
@@ -33,7 +33,7 @@ from strapgen.run.evaluators import Array, integers, numbers
 
 
 class CommitLate:
-    """Integrates samples as they come: an attitude that is committed late, and the attitude of now on request.
+    """Integrates samples as they arrive: an attitude that is committed late, and the present one on request.
 
     The first p + 1 + L samples are waited for; the intervals before the first whole window then have filters with fewer
     samples before them. Until then, `now` and `flush` have the rate from polynomials through up to four samples.
@@ -175,7 +175,7 @@ class CommitLate:
         return commits
 
     def now(self) -> Array:
-        """Return the attitude at the end of the last interval, by filters for the samples that are there."""
+        """Return the present attitude, at the end of the last interval, by one-sided filters."""
         return self._numbers(self._unit.now())
 
     def flush(self) -> int:

@@ -25,7 +25,7 @@ from strapgen.design.commit_late.late_filters import (
     FixedFilters,
     Integers,
     LateFilters,
-    NowErrors,
+    PresentErrors,
     Rows,
 )
 from strapgen.fixedpoint.floating.errors import Expressions, sensitivities, slopes
@@ -120,7 +120,7 @@ def _of_rotation(filters: LateFilters, interface: Interface) -> Settings:
 
 
 def _truncation(step: Choice) -> Truncation:
-    """Return what the series of the rotation of a step leaves out."""
+    """Return the truncation error of the series for the rotation of a step."""
     kernels = pipeline.program(step).attitude_step
     assert kernels is not None
     assert kernels.truncation is not None, "the rotation is a series"
@@ -203,7 +203,7 @@ _BITS = 80
 
 
 class Advance(NamedTuple):
-    """What one step adds to the distance from exact arithmetic."""
+    """Growth of the distance from exact arithmetic in one step."""
 
     #: Length of the difference that it adds, of a row for a matrix
     error: Fraction
@@ -217,7 +217,7 @@ def now_errors(
     programs: tuple[Program, Program],
     interfaces: tuple[Interface, Interface],
     truncation: Truncation,
-) -> NowErrors:
+) -> PresentErrors:
     """Return bounds of the distance of the attitude of now from that of exact arithmetic."""
     running = _rounding_of_filters(filters.sets, fixed.sets, fixed, interfaces[1])
     starting = _rounding_of_filters(filters.short, fixed.short, fixed, interfaces[1])
@@ -233,7 +233,7 @@ def now_errors(
     gap = [by_sets] * previous + [step] * REACH + [by_sets] * ahead
     start = _total([by_short] * (previous + ahead))
     # A sample that is lost before the end of the start waits among the intervals of the start.
-    return NowErrors(_total([by_sets] * ahead), start, max(start, _total(gap)))
+    return PresentErrors(_total([by_sets] * ahead), start, max(start, _total(gap)))
 
 
 def _total(steps: Iterable[Advance]) -> Fraction:
@@ -256,7 +256,7 @@ def _box(interface: Interface) -> dict[str, Interval]:
 def _stretch(
     filters: LateFilters, fixed: FixedFilters, program: Program, interface: Interface, truncation: Truncation
 ) -> Fraction:
-    """Return what the transition of a step can multiply a distance by."""
+    """Return the largest factor by which the transition of a step stretches a distance."""
     expressions = Expressions.of(program)
     ranges = ExactRanges(program, expressions, _box(interface)).ranges
     left_out = truncation.bound(ranges[expressions.names[truncation.square]].magnitude)
@@ -269,7 +269,7 @@ def _stretch(
 
 
 def _rounding(program: Program, interface: Interface, moved: Mapping[str, Fraction]) -> Fraction:
-    """Return what the step from Legendre coefficients adds to the distance: its rounding, and that of its inputs."""
+    """Return the rounding of the step from Legendre coefficients, and of its inputs, as a distance."""
     expressions = Expressions.of(program)
     derivatives = slopes(expressions, ExactRanges(program, expressions, _box(interface)).ranges)
     elements = []

@@ -1,4 +1,4 @@
-"""Generates C that commits an attitude late and answers it now."""
+"""Generates C that commits an attitude late, and estimates the present one."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ NORMALIZATIONS = {"dcm": "dcm-orthonormalize-first-order", "euler": "euler-norma
 
 @dataclass(frozen=True)
 class LateResult(Result):
-    """C that commits an attitude late and answers it now, as it was written."""
+    """The written C that commits an attitude late, and estimates the present one."""
 
     name: str
     target: str
@@ -64,7 +64,7 @@ class LateResult(Result):
 
 @dataclass(frozen=True)
 class LateSources:
-    """What commits an attitude late and answers it now."""
+    """Sources of code that commits an attitude late, and estimates the present one."""
 
     filters: LateFilters
     #: The step of the window, which is committed
@@ -132,7 +132,7 @@ def sources(
     name: str | None = None,
     settings: Settings | None = None,
 ) -> Sources:
-    """Return the C that commits an attitude late and answers it now.
+    """Return the C that commits an attitude late, and estimates the present one.
 
     `settings`: of fixed point, with words of 32 bits; by default increments are up to 1/8 rad.
 
@@ -159,7 +159,7 @@ def sources(
 
 
 def _identifier(window: Window, algorithm: str, target: str, name: str | None) -> str:
-    """Return what the names of functions and files begin with."""
+    """Return the prefix of the names of functions and files."""
     infix = f"_w{WORD}" if BUILT_IN[target].fixed else real_of(target).infix
     default = f"{algorithm}_late_{window.name.removeprefix('window-')}".replace("-", "_") + infix
     identifier = default if name is None else name
@@ -210,7 +210,7 @@ class CallCost:
 
 @dataclass(frozen=True)
 class LateCosts:
-    """What calls of the generated functions cost at most."""
+    """Largest operation counts of calls of the generated functions."""
 
     #: A commit with all samples ahead, which nearly every sample is
     commit: CallCost
@@ -251,7 +251,7 @@ def whole(
     functions: tuple[Sources, Sources, Sources],
     fixed: FixedFilters | None = None,
 ) -> Sources:
-    """Generate the C that commits late and answers now."""
+    """Generate the C of the main unit."""
     step, rotation, normalization = functions
     state, result = step.function.inputs[0], step.function.outputs[0]
     rows = filters.sums
@@ -289,7 +289,7 @@ def whole(
 
 
 def _in_floating_point(filters: LateFilters, step: Sources) -> dict[str, object]:
-    """Return what templates take of numbers in double or in float."""
+    """Return the values of the templates for double or float."""
     real, rows = real_of(step.target), filters.sums
     printer, size = CPrinter(real), step.function.inputs[0].size
     return {
@@ -313,7 +313,7 @@ def _in_floating_point(filters: LateFilters, step: Sources) -> dict[str, object]
 def _in_fixed_point(
     filters: LateFilters, fixed: FixedFilters, step: Sources, normalization: Sources
 ) -> dict[str, object]:
-    """Return what templates take of integers."""
+    """Return the values of the templates for fixed point."""
     assert step.fixed is not None
     assert normalization.fixed is not None
     state, samples = step.fixed.inputs
@@ -344,7 +344,7 @@ def _in_fixed_point(
 
 
 def _unit(samples: Argument) -> str:
-    """Return in words what the integers of samples are."""
+    """Return the scale of the integers of samples in words."""
     if samples.sensor is not None:
         return f"counts of the gyro, unit {samples.sensor.unit}"
     return f"format {samples.format}, unit 2^-{samples.format.fraction} rad"

@@ -1,4 +1,4 @@
-"""The filters with which an attitude is committed late and answered now, as plain tables.
+"""The filters of a unit that commits an attitude late, as plain tables.
 
 A family of windows has filters for the same samples with any number of them ahead. Where samples are fewer than the
 window takes, at the beginning of a recording, polynomials through up to four of them give the rate.
@@ -37,7 +37,7 @@ Rows = tuple[Taps, ...]
 
 @dataclass(frozen=True)
 class LateFilters:
-    """All filters that commit an attitude late, and answer it now.
+    """All filters of a unit that commits an attitude late.
 
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> filters = LateFilters(WINDOWS["window-3-3"])
@@ -127,7 +127,7 @@ class LateFilters:
 
 
 def short_place(count: int, place: int) -> int:
-    """Return where the filters of an interval stand in `LateFilters.short`.
+    """Return the index of the filters of an interval in `LateFilters.short`.
 
     >>> [short_place(3, place) for place in range(3)]
     [3, 4, 5]
@@ -246,7 +246,7 @@ Integers = tuple[int, ...]
 NORMALIZED_EVERY = 1024
 
 
-class NowErrors(NamedTuple):
+class PresentErrors(NamedTuple):
     """Bounds of the distance of the attitude of now from the exact filters and steps on the same integers.
 
     They are lengths of the difference of the state, of a row for a matrix. The integers are those of the committed
@@ -281,4 +281,4 @@ class FixedFilters:
     #: Bits by which their sums are shifted down
     restoring_shift: int
     #: Bounds of the distance of the attitude of now from exact arithmetic, see `commit_late_fixed.now_errors`
-    now_errors: NowErrors = field(default_factory=NowErrors)
+    now_errors: PresentErrors = field(default_factory=PresentErrors)

@@ -128,7 +128,7 @@ def _few(row: Array, place: int, filters: LateFilters) -> Array:
 
 
 def _restore(row: Array, kinds: Array, filters: LateFilters) -> Array:
-    """Return the samples with the lost ones restored, and those merged with them taken apart."""
+    """Return the samples with lost ones restored, and merged samples split."""
     if kinds.shape != (len(row),) or kinds.dtype.kind not in "iu":
         raise InputError(
             f"kinds has shape {kinds.shape}; a whole number for each of {len(row)} samples is needed"

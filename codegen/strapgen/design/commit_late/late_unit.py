@@ -1,4 +1,4 @@
-"""Commits an attitude late and answers it now, sample by sample: in Python with generated functions, or in generated C.
+"""Commits an attitude late, sample by sample: in Python with generated functions, or in generated C.
 
 Interval k lies between two instants and has sample k. It is committed when L samples after it are there, by the step of
 the window. The attitude of now is the committed one times the steps of the last intervals, with filters for the samples
@@ -26,9 +26,9 @@ from strapgen.run.evaluators import Array, Evaluator, in_units
 
 
 class SampleKind(IntEnum):
-    """What a sample is.
+    """The kind of a sample: regular, lost, or merged with a lost one.
 
-    `MERGED` follows a lost one, and is the sum of it and of the interval of now.
+    A `MERGED` sample follows a lost one, and is the sum of both.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def refusal(kind: int, gap: int, count: int) -> str:
 
 
 class LateUnit:
-    """Commits late and answers now, in the numbers of generated functions: doubles, or integers of the model.
+    """A late-commit unit in the numbers of generated functions: doubles, or integers of the model.
 
     `attitude` is the committed one, at the end of the last committed interval, `pending` the number of intervals that
     are not committed, and `committed` the attitudes that the last call committed, the oldest first.
@@ -211,7 +211,7 @@ class LateUnit:
 
 
 class LateUnitOnIntegers(LateUnit):
-    """Commits late and answers now in the integer model."""
+    """A late-commit unit in the integer model."""
 
     _normalized_every = NORMALIZED_EVERY
 
@@ -255,7 +255,7 @@ def state_argument(step: Sources) -> Argument:
 
 
 def sample_integers(argument: Argument, values: Any, kind: int, rest: Array) -> tuple[Array, Array]:
-    """Return a sample in rad, (3,), as nearest integers, and what rounding leaves for the next one.
+    """Return a sample in rad, (3,), as nearest integers, and the remainder for the next one.
 
     As from a gyro that counts pulses, the error of a sum of samples is at most a unit: `rest` is what the samples
     before have left, in units. A sample outside its range, or that of the sum of two, is refused.
@@ -274,7 +274,7 @@ def sample_integers(argument: Argument, values: Any, kind: int, rest: Array) -> 
 
 
 class LateUnitInC:
-    """Commits late and answers now in the C of `commit_late_sources.sources`; its interface is that of `LateUnit`."""
+    """A late-commit unit in the C of `commit_late_sources.sources`, with the interface of `LateUnit`."""
 
     def __init__(self, sources: Sources) -> None:
         module = compiler.load(sources)
@@ -327,7 +327,7 @@ class LateUnitInC:
         return status
 
     def _refusal(self, status: int, kind: int, gap: int, count: int) -> InputError:
-        """Return the error that a status stands for."""
+        """Return the error for a status."""
         if self.fixed is not None and status == -1:
             return InputError("a sample lies outside the range of its format")
         if self.fixed is not None and status == -2:

@@ -1,4 +1,4 @@
-"""Frequencies of a band, with what the samples of a window answer there, in integers of `BITS` binary digits.
+"""Frequency responses of the samples of a window over a band, in integers of `BITS` binary digits.
 
 A filter F of the Legendre coefficient m has, at the angular frequency b in rad a sample and up to a factor of
 modulus 1, the error  h(b) sum_j F_j e^{ibj} - i^m N (2m + 1) j_m(b N/2),  h = G(b) sin(b/2)/(b/2),  for each unit of

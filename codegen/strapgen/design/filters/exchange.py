@@ -42,15 +42,15 @@ _NEWTON_STEPS = 6
 _QUOTIENT_BITS = 80
 
 
-class Answers(NamedTuple):
-    """What unknowns answer at frequencies, and what they have to answer together, in the integers of `band_grid`."""
+class Responses(NamedTuple):
+    """Responses of the unknowns at frequencies, and the required sum, in the integers of `band_grid`."""
 
     #: The answer to a unit of each free unknown
     columns: list[list[int]]
     right: list[int]
 
     def errors(self, free: Sequence[Any]) -> list[int]:
-        """Return what the unknowns leave of the right side at each point."""
+        """Return the residual of the right side at each point."""
         if not free:
             return self.right
         weights = [integer(value) for value in free]
@@ -61,17 +61,17 @@ class Answers(NamedTuple):
 
 
 class Problem(Protocol):
-    """A function of frequency that is linear in its unknowns, and is to be as small as possible."""
+    """A minimization problem: a function of frequency that is linear in its unknowns."""
 
     @property
     def title(self) -> str:
-        """What is designed, for an error message."""
+        """Name of the design, for an error message."""
 
     @property
     def free(self) -> int:
         """Number of unknowns that no condition determines."""
 
-    def answers(self, points: Sequence[Any]) -> Answers:
+    def answers(self, points: Sequence[Any]) -> Responses:
         """Return the answers at frequencies in rad a sample."""
 
 
@@ -112,7 +112,7 @@ def least_largest(problem: Problem, band: Fraction, points: int = SEARCH_POINTS)
     )
 
 
-def _level(answers: Answers) -> tuple[list[Any], Any]:
+def _level(answers: Responses) -> tuple[list[Any], Any]:
     """Return the free unknowns whose errors alternate and are equally large, and how large."""
     matrix = [
         [*(REAL.ldexp(REAL.mpf(column[i]), -BITS) for column in answers.columns), REAL.mpf((-1) ** i)]
@@ -169,8 +169,8 @@ def _start(problem: Problem, band: Fraction) -> list[Any]:
     return [points[k] for k in places]
 
 
-def orthonormal(answers: Answers) -> tuple[list[list[float]], list[float]]:
-    """Return orthonormal columns and what they leave of the right side, scaled to at most 1, in double precision."""
+def orthonormal(answers: Responses) -> tuple[list[list[float]], list[float]]:
+    """Return orthonormal columns and the residual of the right side, scaled to at most 1, in double precision."""
     basis: list[list[int]] = []
     for column in [*answers.columns, answers.right]:
         for other in basis * 2:
@@ -250,7 +250,7 @@ class FilterProblem:
         self._directions = [[integer(x) for x in direction] for direction in unknowns.directions]
         self._base = [integer(x) for x in unknowns.complete([Fraction(0)] * unknowns.free)]
 
-    def answers(self, points: Sequence[Any]) -> Answers:
+    def answers(self, points: Sequence[Any]) -> Responses:
         """Return the answers at frequencies in rad a sample."""
         unknowns = self._unknowns
         shape = unknowns.shape
@@ -266,7 +266,7 @@ class FilterProblem:
                 ]
             )
         rows = list(zip(*single, strict=True)) or [()] * len(points)
-        return Answers(
+        return Responses(
             [[sum(map(mul, direction, row)) >> BITS for row in rows] for direction in self._directions],
             [
                 value - (sum(map(mul, self._base, row)) >> BITS)
@@ -281,13 +281,13 @@ _MULTIPLIER_EXCESS = REAL.mpf(2) ** -100
 _MOST_VERTICES = 20
 
 
-def least_absolute(answers: Answers, weights: Sequence[Any]) -> list[Any]:
+def least_absolute(answers: Responses, weights: Sequence[Any]) -> list[Any]:
     """Return the unknowns of the least sum of w |error|.
 
     `weights` (n,): above 0.
 
     >>> one = 1 << BITS
-    >>> [float(x) for x in least_absolute(Answers([[one] * 4], [one, 2 * one, 3 * one, 10 * one]), [2, 1, 1, 1])]
+    >>> [float(x) for x in least_absolute(Responses([[one] * 4], [one, 2 * one, 3 * one, 10 * one]), [2, 1, 1, 1])]
     [2.0]
     """
     count, points = len(answers.columns), len(answers.right)

@@ -29,7 +29,7 @@ from strapgen.ir.exceptions import InputError
 
 @dataclass(frozen=True)
 class Shape:
-    """What determines the conditions of a filter: the samples around and in a step, the number of powers, the gyro."""
+    """Parameters of the conditions of a filter: samples around and in a step, number of powers, gyro."""
 
     previous: int
     ahead: int
@@ -130,7 +130,7 @@ class Unknowns:
 
     @cached_property
     def directions(self) -> list[list[Fraction]]:
-        """What a unit of each free unknown adds to all unknowns under the conditions, (free, unknowns)."""
+        """The derivatives of all unknowns by the free ones under the conditions, (free, unknowns)."""
         base = self.complete([Fraction(0)] * self.free)
         units = [[Fraction(int(i == j)) for j in range(self.free)] for i in range(self.free)]
         return [[a - b for a, b in zip(self.complete(unit), base, strict=True)] for unit in units]

@@ -1,4 +1,4 @@
-"""What filters do over the band and outside of it, and the density of the rate there from a spectrum of vibration."""
+"""Responses of filters inside and outside the band, and the density of the rate from a vibration spectrum."""
 
 from __future__ import annotations
 

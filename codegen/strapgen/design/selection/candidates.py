@@ -1,4 +1,4 @@
-"""The algorithms from which one is selected for a brief, and what the brief asks of each.
+"""The candidate algorithms for a brief, and their predicted drifts and costs.
 
 They are the methods of the catalogue, coefficients designed for the vibration, and the loops of two speeds.
 """
@@ -45,7 +45,7 @@ def reference(brief: DesignBrief, steps: int) -> tuple[str, int]:
 
 
 class ProcessorCost(NamedTuple):
-    """What an algorithm costs on a processor."""
+    """Bytes and instructions of an algorithm on a processor."""
 
     #: Of code and constants
     bytes: float
@@ -88,7 +88,7 @@ class Algorithm(Protocol):
         """Return the certified drift of the fixed-point code with as little error feedback as meets a limit."""
 
     def cost(self, carry: str) -> ProcessorCost:
-        """Return what the fixed-point code costs on the processor of the brief."""
+        """Return the cost of the fixed-point code on the processor of the brief."""
 
     def steady(self) -> Any:
         """Return the algorithm as `random_runs` runs it."""
@@ -96,7 +96,7 @@ class Algorithm(Protocol):
     def run(self, motion: Motion, steps: int, record: Fraction | None = None) -> Run:
         """Run the algorithm in double on a motion."""
 
-    def rounded_apart(self, motion: Motion, steps: int, carry: str) -> float:
+    def rounding_drift(self, motion: Motion, steps: int, carry: str) -> float:
         """Return the drift between fixed point and its reference at the end of a run on a motion."""
 
 
@@ -159,7 +159,7 @@ class AttitudeStep:
         """Run the step in double on a motion."""
         return simulate(backend(self.choice), motion, self.step, steps * self.step, record=record)
 
-    def rounded_apart(self, motion: Motion, steps: int, carry: str) -> float:
+    def rounding_drift(self, motion: Motion, steps: int, carry: str) -> float:
         """Return the drift between the integer model and its reference, on the increments of the integer model."""
         name, steps = reference(self._brief, steps)
         choice, double = self.choice, backend(self.choice, backend=name)

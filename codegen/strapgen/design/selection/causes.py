@@ -189,7 +189,7 @@ def rounding(choice: Choice, brief: DesignBrief, allowed: float) -> Rounding:
 
 
 def _least_without_feedback(choice: Choice, brief: DesignBrief) -> float:
-    """Return a drift in deg/h that every bound without error feedback exceeds: a place of the state's a step."""
+    """Return a lower limit in deg/h of bounds without error feedback: a unit in the last place of the state a step."""
     steps = float(brief.budget.over_s / step_length(choice, brief.gyro))
     return math.degrees(steps * 2.0 ** (_STATE_PLACES - brief.processor.word)) / _hours(brief)
 

@@ -301,7 +301,7 @@ def judgements(
 
 
 def _identity(path: str | Path) -> dict[str, Any]:
-    """Return what results belong to: the code and the brief."""
+    """Return the identity of results: the code and the brief."""
     return {
         "study": "design",
         "version": VERSION,

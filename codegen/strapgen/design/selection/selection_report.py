@@ -1,4 +1,4 @@
-"""Which algorithms meet a brief, as a result: causes of drift, costs, what binds the others; and the firmware files."""
+"""The selection for a brief as a result: drifts by cause, costs, exceeded limits; and the firmware files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MOST_ACCEPTED, _MOST_REFUSED = 20, 12
 
 @dataclass(frozen=True)
 class JudgedAlgorithm:
-    """An algorithm with what it loses and costs, and whether it meets a brief."""
+    """An algorithm with its drift by cause and its cost, and whether it meets a brief."""
 
     judgement: Judgement = field(metadata=entry(spread=True))
     #: Drifts in time simulations by cause
@@ -35,7 +35,7 @@ class JudgedAlgorithm:
 
 @dataclass(frozen=True)
 class SelectionResult(Result):
-    """Which algorithms meet a brief: every cause of drift, what each costs, and what binds the others."""
+    """The algorithms for a brief: drifts by cause, costs, and exceeded limits."""
 
     row = JudgedAlgorithm
     drawn_by = "strapgen.design.design_plots:selection_image"
@@ -72,7 +72,7 @@ class SelectionResult(Result):
 
 
 def _table(brief: DesignBrief, ordered: Sequence[Judgement], refused: bool) -> TextTable:
-    """Return what a reader compares: drifts by cause, and costs."""
+    """Return the table for a reader: drifts by cause, and costs."""
     measured = brief.processor.is_measured
     columns = [
         Column("algorithm", "<"),
@@ -92,7 +92,7 @@ def _table(brief: DesignBrief, ordered: Sequence[Judgement], refused: bool) -> T
 
 
 def _exceeded(one: Judgement) -> str:
-    """Return what an algorithm exceeds."""
+    """Return the exceeded limit of an algorithm."""
     return f"{one.binding}, in its run" if one.run_deg_h is not None else one.binding or ""
 
 

@@ -1,4 +1,4 @@
-"""Runs algorithms that meet a brief in time, to set the drift of a simulation beside the predicted one."""
+"""Simulates algorithms that meet a brief, to compare their drift with the predicted one."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def run(brief: DesignBrief, judgement: Judgement, algorithm: Algorithm, jobs: in
     return Simulated(
         drifts["truncation"],
         drifts.get("coning"),
-        algorithm.rounded_apart(_largest_turn(brief), _steps(brief, algorithm), judgement.carry),
+        algorithm.rounding_drift(_largest_turn(brief), _steps(brief, algorithm), judgement.carry),
         _of_pulses(brief, judgement, algorithm, jobs),
         _of_noise(brief, algorithm, jobs),
     )
@@ -160,7 +160,7 @@ def _largest_turn(brief: DesignBrief) -> Motion:
 
 
 def confirm(brief: DesignBrief, path: str | Path, ordered: Iterable[Judgement]) -> list[Judgement]:
-    """Run algorithms that meet a brief, the cheapest first, until one meets it in its run too.
+    """Simulate algorithms that meet a brief, the cheapest first, until one meets it in the simulation too.
 
     What is above fourth order in the angles of lines, and above second order under a spectrum, shows in a run alone.
     """
@@ -225,7 +225,7 @@ def _record(step: Fraction, steps: int) -> Fraction:
 
 
 def _slope(run: Run) -> float:
-    """Return the slope of the error in deg/h; records in the middle weigh most, so that what swings cancels."""
+    """Return the slope of the error in deg/h; records in the middle weigh most, so that oscillations cancel."""
     time = run.time - run.time.mean()
     weights = np.hanning(len(time) + 2)[1:-1]
     time = time - np.average(time, weights=weights)

@@ -1,4 +1,4 @@
-"""The integer types of C on two kinds of processors, and the type of what an operator returns."""
+"""The integer types of C on two kinds of processors, and the result types of operators."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class IntegerType:
 
 @dataclass(frozen=True)
 class Model:
-    """What a processor's C leaves to it."""
+    """Implementation-defined properties of C on a processor."""
 
     int_bits: int
     long_bits: int
@@ -66,7 +66,7 @@ class Model:
         raise ValueError(f"{text} has no type")
 
     def promoted(self, kind: IntegerType) -> IntegerType:
-        """Return the type as which an operand is computed with."""
+        """Return the type of an operand after integer promotion."""
         return self.plain if kind.low >= self.plain.low and kind.high <= self.plain.high else kind
 
     def common(self, left: IntegerType, right: IntegerType) -> IntegerType:

@@ -1,4 +1,4 @@
-"""Expressions of C as intervals and formulas; whatever could go wrong in them becomes an obligation that is proved.
+"""Expressions of C as intervals and formulas; each possible overflow becomes a proof obligation.
 
 A `Number` is what is known of an integer: its type, an interval, and a formula in real numbers.
 """
@@ -19,7 +19,7 @@ from strapgen.evidence.overflow.c_types import IntegerType, Model
 
 @dataclass(frozen=True)
 class Obligation:
-    """What must hold for the C to do what it says, and does not follow."""
+    """A condition for defined behaviour of the C that is not proved."""
 
     #: The function, and the value or the statement in it
     place: str
@@ -62,7 +62,7 @@ class Variable:
         self.facts: list[Fact] = []
 
     def known(self, path: Sequence[Fact]) -> list[Fact]:
-        """Return what is known of it on a path: its interval, and what defines it."""
+        """Return interval and definition of the variable on a path."""
         interval = Fact(z3.And(self.real >= self.low, self.real <= self.high), frozenset([self]))
         further = [condition for condition in self.path if condition not in path]
         return [fact.where(further) for fact in (interval, *self.facts)]
@@ -91,7 +91,7 @@ class Number:
         return cls(kind, variable.low, variable.high, variable.real, frozenset([variable]))
 
     def narrowed(self) -> Number:
-        """Return it with the interval that is known by now, if it is one variable."""
+        """Return the number with the interval known on the present path, if it is one variable."""
         for variable in self.variables:
             if variable.real is self.real:
                 low, high = max(self.low, variable.low), min(self.high, variable.high)
@@ -99,7 +99,7 @@ class Number:
         return self
 
     def between(self, low: int, high: int) -> Number:
-        """Return it with an interval that is known to hold, and what is known already."""
+        """Return the number with the intersection of its interval and another one that holds."""
         return Number(self.kind, max(low, self.low), min(high, self.high), self.real, self.variables)
 
     def as_type(self, kind: IntegerType) -> Number:
@@ -170,7 +170,7 @@ class ExpressionFormulas:
         return number.as_type(self.model.promoted(number.kind))
 
     def converted(self, number: Number, kind: IntegerType) -> Number:
-        """Return a number as another type has it: the same one, which must fit; without a sign, what remains of it."""
+        """Convert a number to another type: it must fit a signed type; an unsigned type keeps the low bits."""
         if kind.signed or number.low >= 0:
             if kind.low <= number.low and number.high <= kind.high:
                 return number.as_type(kind)
@@ -274,7 +274,7 @@ class ExpressionFormulas:
         return self.merged(condition, first, second)
 
     def under(self, condition: Fact, evaluate: Callable[[], Any]) -> Any:
-        """Return what is evaluated on a path on which a condition holds."""
+        """Evaluate on a path on which a condition holds."""
         self.prover.path.append(condition)
         try:
             return evaluate()

@@ -106,7 +106,7 @@ class BitVectorFunction:
         self.safe: list[Any] = []
 
     def result(self, arguments: Mapping[str, Bits]) -> Bits:
-        """Return what a call returns."""
+        """Return the result of a call."""
         known = dict(arguments)
         for statement in self._function.body.block_items:
             match statement:
@@ -266,7 +266,7 @@ def _says_more_than_zero(condition: Any) -> bool:
 
 
 def _keeps(loop: c_ast.While, square: Any, k: int, bits: int) -> bool:
-    """Return whether the body of the loop keeps what holds of its variables when it tries a bit."""
+    """Return whether the body of the loop preserves its invariant."""
     unit, part = 2**k, z3.Real("part")
     holds = [
         part >= 0,
@@ -290,7 +290,7 @@ def _keeps(loop: c_ast.While, square: Any, k: int, bits: int) -> bool:
 
 
 def _ends(statements: list[Any], square: Any, bits: int, nearest: bool) -> bool:
-    """Return whether what follows the loop rounds the root and returns it."""
+    """Return whether the statements after the loop round the root and return it."""
     part = z3.Real("part")
     holds = [part >= 0, part * part <= square, square <= part * part + 2 * part, square < 2 ** (bits - 1)]
     run = _Run({"rest": square - part * part, "root": part}, bits)

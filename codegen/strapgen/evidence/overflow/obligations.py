@@ -1,4 +1,4 @@
-"""Walks through the C of a kernel and lists what could overflow or leave its range and is not proved."""
+"""Walks through the C of a kernel and lists overflows and range violations that are not excluded by proof."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EFFORTS = (100_000, 1_000_000, 4_000_000)
 
 
 def unproved(subject: Subject, files: Mapping[str, str], model: Model) -> list[Obligation]:
-    """Return what is not proved of the C of a kernel: that it computes its integers without overflow, in their ranges.
+    """Return the unproved obligations of the C of a kernel: no overflow, and all integers in their ranges.
 
     The statements of the kernel become formulas; the functions of its own file are proved as lemmas.
     """
@@ -60,7 +60,7 @@ def _functions(subject: Subject, files: Mapping[str, str], *defined: str) -> dic
 def _unproved_lemmas(
     functions: Mapping[str, c_ast.FuncDef], name: str, model: Model, places: set[int], nearest: bool
 ) -> list[Obligation]:
-    """Return the functions of the file that are not proved to return what is taken for granted in the kernel."""
+    """Return the functions of the file whose assumed results are not proved."""
     left = []
     for part in ("fit", "shr"):
         function = functions.get(f"{name}_{part}")
@@ -92,7 +92,7 @@ class KernelStatements:
         self.places: set[int] = set()
 
     def obligations(self) -> list[Obligation]:
-        """Return what cannot be proved; nothing if the kernel is safe."""
+        """Return the unproved obligations; none if the kernel is safe."""
         function = self._functions[self._name]
         known = {}
         for parameter in function.decl.type.args.params:
@@ -107,7 +107,7 @@ class KernelStatements:
         return self._model.named(tuple(node.type.names))
 
     def _block(self, statements: list[Any], known: dict[str, Number]) -> None:
-        """Go through statements; what they declare and assign is put among the known."""
+        """Go through statements, and store the values that they declare and assign."""
         for statement in statements:
             self._expressions.place = f"{self._name}: {_subject(statement)}"
             match statement:
@@ -237,7 +237,7 @@ class KernelStatements:
         }
 
     def _call(self, name: str, arguments: list[Number]) -> Number:
-        """Return what a function of the file returns: by what is proved of it, or by its own statements."""
+        """Return the result of a function of the file, by its lemma or by its statements."""
         function = self._functions[name]
         inside = self._bound(function, arguments)
         kind = self._kind(function.decl.type.type)
@@ -269,7 +269,7 @@ def _named(node: Any) -> str | None:
 
 
 def _subject(statement: Any) -> str:
-    """Return what a statement is about, for a message."""
+    """Return the variable of a statement, for a message."""
     match statement:
         case c_ast.Decl():
             return str(statement.name)

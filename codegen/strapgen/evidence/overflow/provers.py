@@ -48,7 +48,7 @@ def prove_by_z3(subject: Subject, folder: Path) -> list[Verdict]:
 
 
 def judged_by_z3(subject: Subject, files: dict[str, str], model: Model) -> tuple[Result, str]:
-    """Return whether everything is proved of the C in some files, and what is not."""
+    """Return whether all obligations of the C in some files are proved, and the others."""
     from strapgen.evidence.overflow.obligations import unproved
 
     left = unproved(subject, files, model)

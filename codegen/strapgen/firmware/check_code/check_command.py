@@ -154,7 +154,7 @@ def check(
 
 
 def _refuse(options: Iterable[str], reason: str) -> None:
-    """Refuse options that do not go with what is checked."""
+    """Refuse options that do not apply to the checked algorithm."""
     for name in options:
         raise InputError(f"{name} {reason}")
 

@@ -1,4 +1,4 @@
-"""`check_foreign` holds a user's function in C or C++ to the behaviour of an attitude step, and names what is wrong."""
+"""`check_foreign` tests a user's function in C or C++ as an attitude step, and names the cause of a failure."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _MOST_SHOWN = 4
 
 
 @dataclass(frozen=True)
-class SeenCoefficient:
+class MeasuredCoefficient:
     """The coefficient of the cross product of two samples, older times newer."""
 
     #: Samples of a call have the numbers from 0, those before it are negative
@@ -71,7 +71,7 @@ class SeenCoefficient:
 
 @dataclass(frozen=True)
 class MeasuredCheck:
-    """A check and what it measured."""
+    """A check with its measurement."""
 
     name: str
     #: Whether the function passes; None where nothing is required, or nothing could be measured
@@ -80,13 +80,13 @@ class MeasuredCheck:
 
 
 def without_words(findings: Sequence[Finding]) -> list[MeasuredCheck]:
-    """Return what findings measured."""
+    """Return the measurements of findings, without their texts."""
     return [MeasuredCheck(finding.name, finding.holds, finding.measured) for finding in findings]
 
 
 @dataclass(frozen=True)
 class ForeignResult(Result):
-    """What was found of a user's function."""
+    """The findings on a user's function."""
 
     computed = properties(holds=entry())
 
@@ -106,7 +106,7 @@ class ForeignResult(Result):
     #: The drift about x, y and z of the reference axes in deg/h; its length is the magnitude
     drift_by_axis_deg_h: tuple[float, ...] | None = None
     #: Those of cross products that are seen or wanted; none where samples are rates at instants
-    coefficients: tuple[SeenCoefficient, ...] = ()
+    coefficients: tuple[MeasuredCoefficient, ...] = ()
     #: What they correct of the drift on coning to leading order, 1 if they are right
     coefficient_ratio: float | None = None
 
@@ -120,7 +120,7 @@ class ForeignResult(Result):
         return without_words(self.findings)
 
     def text(self) -> str:
-        """Return the findings, a line each, and the likely cause of what fails."""
+        """Return the findings, a line each, and the likely cause of a failure."""
         lines = [f"{self.file}: {self.function}", "", *map(finding_text, self.findings)]
         return "\n".join([*lines, *(["", f"likely cause: {self.cause}"] if self.cause else [])])
 
@@ -131,7 +131,7 @@ def check_foreign(step: ForeignStep) -> ForeignResult:
 
 
 class _Check:
-    """The checks of one function, and what they measure."""
+    """The checks of one function with their measurements."""
 
     def __init__(self, step: ForeignStep) -> None:
         self.step = step
@@ -140,7 +140,7 @@ class _Check:
         self.order: float | None = None
         self.drift: Array | None = None
         self.closed: float | None = None
-        self.coefficients: tuple[SeenCoefficient, ...] = ()
+        self.coefficients: tuple[MeasuredCoefficient, ...] = ()
         self.ratio: float | None = None
 
     def outcome(self) -> ForeignResult:
@@ -162,7 +162,7 @@ class _Check:
         )
 
     def findings(self) -> Iterator[Finding]:
-        """Yield what is seen; after a fault that hides all others there is no more."""
+        """Yield the findings, up to a fault that hides all others."""
         first = self.step.run(direction_segments(self.step))
         calls = self.calls(first)
         if calls.holds is False:
@@ -195,7 +195,7 @@ class _Check:
         return Finding(name, False, text, measured)
 
     def calls(self, done: ForeignRun) -> Finding:
-        """Return the finding on how calls end, and on what they do to memory."""
+        """Return the finding on crashes of calls, and on writes outside of their memory."""
         if done.stopped:
             return self.failed("calls", done.stopped)
         if done.writes_beyond:
@@ -247,10 +247,10 @@ class _Check:
         ]
 
     def measured(self, convention: Convention, runs: dict[str, tuple[SegmentRun, ...]]) -> Iterator[Finding]:
-        """Yield what is measured on all segments."""
+        """Yield the findings on all segments."""
         still = rest(self.step, runs["at rest"])
         yield self.at_rest(still)
-        runs = {name: tuple(run.unturned(still.frame) for run in part) for name, part in runs.items()}
+        runs = {name: tuple(run.in_resting_frame(still.frame) for run in part) for name, part in runs.items()}
         response = directions(self.step, runs["directions"])
         delay = self.delay(response)
         coefficients = None
@@ -270,14 +270,14 @@ class _Check:
         yield self.repeated(*runs["runs"])
 
     def at_rest(self, still: Rest) -> Finding:
-        """Return the finding on what happens without rotation."""
+        """Return the finding on a run without rotation."""
         allowed = _UNITS_A_CALL * self.step.unit
         text = f"without rotation the state {'stays as it is' if still.moved <= allowed else 'moves'}"
         self.causes.extend(still.causes(float(self.step.interval * self.count)))
         return Finding("at rest", still.moved <= allowed, text, still.moved, allowed)
 
     def delay(self, response: Directions) -> Finding:
-        """Return the finding on a rotation that another call brings."""
+        """Return the finding on the delay between samples and rotation."""
         lag, ends = response.lag, self.step.takes == ENDS
         if abs(lag) <= DIRECTION_WITHIN if ends else fits(response.at_once):
             return Finding("delay", True, "a call turns by its own samples", lag)
@@ -329,16 +329,16 @@ class _Check:
         else:
             order, self.order = ladder.order_on_ladder(self.step, seen)
         yield order
-        seen_design = None if coefficients is None else coning_causes.seen_design(coefficients)
+        measured_design = None if coefficients is None else coning_causes.measured_design(coefficients)
         drift, self.drift, self.closed = ladder.drift_on_cones(
-            self.step, runs["drift"], standard, seen_design
+            self.step, runs["drift"], standard, measured_design
         )
         yield drift
 
     def shown(self, known: Products) -> Finding:
         """Return the finding on the coefficients, and keep them beside those that are wanted."""
         self.coefficients = tuple(
-            SeenCoefficient(older, newer, known.at_once[older, newer], value)
+            MeasuredCoefficient(older, newer, known.at_once[older, newer], value)
             for (older, newer), value in coning_causes.wanted(known).items()
             if value or abs(known.at_once[older, newer]) > coning_causes.LEAST
         )
@@ -356,7 +356,7 @@ class _Check:
         return Finding("coefficients", holds, text, self.ratio, coning_causes.tolerance(known))
 
     def symmetry(self, plain: SegmentRun, turned: SegmentRun) -> Finding:
-        """Turn all increments: the attitude must turn with them."""
+        """Rotate all increments: the attitude must rotate with them."""
         frame = _frame()
         off = float(np.abs(turned.relative - frame @ plain.relative @ frame.T).max())
         allowed = _UNITS_A_CALL * self.step.unit * len(plain.relative)
@@ -365,7 +365,7 @@ class _Check:
         return Finding("symmetry", off <= allowed, text, off, allowed)
 
     def norm(self, convention: Convention, run: SegmentRun) -> Finding:
-        """Look at the length of the state along the cone."""
+        """Check the length of the state along the cone."""
         off = departure(run.states)
         allowed = max(_NORM_WITHIN, 4 * self.step.unit * len(run.matrices))
         text = f"on the cone C C' departs from the unit matrix by at most {off:.3g}"

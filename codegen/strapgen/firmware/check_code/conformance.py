@@ -1,4 +1,4 @@
-"""`check` tests the behaviour that every attitude step must show, one `Finding` for each property."""
+"""`check` runs the conformance tests of an attitude step, one `Finding` for each property."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def _samples(program: Program) -> int:
 
 def _random(program: Program, steps: int, size: float = 0.02) -> NDArray[np.float64]:
     """Return random increments; a step that takes increments from beside it sees those of its neighbours."""
-    beside = _step_kernels(program).beside
+    beside = _step_kernels(program).extra_increments
     count = _samples(program) - beside
     row = np.random.default_rng(1969).uniform(-size, size, (beside + steps * count, 3))
     return windows(row, count, beside)
@@ -270,7 +270,7 @@ def _at_rest(step: _Precise) -> Finding:
 def _direction(step: _Precise) -> Finding:
     """Compare a small rotation with the true one and with its opposite, which tells a wrong sign."""
     samples = _samples(step.program)
-    count = samples - _step_kernels(step.program).beside
+    count = samples - _step_kernels(step.program).extra_increments
     worst, mirrored = 0.0, math.inf
     size = 0.01
     with mpmath.workdps(exact.DIGITS):
@@ -368,7 +368,7 @@ def _back_ends(choice: Choice, program: Program) -> Iterator[Finding]:
 
 
 def _compile(choice: Choice, settings: Settings | None) -> None:
-    """Compile the C of all back ends in one call of the compiler; what fails is told of each of them."""
+    """Compile the C of all back ends in one call of the compiler; each reports its own failure."""
     every: list[Sources] = []
     for name, stated in (("c", None), ("c-float", None), *([("c-fixed32", settings)] if settings else [])):
         with suppress(InputError):

@@ -1,4 +1,4 @@
-"""Names the likely cause of a wrong coning correction from the coefficients that a function is seen to have."""
+"""Names the likely cause of a wrong coning correction from the measured coefficients of a function."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _WEIGHT_WITHIN = 0.01
 
 
 def standard_design(products: Products) -> Design:
-    """Return the published correction that a function is measured by.
+    """Return the published correction with which a function is compared.
 
     It has the samples of a call, and from before the call as many as the function is seen to use rightly, but for one
     sample a call at least one, without which nothing can be corrected. A function that turns by every sample on its own
@@ -54,8 +54,8 @@ def plain_design(samples: int) -> Design:
     return design(samples, 1 if samples == 1 else 0)
 
 
-def seen_design(products: Products) -> Design:
-    """Return the correction that a function is seen to have, as a design with the samples that are looked at."""
+def measured_design(products: Products) -> Design:
+    """Return the measured correction of a function as a design on the probed samples."""
     previous = -min(older for older, _ in products.finally_)
     table = {
         (older + previous, newer + previous): Fraction(c).limit_denominator(_DENOMINATOR)
@@ -156,7 +156,7 @@ def cause(products: Products) -> str | None:
 
 
 def _by_size(products: Products) -> str:
-    """Return the size of a correction that is a multiple of a known one, or else that it is none."""
+    """Return the cause in words for a multiple of a known correction, or for no correction."""
     for ideal, base in _ideals(products.samples):
         correction = _less(products.finally_, base)
         visible = {pair: ideal.get(pair, 0.0) for pair in correction}
@@ -205,7 +205,7 @@ def _ideals(samples: int) -> Iterator[tuple[Table, Table]]:
 
 
 def _one_by_one(samples: int) -> tuple[Table, Table]:
-    """Return the right correction of a function that turns by each sample on its own, and what it is added to."""
+    """Return the right correction of a function that rotates by each sample separately, and its base products."""
     coefficient = float(design(1, 1).pairs[0, 1])
     turned = {(older, newer): 0.5 for newer in range(samples) for older in range(newer)}
     return {(newer - 1, newer): coefficient for newer in range(samples)}, turned
@@ -220,7 +220,7 @@ def _delayed(ideal: Table, samples: int) -> Iterator[Table]:
 
 
 def _reversed(table: Table, samples: int, visible: Table) -> Table:
-    """Return what is seen of coefficients where the samples of each call are taken from the last to the first.
+    """Return the measured coefficients if the samples of each call are taken in reverse order.
 
     Of a correction that is even in this order, as that of added samples often is, it is the wrong sign.
     """
@@ -234,7 +234,7 @@ def _reversed(table: Table, samples: int, visible: Table) -> Table:
 
 
 def _is_earlier_reversed(now: Table, samples: int, noise: float) -> bool:
-    """Return whether coefficients are right if the samples from before a call stand from the newest to the oldest."""
+    """Return whether coefficients are right if the samples before a call are in order from new to old."""
     known = [(ideal, _less(now, base)) for ideal, base in _ideals(samples)]
     if any(_alike(correction, ideal, noise) for ideal, correction in known):
         return False  # those from before a call are too small to tell

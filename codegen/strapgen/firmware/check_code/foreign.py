@@ -113,7 +113,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class SegmentRun:
-    """What a function makes of a segment."""
+    """The states of a function along a segment."""
 
     #: (N, elements): the results of its calls
     states: Array
@@ -128,7 +128,7 @@ class SegmentRun:
         start: Array = self.matrices[0] @ self.relative[1].T
         return start
 
-    def unturned(self, frame: Array) -> SegmentRun:
+    def in_resting_frame(self, frame: Array) -> SegmentRun:
         """Return the run as it would be in reference axes that stand still.
 
         `frame` (3,): rotation vector in rad by which a call turns the attitude without rotation of the body,
@@ -141,7 +141,7 @@ class SegmentRun:
 
 @dataclass(frozen=True)
 class ForeignRun:
-    """What came of a run."""
+    """The outcome of a run."""
 
     #: (N, elements): the result of every call, in the order of the function's elements; no rows if the run
     #: stopped

@@ -1,4 +1,4 @@
-"""Reads what the arguments of a user's function in C or C++ are, from one line of text.
+"""Reads the declaration of the arguments of a user's function in C or C++ from one line of text.
 
 The line has the arguments in their order in C, the attitude that the function computes behind an arrow::
 
@@ -60,7 +60,7 @@ class ForeignArgument:
 
     @property
     def size(self) -> int:
-        """Number of its numbers."""
+        """Number of elements."""
         return prod(self.shape)
 
 

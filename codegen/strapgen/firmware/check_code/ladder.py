@@ -211,7 +211,7 @@ def drift_on_cones(
 def _published_drifts(
     step: ForeignStep, standard: Design, length: Fraction, duration: Fraction
 ) -> tuple[dict[str, float], str, float | None]:
-    """Return what published steps leave by their names, the closed form in words, and the closed form."""
+    """Return the drifts of published steps by name, the closed form in words, and the closed form."""
     if step.takes == ENDS:
         linear = _drift(step, linear_rates(drift_segments(step)[0]), length, duration)
         return {"a linear rate between instants": _size(linear)}, "", None

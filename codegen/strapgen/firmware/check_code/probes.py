@@ -56,7 +56,7 @@ _SIGNS = list(product((1, -1), repeat=2))
 
 @dataclass(frozen=True)
 class Directions:
-    """How a function answers rotations about the axes."""
+    """Responses of a function to rotations about the axes."""
 
     #: (3, 3): rotation vector of the first call of a constant rate, and of one after many calls, in units of
     #: the rotation about each axis: a column for each
@@ -218,7 +218,7 @@ def convention_of(step: ForeignStep, declared: Directions) -> tuple[Convention |
 
 
 def fits(response: Array) -> bool:
-    """Return whether rotations about the axes come out as they are fed."""
+    """Return whether the computed rotations about the axes equal the input."""
     return bool(np.abs(response - np.eye(3)).max() < DIRECTION_WITHIN)
 
 
@@ -271,7 +271,7 @@ def in_words(step: ForeignStep, response: Array) -> str:
 
 
 def _factor(step: ForeignStep, factor: float) -> str:
-    """Return in words why rotations come out so many times as large as they are fed."""
+    """Return in words the cause of rotations that are too large by a factor."""
     interval = float(step.interval)
     known = {
         math.degrees(1): "degrees for radians, it turns radians into degrees",
@@ -300,7 +300,7 @@ _NO_RATE = 1e-4
 
 @dataclass(frozen=True)
 class Rest:
-    """What a function does without rotation."""
+    """States of a function without rotation."""
 
     #: Largest change of an element of the state
     moved: float
@@ -330,7 +330,7 @@ def rest_segments(step: ForeignStep) -> list[Segment]:
 
 
 def rest(step: ForeignStep, runs: Sequence[SegmentRun]) -> Rest:
-    """Return what a function does without rotation."""
+    """Return the states of a function without rotation."""
     states, none = runs[0].states, np.zeros(3)
     reference = states[0] if states.shape[1] != 3 else none  # of a rotation vector nothing is to be left
     moved = float(np.abs(states - reference).max())

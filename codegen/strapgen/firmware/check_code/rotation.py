@@ -36,7 +36,7 @@ _FORMULAS = ((lambda angle: 2 * math.atan(angle / 2), "2 atan(d/2)"), (math.atan
 
 @dataclass(frozen=True)
 class Rotation:
-    """What a function makes of a constant rate."""
+    """Rotation that a function computes at a constant rate."""
 
     #: Its error by the square and by the cube of the angle
     square: float
@@ -48,7 +48,7 @@ class Rotation:
 
     @property
     def text(self) -> str:
-        """What is seen, in words."""
+        """The observation in words."""
         if self.order == 1:
             return f"a rotation by d is off by {self.square:.3g} d^2"
         if self.order == 2:
@@ -86,7 +86,7 @@ def _large(step: ForeignStep) -> float:
 
 
 def rotation(step: ForeignStep, convention: Convention, runs: Sequence[SegmentRun]) -> Rotation:
-    """Return what a function makes of a constant rate."""
+    """Return the rotation that a function computes at a constant rate."""
     turns = rotation_vectors(np.array([run.relative[-2].T @ run.relative[-1] for run in runs]))
     angle = _large(step)
     least = _PART * angle
@@ -231,7 +231,7 @@ def _exponential(generators: Array, terms: int) -> Array:
 
 
 def _replace(transitions: Array, states: Array, reads: _Reads) -> Array:
-    """Return states (N, E) after an update whose elements read what is replaced already."""
+    """Return states (N, E) after an update in place whose elements read elements replaced before."""
     after = states.copy()
     elements = range(states.shape[1])
     for k in reversed(elements) if reads.downwards else elements:
@@ -241,7 +241,7 @@ def _replace(transitions: Array, states: Array, reads: _Reads) -> Array:
 
 
 def _possible_reads(convention: Convention, elements: int, needed: Array) -> Iterator[_Reads]:
-    """Yield what an update in place may read too late.
+    """Yield the elements that an update in place may read too late.
 
     That is nothing, or one element in one place, or some elements wherever they are read once they have been replaced.
     """
@@ -264,7 +264,7 @@ def _possible_reads(convention: Convention, elements: int, needed: Array) -> Ite
 
 
 def _orthogonal(elements: int) -> Iterator[Callable[[Array], Array]]:
-    """Yield what makes states rotations again: nothing, which stands for the nearest one, first."""
+    """Yield the orthogonalizations of states; the first one, none, stands for the nearest rotation."""
     yield lambda states: states
     if elements == 9:
         for by_rows in (True, False):

@@ -328,7 +328,7 @@ class _ComputedNumbers:
         return up(self.number.half_ulp(largest))
 
     def _is_exact(self, expression: Expression, before: Interval) -> bool:
-        """Tell whether an operation rounds nothing."""
+        """Return whether an operation rounds nothing."""
         if expression.kind in ("negate", "maximum", "select", "at_least"):
             return True
         if expression.kind in ("add", "subtract"):

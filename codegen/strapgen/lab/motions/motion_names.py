@@ -1,4 +1,4 @@
-"""The motions by name, as plain data: what sets a motion, and the function that makes it."""
+"""The motions by name, as plain data: their parameters, and the functions that make them."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ MOTIONS = Registry("motions", MotionEntry)
 
 
 def is_file(name: str) -> bool:
-    """Tell whether the name of a motion is that of a file."""
+    """Return whether the name of a motion is that of a file."""
     return name.endswith(".py")
 
 

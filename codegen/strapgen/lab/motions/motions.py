@@ -217,7 +217,7 @@ def _reference(name: str, parameters: tuple[tuple[str, float], ...]) -> Referenc
 
 
 def _made(name: str, parameters: Mapping[str, float]) -> Motion | RateProfile:
-    """Return what the function of a motion makes of parameters, which it refuses if it cannot use them."""
+    """Return the motion of a function and its parameters, or refuse parameters out of range."""
     with MOTIONS.guarded(name, "define a motion"):
         made = registration.load(MOTIONS[name].function)(**parameters)
     if not isinstance(made, Motion | RateProfile):

@@ -1,4 +1,4 @@
-"""Turns rates that are expressions of SymPy into operations on Taylor polynomials, and refuses what has none."""
+"""Turns rates in SymPy expressions into operations on Taylor polynomials; refuses other functions."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ class Jets:
         return _Jet(value, [_largest(value) if self.bounds else value, *rest])
 
     def divisor(self, value: Any) -> Any:
-        """Return what a quotient is divided by."""
+        """Return the divisor of a quotient."""
         if not self.bounds:
             if value == 0:
                 raise UnboundedError

@@ -1,4 +1,4 @@
-"""`RateMotion` is a motion whose body rate is an expression: all else is integrated from it."""
+"""`RateMotion` is a motion whose body rate is an expression; angles and attitude are integrated from it."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class RateMotion(Motion):
     elements: tuple[Any, ...] = field(default=())
 
     @cached_property
-    def _integrate(self) -> Integrated:
-        return Integrated(self.name, *operations_of(self.name, self.elements))
+    def _integrate(self) -> IntegratedRate:
+        return IntegratedRate(self.name, *operations_of(self.name, self.elements))
 
     def error_bound(self, time: float) -> float:
         """Return a proved bound of the error of the attitude at a time in s, before it is rounded, in rad."""
@@ -62,7 +62,7 @@ class RateMotion(Motion):
         return np.array(rows, float).reshape(stop - first, 3)
 
     def samples_in_digits(self, interval: Fraction, first: int, stop: int) -> list[list[Any]]:
-        """Return what `samples` does before it is rounded, integrated in 50 digits: (stop - first) rows of three."""
+        """Return the increments of `samples` in 50 digits, before rounding: (stop - first) rows of three."""
         with mp.workdps(DIGITS):
             edges = [_time(k * interval) for k in range(first, stop + 1)]
             angles = [self._integrate.piece(edge).angle_at(edge) for edge in edges]
@@ -110,7 +110,7 @@ def _number(time: float) -> Any:
 
 @dataclass(frozen=True)
 class _Piece:
-    """An interval of time with the Taylor coefficients of what is integrated over it."""
+    """An interval of time with the Taylor coefficients of rate and attitude."""
 
     #: Middle and half the length, in s
     middle: Any
@@ -156,7 +156,7 @@ class _Piece:
 # the attitude in rad.
 
 
-class Integrated:
+class IntegratedRate:
     """The integral of a rate, and the attitude, from time 0 as far as they are needed, forwards and backwards.
 
     `places`: the operations that are the three elements of the rate in rad/s.
@@ -250,7 +250,7 @@ def _interval(middle: Any, half: Any) -> Any:
 
 
 def _remainder(lengths: list[Any], half: Any) -> Any:
-    """Return a bound of what the series of the attitude leaves out, from the lengths of the rate's coefficients."""
+    """Return a bound of the remainder of the attitude series, from the lengths of the rate's coefficients."""
     majorant, angle, power = [mp.mpf(1)], mp.mpf(0), mp.mpf(1)
     for k in range(ATTITUDE_DEGREE):
         known = range(max(0, k - RATE_DEGREE), k + 1)
@@ -296,7 +296,7 @@ def _integrate(rate: list[list[Any]]) -> list[list[Any]]:
 
 
 def _series_at(series: list[list[list[Any]]], x: Any) -> list[list[Any]]:
-    """Return a matrix of Taylor series at a time from where they begin."""
+    """Evaluate a matrix of Taylor series at a time after their origin."""
     powers = [mp.mpf(1)]
     for _ in range(ATTITUDE_DEGREE):
         powers.append(powers[-1] * x)

@@ -1,4 +1,4 @@
-"""Specific forces along a motion in body axes: exact velocity increments, and the velocity and position they lead to.
+"""Specific forces along a motion in body axes: exact velocity increments, and the resulting velocity and position.
 
 A force has no need of a closed form: what has none is summed up at Gauss-Legendre nodes, so many that rounding is all
 that is left. Gravity is in none of it.

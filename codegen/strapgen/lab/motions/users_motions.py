@@ -95,7 +95,7 @@ class UsersMotion(Motion):
         return self._call("increments", shape, step, steps, samples, previous, ahead)
 
     def _call(self, function: str, shape: tuple[int, ...], *arguments: Any) -> Array:
-        """Return what a function of the file returns, checked."""
+        """Return the checked result of a function of the file."""
         with _guard(self.name):
             value = self.functions[function](*arguments)
         try:
@@ -278,7 +278,7 @@ class _Integral:
             raise InputError(f"{self._users.name}: {said} from {begin:.6g} s to {end:.6g} s")
 
     def _first_fault(self, edges: Array, most: int) -> tuple[str, int]:
-        """Return what is wrong first, and in which interval; "" if nothing is."""
+        """Return the first contradiction and its interval; "" if there is none."""
         matrices = self._users.attitude(edges)
         true = np.swapaxes(matrices[:-1], -1, -2) @ matrices[1:]
         turned, angle, summed = self._integrate(edges, 1)

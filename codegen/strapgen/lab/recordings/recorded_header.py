@@ -1,4 +1,4 @@
-"""Finds the columns of a recording by the names and units in its header, or refuses what it cannot tell."""
+"""Finds the columns of a recording by the names and units in its header, or refuses an ambiguous header."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SUFFIXES = ("ns", "us", "ms", "s", "sec", "rad_s", "rads", "deg_s", "dps", "mdp
 
 @dataclass(frozen=True)
 class ColumnLayout:
-    """Where the columns stand, and in which units."""
+    """The positions of the columns, and their units."""
 
     #: Of the time and of the values; without a time, of the values alone
     places: tuple[int, ...]
@@ -58,7 +58,7 @@ def rates_layout(
     time_unit: str | None = None,
     has_time: bool = True,
 ) -> ColumnLayout:
-    """Return where time and rates stand in a file of rates.
+    """Return the positions of time and rates in a file of rates.
 
     `unit, columns, time_unit`: what the user states in place of the header: units of rates and time in the spelling of
     `units`; names or numbers of the columns with commas between, the time and three rates, or the rates alone.
@@ -80,7 +80,7 @@ def rates_layout(
 def named_layout(
     header: Sequence[str] | None, width: int, names: Sequence[str], wanted: Sequence[str]
 ) -> ColumnLayout:
-    """Return where columns with fixed names stand; a file without a header has them in their order."""
+    """Return the positions of columns with fixed names; without a header they are in order."""
     if header is None:
         if width != len(names):
             raise InputError(
@@ -156,7 +156,7 @@ def _found_places(cells: Sequence[_HeaderCell] | None, width: int, has_time: boo
 
 
 def _is_other(cell: _HeaderCell) -> bool:
-    """Tell whether a column is one of another sensor, or of an attitude."""
+    """Return whether a column is one of another sensor, or of an attitude."""
     match = _AXIS.fullmatch(cell.name)
     return match is not None and _OTHER.fullmatch(match[1].strip("_")) is not None
 

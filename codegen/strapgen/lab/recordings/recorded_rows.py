@@ -1,4 +1,4 @@
-"""Reads rows of numbers from a recorded file: a block at a time by numpy, row by row what it does not take."""
+"""Reads rows of numbers from a recorded file: in blocks by numpy, and row by row where numpy fails."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _BLOCK = 1 << 13
 
 
 class LineNumbers:
-    """The number of the line of every row: the rows from which on it is another distance away."""
+    """Line numbers of rows, stored where the distance between row and line changes."""
 
     def __init__(self) -> None:
         self._rows, self._lines = array("q"), array("q")

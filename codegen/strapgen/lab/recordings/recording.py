@@ -436,7 +436,7 @@ def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, flo
 
 
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
-    """Return how many steps an interval in s is, to a hundredth of a step."""
+    """Return the number of steps in an interval in s, to a hundredth of a step."""
     ratio = float(checks.number(what, value, positive=True)) / step
     if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")

@@ -261,7 +261,7 @@ _PERFECT = InstrumentErrors()
 
 
 def dithered_laser_noise(lock_in_deg_s: float, dither_deg_s: float, fringes: float) -> float:
-    """Return the white noise that a gyro of dithered laser beams has from passing through lock-in, equation (2).
+    """Return the white noise of a dithered laser gyro due to lock-in, equation (2).
 
     The equation is ``sigma = L / sqrt(D K)`` with the lock-in rate L in deg/h, D in rad/h and K fringes a revolution.
 

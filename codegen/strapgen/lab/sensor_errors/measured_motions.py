@@ -25,7 +25,7 @@ _PART = 1 << 16
 
 @dataclass
 class _Progress:
-    """How far a row of samples has been measured, and by which unit."""
+    """The measurement unit of a run, and the number of samples that it has measured."""
 
     interval: Fraction
     unit: MeasurementUnit

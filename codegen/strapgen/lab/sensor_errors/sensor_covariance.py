@@ -102,7 +102,7 @@ class Path:
 
     @cached_property
     def noise(self) -> QuantizationNoise:
-        """What errors of sampled angles add up to in a run of the step."""
+        """The noise of sampled angles, accumulated in a run of the step."""
         return quantization_noise(self.choice)
 
 
@@ -243,7 +243,7 @@ def _of_losses(path: Path, errors: InstrumentErrors) -> Array:
 
 
 def _mean_loss(path: Path, errors: InstrumentErrors) -> Array:
-    """Return what lost samples lack on average, (records, 3) in rad, reference axes."""
+    """Return the mean angle of lost samples, (records, 3) in rad, reference axes."""
     chance, lost_as = errors.sampling.lost, errors.sampling.lost_as
     share = chance if lost_as == "zero" else chance / (1 - chance)
     along = _missing(path, errors)

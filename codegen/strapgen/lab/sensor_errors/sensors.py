@@ -267,7 +267,7 @@ class _Loss:
         return result[:, :3], result[:, 3:]
 
     def _add_late(self, row: Array, lost: NDArray[np.bool_], result: Array) -> None:
-        """Add what was lost to the next sample that arrives."""
+        """Add the lost increments to the next sample that arrives."""
         if not lost[0]:
             result[0] += self._late
             self._late = np.zeros(6)

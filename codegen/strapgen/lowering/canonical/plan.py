@@ -41,7 +41,7 @@ class Weighted:
     meaning: str
 
 
-class Opened(Enum):
+class OpenedProducts(Enum):
     """The cross products in the skew part that go into outer products; u z' - z u' is the skew matrix of z x u."""
 
     NONE = "none"
@@ -76,7 +76,7 @@ class Plan:
     basis: list[str]  # names of the vectors to which the products in the weights refer
     #: Before a cross product, weights save cross products with a common factor; after it, sums can share them.
     weighted_first: bool
-    opened: Opened = Opened.NONE
+    opened: OpenedProducts = OpenedProducts.NONE
     definitions: list[Cross | Weighted] = field(default_factory=list)  # in the order of computation
     #: The scalar part of a quaternion or the diagonal of a matrix, with its meaning.
     scalars: dict[str, tuple[Polynomial, str]] = field(default_factory=dict)
@@ -112,11 +112,13 @@ class Plan:
             rest.remove(i)
             partners[i][tuple(rest)] = coefficient
         levers: dict[int, Coefficients] = {i: {} for i in chosen}
-        if self.opened is not Opened.NONE:
+        if self.opened is not OpenedProducts.NONE:
             for i, partner in partners.items():
                 levers[i] = _take_lever(skew, i)
-                if self.opened is not Opened.PLAIN:
-                    levers[i] |= _take_triple(skew, i, partner, 1 if self.opened is Opened.RIGHT else -1)
+                if self.opened is not OpenedProducts.PLAIN:
+                    levers[i] |= _take_triple(
+                        skew, i, partner, 1 if self.opened is OpenedProducts.RIGHT else -1
+                    )
         self._count_edges([skew, *partners.values()])
         self.scalars["diagonal"] = (symmetric.get((), {}), "multiple of the unit matrix")
         if skew:
@@ -367,7 +369,9 @@ def _plans(
             if any(factor != 1 for _, factor in named):
                 variant = transform(variant, lengths)
             matrix = core.transition.shape == (3, 3)
-            for weighted, opened in itertools.product((False, True), Opened if matrix else (Opened.NONE,)):
+            for weighted, opened in itertools.product(
+                (False, True), OpenedProducts if matrix else (OpenedProducts.NONE,)
+            ):
                 plan = Plan(pool.copy(), [name for name, _ in named], weighted, opened)
                 if matrix:
                     plan.matrix(variant)

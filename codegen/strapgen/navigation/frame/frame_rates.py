@@ -1,4 +1,4 @@
-"""Derives the rate of the navigation frame: earth rate, transport rate, and what both turn the frame by in a cycle."""
+"""Derives the rate of the navigation frame: earth rate, transport rate, and the rotation of the frame in a cycle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Derives what a navigator shows: latitude, longitude and wander angle, attitude and velocity against north."""
+"""Derives the outputs of a navigator: latitude, longitude and wander angle, attitude and velocity against north."""
 
 from __future__ import annotations
 

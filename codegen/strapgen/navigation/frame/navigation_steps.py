@@ -65,7 +65,7 @@ def midpoint(rate: sp.Matrix, before: sp.Matrix) -> sp.Matrix:
 
 
 def coriolis_gravity() -> Kernel:
-    """Return what changes the velocity beside the specific force, g_n - (2 Wn + rho) x v."""
+    """Return the change of velocity by gravity and Coriolis acceleration, g_n - (2 Wn + rho) x v."""
     build = KernelBuilder()
     v, g, W, rho = map(build.input, (VELOCITY, GRAVITY, EARTH_RATE, TRANSPORT_RATE))
     build.output(ACCELERATION, g - cross(2 * W + rho, v))

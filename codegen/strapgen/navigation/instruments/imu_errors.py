@@ -232,7 +232,7 @@ def parameters(number: int) -> dict[str, sp.Symbol]:
 
 
 def gyro_torques(W: sp.Matrix, A: sp.Matrix, unbalance: sp.Expr, error: dict[str, sp.Expr]) -> sp.Matrix:
-    """Return what the torquers of one gyro measure, equations (4.1) and (4.2).
+    """Return the torques of one gyro, equations (4.1) and (4.2).
 
     `W, A`: rate in rad/s and acceleration in m/s^2 in the axes of the gyro: torquers x and y, spin z.
     `unbalance`: mass unbalance in rad/s per m/s^2.
@@ -269,7 +269,7 @@ def gyro_errors(number: int, W: sp.Matrix, A: sp.Matrix, unbalance: sp.Expr) -> 
 
 @dataclass(frozen=True)
 class ErrorStructure:
-    """The coefficients of the error model (4.9), and where they stand in its matrices."""
+    """The coefficients of the error model (4.9), and their positions in its matrices."""
 
     #: The matrix of every term by its letter, rows x, y, z: an entry is 0 or a multiple of a coefficient's
     #: symbol

@@ -168,7 +168,7 @@ def _covariance(gyros: tuple[TwoAxisGyro, ...], sign: int) -> sp.ImmutableMatrix
 
 
 def _vanishes(expanded: sp.Expr) -> bool:
-    """Tell whether an expression is 0: a polynomial with rational coefficients is not, if it has terms."""
+    """Return whether an expression is 0: a polynomial with rational coefficients is not, if it has terms."""
     symbols = sorted(expanded.free_symbols, key=str)
     if symbols and expanded.is_polynomial() and sp.Poly(expanded, *symbols).domain in (sp.ZZ, sp.QQ):
         return False

@@ -28,7 +28,7 @@ BUILT_IN = Path(__file__).parent / "ltr81.toml"
 
 @dataclass(frozen=True)
 class LoopSetting:
-    """What a mode makes of a loop."""
+    """The settings of a loop in a mode."""
 
     #: "level", "erection", "heading" or "vertical"
     loop: str

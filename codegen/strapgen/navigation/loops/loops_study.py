@@ -43,7 +43,7 @@ _LARGEST = {"heading_deg": 180.0}
 
 @dataclass(frozen=True)
 class LoopErrors:
-    """What disturbs the loops of a study, each error by itself."""
+    """Errors that disturb the loops of a study, each in a case of its own."""
 
     #: Earth rate and gyro bias, about a level axis and about down
     rate_deg_h: float = 10.0
@@ -478,7 +478,7 @@ def loops_image(result: LoopsResult, path: str | Path) -> bytes:
 
 @dataclass(frozen=True)
 class RestingSensors:
-    """What the sensors of a body at rest measure, whose axes are those of the level frame, z down."""
+    """Samples of the sensors of a level body at rest, z down."""
 
     #: In rad/s, axes n
     earth_rate: tuple[float, float, float] = (7.292115e-5, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Axes of redundant sensors in exact numbers: parity equations, triads with noise, and failures that they tell."""
+"""Geometry of redundant sensors in exact numbers: parity equations, triads with noise, detectable failures."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Triad:
 
 @dataclass(frozen=True)
 class SensorGeometry:
-    """Single-axis sensors by what each measures of a vector: its axis, times its scale.
+    """Single-axis sensors, each given by its axis times its scale.
 
     >>> HEXAD.equations[0]
     (-2, -2, 1, 3, 0, 0)

@@ -1,4 +1,4 @@
-"""A geometry of redundant sensors as a result: parity equations, triads with their noise, failures that they tell."""
+"""A geometry of redundant sensors as a result: parity equations, triads with noise, detectable failures."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class GeometryResult(Result):
 
     @staticmethod
     def of(sensors: SensorSet, tables: Sequence[FailureTable], files: Sequence[Path] = ()) -> GeometryResult:
-        """Return the geometry of a set of sensors, and what its tables say."""
+        """Return the geometry of a set of sensors with its tables of failures."""
         geometry = sensors.geometry
         triads = [
             TriadData(
@@ -160,7 +160,7 @@ def _triad_rows(sensors: SensorSet) -> list[list[Any]]:
 
 
 def _failures(sensors: SensorSet) -> str:
-    """Return in words which failures the geometry tells."""
+    """Return in words which failures are detected and isolated."""
     geometry = sensors.geometry
     operate = {0: "no failure is", 1: "one failure is"}.get(
         geometry.fail_operate, f"{geometry.fail_operate} failures are"
@@ -192,7 +192,7 @@ _EQUAL = 1e-9
 
 @dataclass(frozen=True)
 class FailureVerdict:
-    """What a table says of one status of the parity equations."""
+    """The verdict of a table for one status of the parity equations."""
 
     #: A 1 for each equation that fails, and a 0 for the others
     status: str
@@ -219,7 +219,7 @@ class FailureTable:
 
 
 def failure_table(geometry: SensorGeometry, removed: tuple[int, ...] = ()) -> FailureTable:
-    """Scan the parity space point by point, and return what each status of the equations stands for.
+    """Scan the parity space point by point, and return the verdict for each status of the equations.
 
     An equation, divided by the length of its vector, fails from the trip level 1 on.
 

@@ -1,4 +1,4 @@
-"""The command ``strapgen redundancy`` derives what redundant sensors on any axes give, and writes its code."""
+"""The command ``strapgen redundancy`` analyses redundant sensors on any axes, and writes their code."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class SensorSet:
 
     @property
     def word(self) -> str:
-        """What the increments are."""
+        """The increments in words."""
         return KINDS[self.sensor][1]
 
     def measurement(self, sensors: tuple[int, ...]) -> Signal:
@@ -132,7 +132,7 @@ def parity(sensors: SensorSet = HEXAD_SET) -> Kernel:
 
 
 def parity_rest(sensors: SensorSet = HEXAD_SET) -> Kernel:
-    """Return the removal of biases from parity: their mean at rest, and what is left without it.
+    """Return the removal of biases from parity: their mean at rest, and the parity less the mean.
 
     Returns: inputs ``parity`` and ``parity_bias`` (M,), a state, in rad or m/s, and ``share``, 1/k in cycle k
     of a mean, or 0 where the vehicle moves; outputs ``next_parity_bias`` and ``corrected`` (M,), before the

@@ -1,4 +1,4 @@
-"""Counts what redundancy management makes of failing sensors with errors, by Monte Carlo."""
+"""Counts detected and isolated failures of sensors with errors, by Monte Carlo."""
 
 from __future__ import annotations
 
@@ -238,7 +238,7 @@ _KEYS = (
 
 @dataclass(frozen=True)
 class RedundancyResult(Result):
-    """What redundancy management makes of failing sensors."""
+    """Detected and isolated failures of redundant sensors."""
 
     computed = properties(name=entry())
     drawn_by = f"{__name__}:redundancy_image"

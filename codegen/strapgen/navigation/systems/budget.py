@@ -1,4 +1,4 @@
-"""Works out what a described system needs: operations a second at each rate, and bytes of memory and constants."""
+"""The budget of a described system: operations a second at each rate, and bytes of memory and constants."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fractions import Fraction
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.program import Constant, Node, Operation, Program
 from strapgen.lab import cost as costs
-from strapgen.navigation.systems.fitting import Fitted
+from strapgen.navigation.systems.fitting import GeneratedStages
 from strapgen.navigation.systems.system import Rate
 from strapgen.results.records import INTERNAL, entry, properties
 from strapgen.targets import TARGETS
@@ -22,7 +22,7 @@ _COUNTER = 4
 
 @dataclass(frozen=True)
 class StageBudget:
-    """What a stage needs for a call."""
+    """Operations, memory and code of a stage."""
 
     name: str
     kernel: str
@@ -39,7 +39,7 @@ class StageBudget:
 
 @dataclass(frozen=True)
 class RateBudget:
-    """What the stages of one rate need in a second."""
+    """Operations and instructions of the stages of one rate in a second."""
 
     computed = properties(
         operations=entry(),
@@ -75,7 +75,7 @@ class RateBudget:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a system needs."""
+    """Operations, memory and code of a system."""
 
     computed = properties(
         per_second=entry(key="operations_per_second", write=float, kind=float),
@@ -122,11 +122,11 @@ class Budget:
 
 
 def budget(
-    fit: Fitted,
+    fit: GeneratedStages,
     measured: Mapping[str, tuple[int | None, int, int]] | None = None,
     cpu: str | None = None,
 ) -> Budget:
-    """Return what a system needs whose stages are generated.
+    """Return the budget of a system with generated stages.
 
     The copies of values between calls are not counted, nor are rescalings.
     """
@@ -189,7 +189,9 @@ def _thousands(number: Fraction | None) -> str:
     return "-" if number is None else f"{round(number):,}".replace(",", " ")
 
 
-def _rate(fit: Fitted, rate: Rate, measured: Mapping[str, tuple[int | None, int, int]]) -> RateBudget:
+def _rate(
+    fit: GeneratedStages, rate: Rate, measured: Mapping[str, tuple[int | None, int, int]]
+) -> RateBudget:
     stages = []
     for stage in rate.stages:
         counts = {kind: count for kind, count in fit.sources[stage.name].operations.items() if count}
@@ -199,11 +201,11 @@ def _rate(fit: Fitted, rate: Rate, measured: Mapping[str, tuple[int | None, int,
     return RateBudget(rate.every, fit.description.system.sample_hz / rate.every, tuple(stages))
 
 
-def _is_fixed(fit: Fitted) -> bool:
+def _is_fixed(fit: GeneratedStages) -> bool:
     return TARGETS[fit.target].fixed
 
 
-def _bytes(fit: Fitted, stage: str) -> int:
+def _bytes(fit: GeneratedStages, stage: str) -> int:
     """Return the bytes of a number inside a stage."""
     interface = fit.sources[stage].fixed
     if interface is None:
@@ -211,7 +213,7 @@ def _bytes(fit: Fitted, stage: str) -> int:
     return -(-interface.settings.word // 8)
 
 
-def _sizes(fit: Fitted) -> Iterator[tuple[str, int, int]]:
+def _sizes(fit: GeneratedStages) -> Iterator[tuple[str, int, int]]:
     """Return kind, count and size of each member of the memory, in its order."""
     system = fit.description.system
     for cell in system.cells:
@@ -262,8 +264,8 @@ def _is_power(number: Fraction) -> bool:
     return top & (top - 1) == 0 and bottom & (bottom - 1) == 0
 
 
-def measured_budget(fit: Fitted, cpu: str) -> Budget:
-    """Return what a system needs, with the instructions of every stage on a processor."""
+def measured_budget(fit: GeneratedStages, cpu: str) -> Budget:
+    """Return the budget of a system, with the instructions of every stage on a processor."""
     (name,) = costs.processors(None, [cpu])
     counts = {}
     for stage, sources in fit.sources.items():

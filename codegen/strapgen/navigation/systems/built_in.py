@@ -33,7 +33,7 @@ def _title(path: Path) -> str:
 
 
 def is_system(name: object) -> bool:
-    """Tell whether a name stands for a described system: a built-in one, a file that ends with .toml, or -."""
+    """Return whether a name stands for a described system: a built-in one, a file that ends with .toml, or -."""
     text = os.fspath(name) if isinstance(name, os.PathLike) else name
     return isinstance(text, str) and (
         text == "-" or text.endswith(".toml") or (_FOLDER / f"{text}.toml").is_file()

@@ -149,7 +149,7 @@ class Link:
 
     @property
     def net(self) -> tuple[str, str, str]:
-        """What wires share that begin at one port and have one kind."""
+        """The port and the kind of a wire; wires that share both form a net."""
         return self.source[0].name, self.source[1].name, self.kind
 
 
@@ -164,7 +164,7 @@ class Lane:
 
 
 @dataclass(frozen=True)
-class Way:
+class WirePath:
     """The way of a wire, of level and upright lines."""
 
     link: Link
@@ -192,7 +192,7 @@ class Placement:
     boxes: list[Box]
     links: list[Link]
     lanes: list[Lane] = field(default_factory=list)
-    ways: list[Way] = field(default_factory=list)
+    ways: list[WirePath] = field(default_factory=list)
     #: Width of the strip with the rates of the lanes, and of everything
     strip: float = 0
     width: float = 0
@@ -246,7 +246,7 @@ class Routing:
         self._level = {channel: tracks(some, 0.2) for channel, some in runs.items()}
 
     def _nesting(self, net: _Net) -> tuple[int, int]:
-        """Return what orders wires that leave a box side by side: to the left, the first is the lowest."""
+        """Return the sort key of wires that leave a box side by side: to the left, the first is the lowest."""
         links = self.nets[net]
         source, port = links[0].source
         is_left = source.kind and min(link.destination[0].column for link in links) <= source.column
@@ -283,9 +283,9 @@ class Routing:
         """Return how many tracks a gutter has."""
         return max(self._upright.get(gutter, {}).values(), default=-1) + 1
 
-    def ways(self) -> list[Way]:
+    def ways(self) -> list[WirePath]:
         """Return the ways of all wires, once everything has its place."""
-        return [Way(link, tuple(self._points(link))) for links in self.nets.values() for link in links]
+        return [WirePath(link, tuple(self._points(link))) for links in self.nets.values() for link in links]
 
     def _points(self, link: Link) -> list[tuple[float, float]]:
         """Return the corners of a wire."""

@@ -25,8 +25,8 @@ from strapgen.targets.names import MOST_CHOSEN, UNNAMED, Naming
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """The generated stages of a system, and in fixed point the formats of what passes between them."""
+class GeneratedStages:
+    """The generated stages of a system, and in fixed point the formats between them."""
 
     description: Description
     #: Target of the stages
@@ -51,7 +51,7 @@ class Fitted:
         )
 
     def held(self, name: str) -> list[Argument]:
-        """Return the ranges of what a cell or an input holds: its own first, and those of the outputs it takes."""
+        """Return the ranges of a cell or an input: its own first, then those of the outputs stored in it."""
         outputs = [
             self.arguments_of(stage)[output]
             for stage in self.description.system.stages
@@ -62,14 +62,14 @@ class Fitted:
 
 
 def clipped(held: Sequence[Argument], here: Argument | None) -> bool:
-    """Tell whether what is held, in the format of the first, may lie beyond the word to which it is rescaled."""
+    """Return whether a stored value may exceed the word to which it is rescaled."""
     if here is None or not held or held[0].format == here.format:
         return False
     largest = max(argument.unit * max(argument.high, -argument.low) for argument in held)
     return math.floor(largest / here.unit + Fraction(1, 2)) > here.format.largest
 
 
-def fitted(description: Description, target: str, settings: Settings | None = None) -> Fitted:
+def fitted(description: Description, target: str, settings: Settings | None = None) -> GeneratedStages:
     """Generate the stages of a system.
 
     In fixed point an input takes the format of what is wired to it, where that holds its range; where it does not, or
@@ -84,7 +84,7 @@ def fitted(description: Description, target: str, settings: Settings | None = No
             sources[stage.name] = _generated(description, stage, target, None)
         except InputError as error:
             raise InputError(f"stage {stage.name}: {error}") from None
-    return Fitted(description, target, None, sources)
+    return GeneratedStages(description, target, None, sources)
 
 
 def _suffix(target: str, settings: Settings | None) -> str:
@@ -107,7 +107,7 @@ def _generated(
 
 
 def without_needless_feedback(generate: Callable[[Settings], Sources], settings: Settings) -> Sources:
-    """Generate a stage; without error feedback where it rounds nothing that goes on to the next call."""
+    """Generate a stage; without error feedback if it rounds nothing that the next call takes."""
     result = generate(settings)
     if settings.carry == "none" or result.fixed is None or result.fixed.residuals:
         return result
@@ -125,7 +125,7 @@ class _Fit:
     sources: dict[str, Sources] = field(default_factory=dict)
     arguments: dict[str, Argument] = field(default_factory=dict)
 
-    def run(self) -> Fitted:
+    def run(self) -> GeneratedStages:
         """Generate all stages, each with the formats of those before it."""
         system = self.description.system
         self.inputs = {signal.name: signal for signal in system.inputs}
@@ -145,11 +145,11 @@ class _Fit:
                 raise InputError(f"stage {stage.name}: {error}") from None
             self._note(stage, self.sources[stage.name])
         self._check_initial()
-        fit = Fitted(self.description, self.target, self.settings, self.sources, self.arguments)
+        fit = GeneratedStages(self.description, self.target, self.settings, self.sources, self.arguments)
         self._check_ends(fit)
         return fit
 
-    def _check_ends(self, fit: Fitted) -> None:
+    def _check_ends(self, fit: GeneratedStages) -> None:
         """Check that every stage refuses what is rescaled to the end of a word, which stands for all beyond it."""
         for stage in self.description.system.stages:
             arguments = fit.arguments_of(stage)

@@ -1,4 +1,4 @@
-"""The inputs, outputs and states of a stage's kernel, and what its units and frames are once it is wired."""
+"""The inputs, outputs and states of a stage's kernel, with units and frames after wiring."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Ports:
         return next((state for state, output in self.states.items() if output == signal), None)
 
     def start(self, signal: Signal) -> tuple[Fraction, ...]:
-        """Return what a signal is before the first cycle if the file does not say so: no rotation, or zero."""
+        """Return the default value of a signal before the first cycle: no rotation, or zero."""
         step = self.program.attitude_step
         if step is not None and signal.name == self.program.inputs[0].name:
             return step.identity
@@ -79,7 +79,7 @@ class Ports:
         return (Fraction(0),) * signal.size
 
     def settled(self, signal: Signal) -> Signal:
-        """Return a signal with the unit and the frame that "any" stands for."""
+        """Return a signal with actual unit and frame in place of "any"."""
         unit = self.known.get("unit", ANY) if signal.unit == ANY else signal.unit
         frame = self.known.get("frame", ANY) if signal.frame == ANY else signal.frame
         return replace(signal, unit=unit, frame=frame)
@@ -130,7 +130,7 @@ def _check_names(stage: Ports) -> None:
 
 @dataclass(frozen=True)
 class Source:
-    """What a wire comes from: an input of the system, or a value of a stage."""
+    """The source of a wire: an input of the system, or a value of a stage."""
 
     #: As the file writes it
     name: str
@@ -221,11 +221,11 @@ def check_rates(where: str, stage: Ports, signal: Signal, source: Source, sample
     here, there = stage.text.every, source.every
     step = stage.program.attitude_step
     if samples and step is not None:
-        due = there * (samples - step.beside)
-        if here != due:
+        taken = samples - step.extra_increments
+        if here != there * taken:
             raise InputError(
-                f"{where}: a step takes {counted(samples - step.beside, 'sample')} of every {there}, so that its every "
-                f"is {due}, not {here}"
+                f"{where}: a step takes {counted(taken, 'sample')} of every {there}, so that its every is "
+                f"{there * taken}, not {here}"
             )
     elif source.sum:
         if here < there:

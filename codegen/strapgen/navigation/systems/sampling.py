@@ -1,4 +1,4 @@
-"""Derives what stands between stages of different rates: sums and shares of increments, and increments from counts."""
+"""Derives the kernels between stages of different rates: sums and shares of increments, and increments from counts."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Wire:
-    """Where an input of a stage comes from."""
+    """A wire from a cell or an input to an input of a stage."""
 
     #: Name of the input of the kernel
     input: str
@@ -69,7 +69,7 @@ class Push:
 
 @dataclass(frozen=True)
 class Rate:
-    """What happens at one rate, in this order: samples are stored, stages are called, sums are cleared."""
+    """The steps of one rate in order: samples are stored, stages are called, sums are cleared."""
 
     #: Cycles of the fastest rate from one time to the next
     every: int

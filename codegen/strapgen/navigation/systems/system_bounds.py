@@ -1,4 +1,4 @@
-"""Adds up the error bounds of stages along the wires: what one pass through a system may lose to rounding."""
+"""Adds up the error bounds of stages along the wires: the rounding error of one pass through a system."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import DEFAULT_ANGLE, ROTATION_INPUTS, Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.program import Program
-from strapgen.navigation.systems.fitting import Fitted, clipped, fitted
+from strapgen.navigation.systems.fitting import GeneratedStages, clipped, fitted
 from strapgen.navigation.systems.system import Push, SystemStage
 from strapgen.targets import TARGETS
 
@@ -35,7 +35,7 @@ class SystemBounds:
     reasons: Mapping[str, str] = field(default_factory=dict)
 
 
-def bounds(fit: Fitted) -> SystemBounds:
+def bounds(fit: GeneratedStages) -> SystemBounds:
     """Return the error bounds of one pass through a system.
 
     Every stage has the bound of its own rounding, and passes on the errors of its inputs by at most its derivatives,
@@ -49,10 +49,10 @@ def bounds(fit: Fitted) -> SystemBounds:
 
 @dataclass
 class _Pass:
-    """The errors along one pass, while they are worked out."""
+    """The errors along one pass, during the computation."""
 
-    fit: Fitted
-    ranges: Fitted
+    fit: GeneratedStages
+    ranges: GeneratedStages
     errors: dict[str, Errors] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     faster: dict[str, Errors] = field(default_factory=dict)
@@ -89,7 +89,7 @@ class _Pass:
         return _rescale(self.errors[source], self.fit.arguments.get(source), here)
 
     def _call(self, stage: SystemStage) -> None:
-        """Add the rounding of a stage to what its inputs bring."""
+        """Add the rounding of a stage to the propagated errors of its inputs."""
         program = self.fit.description.programs[stage.name]
         arguments = self.fit.arguments_of(stage)
         unknown = next((self.reasons[w.source] for w in stage.wires if w.source in self.reasons), "")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from strapgen.ir.fixed_settings import Settings
     from strapgen.ir.sources import Sources
     from strapgen.navigation.systems.budget import Budget
-    from strapgen.navigation.systems.fitting import Fitted
+    from strapgen.navigation.systems.fitting import GeneratedStages
     from strapgen.navigation.systems.system_bounds import SystemBounds
 
 
@@ -145,7 +145,7 @@ def _compiled(target: str) -> bool:
     return TARGETS[target].compiled
 
 
-def unit(fit: Fitted, needs: Budget, errors: SystemBounds, command: str) -> Sources:
+def unit(fit: GeneratedStages, needs: Budget, errors: SystemBounds, command: str) -> Sources:
     """Return the files of the whole, with bounds and budget in its head."""
     from strapgen.navigation.systems import budget, system_generation
     from strapgen.navigation.systems.system_report import bound_lines
@@ -155,8 +155,8 @@ def unit(fit: Fitted, needs: Budget, errors: SystemBounds, command: str) -> Sour
 
 def fitted_stages(
     file: Path, target: str, sample_hz: Positive | None, cpu: str | None, fixed: FixedOptions
-) -> tuple[Fitted, Budget, str]:
-    """Return the generated stages, what they need, and the command that makes the files again."""
+) -> tuple[GeneratedStages, Budget, str]:
+    """Return the generated stages, their budget, and the command that makes the files."""
     from strapgen.ir.fixed_settings import Settings
     from strapgen.lab.cost import processors
     from strapgen.navigation.systems.budget import budget, measured_budget

@@ -52,7 +52,7 @@ class OutputComparison:
 
 
 class RunsSamples(Protocol):
-    """What runs a system: a back end, or files."""
+    """A runner of a system: a back end, or files."""
 
     def run(self, inputs: Mapping[str, Any]) -> SystemRun:
         """Run cycles of the fastest rate, see `SystemRunner.run`."""
@@ -122,7 +122,7 @@ _BLOCK = 20_000
 
 @dataclass(frozen=True)
 class PassAgreement:
-    """How far one pass of a back end is from one of another, from equal memories and samples."""
+    """The difference of one pass on two back ends, from equal memories and samples."""
 
     #: Number of passes that were compared
     cycles: int

@@ -24,9 +24,9 @@ from strapgen.navigation.systems.drawing_routing import (
     Placement,
     Port,
     Routing,
-    Way,
+    WirePath,
 )
-from strapgen.navigation.systems.fitting import Fitted
+from strapgen.navigation.systems.fitting import GeneratedStages
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, SystemStage
 from strapgen.targets.rendering import render
 
@@ -34,7 +34,7 @@ from strapgen.targets.rendering import render
 TITLE_CHARACTER, TITLE_LINE, LEGEND_LINE = 11.5, 26, 22
 
 
-def drawing(fit: Fitted) -> str:
+def drawing(fit: GeneratedStages) -> str:
     """Return a drawing of the wiring of a system."""
     system = fit.description.system
     placed = plan(system)
@@ -56,9 +56,9 @@ def drawing(fit: Fitted) -> str:
     )
 
 
-def _nets(ways: Iterable[Way]) -> list[tuple[str, list[Way], list[tuple[float, float]]]]:
+def _nets(ways: Iterable[WirePath]) -> list[tuple[str, list[WirePath], list[tuple[float, float]]]]:
     """Return the wires that are one line together: their kind, their ways, and where they part."""
-    nets: dict[tuple[str, str, str], list[Way]] = {}
+    nets: dict[tuple[str, str, str], list[WirePath]] = {}
     for way in ways:
         nets.setdefault(way.link.net, []).append(way)
     order = list(KINDS)
@@ -68,7 +68,7 @@ def _nets(ways: Iterable[Way]) -> list[tuple[str, list[Way], list[tuple[float, f
     ]
 
 
-def _partings(ways: list[Way]) -> list[tuple[float, float]]:
+def _partings(ways: list[WirePath]) -> list[tuple[float, float]]:
     """Return the places from which lines go in three directions or four."""
     lines = {line for way in ways for line in pairwise(way.points)}
     partings = []
@@ -84,7 +84,7 @@ def _partings(ways: list[Way]) -> list[tuple[float, float]]:
 
 
 def _legend(placed: Placement) -> Iterator[tuple[str, str, float, float]]:
-    """Return the entries of the legend: what is drawn, its words and its place, below the lanes."""
+    """Return the entries of the legend below the lanes: symbol, words and position."""
     used = {link.kind for link in placed.links}
     marks = {port.mark for box in placed.boxes for port in box.outputs}
     entries = [(kind, words) for kind, words in KINDS.items() if kind in used]

@@ -1,4 +1,4 @@
-"""Reads the text of a described system: its tables, keys and numbers, before any kernel is looked at."""
+"""Reads the file of a described system: tables, keys and numbers, without deriving a kernel."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class StageText:
 
     @property
     def options(self) -> dict[str, Any]:
-        """What `catalogue.choose` takes beside the name."""
+        """The arguments of `catalogue.choose` beside the name."""
         stated = {name: getattr(self, name) for name in ("method", "increments", "previous", "ahead")}
         return {name: value for name, value in stated.items() if value is not None}
 

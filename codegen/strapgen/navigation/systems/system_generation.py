@@ -13,7 +13,7 @@ from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.signals import FRAMES, Signal
 from strapgen.ir.sources import Function, Sources
 from strapgen.ir.version import VERSION
-from strapgen.navigation.systems.fitting import Fitted, fitted
+from strapgen.navigation.systems.fitting import GeneratedStages, fitted
 from strapgen.navigation.systems.system import Cell, DescribedSystem, Push, Rate, SystemStage
 from strapgen.navigation.systems.wiring import Description
 from strapgen.targets import TARGETS, system_targets
@@ -30,7 +30,7 @@ def sources(
     return unit(fitted(description, target, settings), command)
 
 
-def unit(fit: Fitted, command: str, budget: Sequence[str] = ()) -> Sources:
+def unit(fit: GeneratedStages, command: str, budget: Sequence[str] = ()) -> Sources:
     """Return the C of a system whose stages are generated, or its twin in Python."""
     system, stages = fit.description.system, fit.sources
     if TARGETS[fit.target].language == "Python":
@@ -57,14 +57,14 @@ def unit(fit: Fitted, command: str, budget: Sequence[str] = ()) -> Sources:
 
 @dataclass(frozen=True)
 class _Printer:
-    """What both languages say of a system."""
+    """Common parts of the printers for C and Python."""
 
     system: DescribedSystem
     stages: Mapping[str, Sources]
     arguments: Mapping[str, Argument]
 
     def _describe(self, signal: Signal, cell: Cell | None = None) -> str:
-        """Return what a cell or an input is: meaning, frame, unit, and format or range."""
+        """Return the description of a cell or an input: meaning, frame, unit, and format or range."""
         history = f"the last {cell.samples} samples, the newest last: " if cell and cell.samples else ""
         argument = self.arguments.get(signal.name if cell is None else cell.name)
         frame = f"frame {signal.frame}; " if signal.frame else ""
@@ -253,7 +253,7 @@ class _CPrinter(_Printer):
         yield from [*(f"    {line}" for line in after), "}"]
 
     def _differs(self, stage: SystemStage, name: str, cell: str) -> bool:
-        """Tell whether an argument of a stage has another format or type than the cell on its wire."""
+        """Return whether an argument of a stage has another format or type than the cell on its wire."""
         argument, held = self._argument(stage, name), self.arguments.get(cell)
         return argument is not None and held is not None and argument.format != held.format
 

@@ -12,7 +12,7 @@ from strapgen.ir.formats import above, float_above
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.signals import Signal
 from strapgen.navigation.systems.budget import Budget, lines
-from strapgen.navigation.systems.fitting import Fitted
+from strapgen.navigation.systems.fitting import GeneratedStages
 from strapgen.navigation.systems.system_bounds import SystemBounds
 from strapgen.results.records import INTERNAL, entry, reader_table
 from strapgen.results.result import Result
@@ -92,8 +92,10 @@ class SystemResult(Result):
     files: Sequence[Path]
 
     @staticmethod
-    def of(fit: Fitted, needs: Budget, bounds: SystemBounds, files: Sequence[Path] = ()) -> SystemResult:
-        """Return a system with what it needs, and the files that were written."""
+    def of(
+        fit: GeneratedStages, needs: Budget, bounds: SystemBounds, files: Sequence[Path] = ()
+    ) -> SystemResult:
+        """Return a system with its budget, and the written files."""
         system = fit.description.system
         return SystemResult(
             bounds=bounds,
@@ -140,7 +142,7 @@ def _used_columns(table: TextTable) -> TextTable:
     return TextTable(columns, [[row[k] for k in used] for row in table.rows])
 
 
-def bound_lines(fit: Fitted, errors: SystemBounds) -> list[str]:
+def bound_lines(fit: GeneratedStages, errors: SystemBounds) -> list[str]:
     """Return the error bounds of a pass in lines of text, for the head of generated files."""
     outputs = fit.description.system.outputs
     known = [name for name in outputs if name in errors.errors]
@@ -159,12 +161,12 @@ def bound_lines(fit: Fitted, errors: SystemBounds) -> list[str]:
     return result
 
 
-def _unit(fit: Fitted, name: str) -> str:
+def _unit(fit: GeneratedStages, name: str) -> str:
     unit = fit.description.system.cell(name).signal.unit
     return "" if unit == "1" else unit
 
 
-def _stages(fit: Fitted, needs: Budget) -> Iterator[StageRow]:
+def _stages(fit: GeneratedStages, needs: Budget) -> Iterator[StageRow]:
     """Return the stages, from the fastest."""
     words = {stage.name: stage for stage in fit.description.system.stages}
     for rate in needs.rates:
@@ -186,8 +188,8 @@ def _stages(fit: Fitted, needs: Budget) -> Iterator[StageRow]:
             )
 
 
-def _values(fit: Fitted, errors: SystemBounds) -> Iterator[ValueRow]:
-    """Return what is stored between calls."""
+def _values(fit: GeneratedStages, errors: SystemBounds) -> Iterator[ValueRow]:
+    """Return the values that are stored between calls."""
     system = fit.description.system
     for cell in system.cells:
         bounds = errors.errors.get(cell.name)
@@ -203,7 +205,7 @@ def _values(fit: Fitted, errors: SystemBounds) -> Iterator[ValueRow]:
 
 
 def _about(
-    fit: Fitted, name: str, signal: Signal
+    fit: GeneratedStages, name: str, signal: Signal
 ) -> tuple[str, str, tuple[int, ...], str | None, float | None]:
     """Return unit, frame, shape, format and range of a value."""
     argument = fit.arguments.get(name)

@@ -19,7 +19,7 @@ from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.signals import CYCLE
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems import system_generation
-from strapgen.navigation.systems.fitting import Fitted, fitted
+from strapgen.navigation.systems.fitting import GeneratedStages, fitted
 from strapgen.navigation.systems.system import Push, Rate, SystemStage
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.wiring import Description
@@ -43,7 +43,7 @@ class SystemRunner:
 
     Parameters
     ----------
-    fit : Fitted
+    fit : GeneratedStages
         Its generated stages.
     backend : str
         Name of the back end.
@@ -60,7 +60,7 @@ class SystemRunner:
     def _in_words(self) -> str:
         return f"{self.system.name} on {self.backend}: {', '.join(self.fit.sources)}"
 
-    def __init__(self, fit: Fitted, backend: str) -> None:
+    def __init__(self, fit: GeneratedStages, backend: str) -> None:
         self.fit = fit
         self.backend = backend
         self.system = fit.description.system
@@ -278,7 +278,7 @@ def carried(values: Array, unit: Fraction) -> Array:
 
 @dataclass
 class SystemMemory:
-    """What a system stores, in the numbers of its back end."""
+    """The memory of a system, in the numbers of its back end."""
 
     cells: dict[str, Array]  # (runs, elements)
     feedback: dict[str, Array]  # error feedback of each stage, (runs, number of words)
@@ -313,7 +313,7 @@ def rescaled(values: Array, there: Format, here: Format) -> Array:
 class CompiledSystem(SystemRunner):
     """Runs the C unit of a system: the generated one, or files that are stated."""
 
-    def __init__(self, fit: Fitted, backend: str, sources: Sources | None = None) -> None:
+    def __init__(self, fit: GeneratedStages, backend: str, sources: Sources | None = None) -> None:
         super().__init__(fit, backend)
         self.sources = sources or system_generation.unit(fit, f"strapgen system {self.system.name}")
         self.module = compiler.load(self.sources)
@@ -455,7 +455,7 @@ def system_runner(
     chosen = fit_settings(backend, settings)
     if entry.target not in TARGETS:
         sources = {name: sources_of_choice(c, entry.target) for name, c in description.choices.items()}
-        return SystemRunner(Fitted(description, entry.target, None, sources), backend)
+        return SystemRunner(GeneratedStages(description, entry.target, None, sources), backend)
     fit = fitted(description, entry.target, chosen)
     compiled = TARGETS[entry.target].compiled
     return (CompiledSystem if compiled else SystemRunner)(fit, backend)

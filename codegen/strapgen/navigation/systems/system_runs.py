@@ -59,7 +59,7 @@ def matrices(signal: Signal, values: Any) -> Array:
 
 
 def _parameters(signal: Signal) -> str:
-    """Return what four elements of an attitude are: the scalar stands first in Cayley-Klein parameters."""
+    """Return the kind of an attitude of four elements: the scalar is first in Cayley-Klein parameters."""
     return "cayley-klein" if signal.elements[0].endswith("_s") else "euler"
 
 
@@ -234,7 +234,7 @@ def _with_errors(description: Description, angle: Array, velocity: Array) -> tup
 
 
 def _measured(description: Description, signal: Signal) -> tuple[str, float | None]:
-    """Return the unit of what an input measures, and how much of it a count is."""
+    """Return the unit of a measured input, and the size of a count."""
     if signal.unit != "1" or signal.over != CYCLE:
         return signal.unit, None
     for stage in description.system.stages:

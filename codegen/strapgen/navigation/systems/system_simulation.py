@@ -130,7 +130,7 @@ def runner_of(description: Description, backend: str, fixed: FixedOptions) -> Sy
 
 
 def facts_of(runner: SystemRunner, name: str) -> dict[str, Any]:
-    """Return what a report says first."""
+    """Return the facts at the head of a report."""
     rate = runner.system.sample_hz
     return {"system": name, "backend": runner.backend, "sample_hz": float(rate)}
 
@@ -171,7 +171,7 @@ def compared_system(
 
 
 def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDArray[Any]], str]:
-    """Return the system, the samples of its inputs, and where they come from in words."""
+    """Return the system, the samples of its inputs, and their source in words."""
     import numpy as np
 
     from strapgen.lab.sensor_errors.measured_motions import both_increments

@@ -1,4 +1,4 @@
-"""Runs a described system on several back ends from the counts of one vehicle, and compares what it navigates."""
+"""Runs a described system on several back ends from the counts of one vehicle, and compares the navigation outputs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _RADIUS = 6378137.0
 
 @dataclass(frozen=True)
 class NavigationErrors:
-    """How far one back end has gone from another."""
+    """Differences of attitude, velocity and position of one back end from another."""
 
     backend: str
     #: (N,): angle between the attitudes in rad, length of the difference of velocities in m/s, distance of the
@@ -103,7 +103,7 @@ def study(
 
 
 def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction) -> dict[str, Array]:
-    """Return what a system measures on a vehicle, by the names of its inputs.
+    """Return the samples of a system on a vehicle, by the names of its inputs.
 
     An input in rad or m/s takes increments. One of counts takes those of the unit that the stage has to which it is
     wired, angle-counts or velocity-counts. Where a stage compensates the errors of a measurement unit, the sensors have
@@ -117,7 +117,7 @@ def samples(description: Description, vehicle: TurningVehicle, seconds: Fraction
 
 @dataclass(frozen=True)
 class Outputs:
-    """The cells of a system's outputs that a navigator is judged by; None for what it has not."""
+    """The cells with attitude, velocity and position of a system; None for a missing output."""
 
     attitude: Cell | None
     velocity: Cell | None
@@ -140,7 +140,7 @@ class Outputs:
         return cls(first("b to n", True, "1"), first("n", False, "m/s"), first("n to e", True, "1"))
 
     def between(self, name: str, one: Mapping[str, Array], other: Mapping[str, Array]) -> NavigationErrors:
-        """Return how far one run is from another."""
+        """Return the differences of one run from another."""
         empty = np.empty(0)
 
         def turned(cell: Cell | None) -> Array:
@@ -172,7 +172,7 @@ _PRINTED = (
 
 @dataclass(frozen=True)
 class DifferenceRow:
-    """How far a back end has gone from double: at most, and at the end; None where there is no such output."""
+    """Differences of a back end from double, largest and at the end; None for a missing output."""
 
     backend: str = field(metadata=entry("back end", align="<"))
     attitude_arcsec: float | None = field(metadata=entry("largest", _SPEC, group="attitude, arcsec"))
@@ -195,7 +195,7 @@ class DifferenceRow:
 
 
 @dataclass(frozen=True)
-class NeedsRow:
+class ResourceRow:
     """Memory, code and load of a back end in C; None where no processor was named."""
 
     backend: str
@@ -207,10 +207,10 @@ class NeedsRow:
     instructions_per_s: float | None
 
     @staticmethod
-    def of(backend: str, needs: Budget) -> NeedsRow:
-        """Return what a back end needs."""
+    def of(backend: str, needs: Budget) -> ResourceRow:
+        """Return memory, code and load of a back end."""
         executed = needs.executed_per_second
-        return NeedsRow(
+        return ResourceRow(
             backend,
             needs.memory_bytes,
             needs.constant_bytes,
@@ -221,7 +221,7 @@ class NeedsRow:
         )
 
 
-class FromTruth(NamedTuple):
+class AttitudeError(NamedTuple):
     """Angle between the attitude and the true one in arcsec, at most and at the end."""
 
     largest: float
@@ -230,7 +230,7 @@ class FromTruth(NamedTuple):
 
 @dataclass(frozen=True)
 class SystemStudyResult(Result):
-    """What a described system navigates on several back ends."""
+    """Navigation outputs of a described system on several back ends."""
 
     rows_in = "from_double"
 
@@ -239,8 +239,8 @@ class SystemStudyResult(Result):
     sample_hz: float
     seconds: float
     #: Attitude of C in double from the true one; None without an attitude
-    double_from_truth_arcsec: FromTruth | None
-    needs: list[NeedsRow]
+    double_from_truth_arcsec: AttitudeError | None
+    needs: list[ResourceRow]
     from_double: list[DifferenceRow]
 
     @staticmethod
@@ -252,8 +252,10 @@ class SystemStudyResult(Result):
             system=system.name,
             sample_hz=float(system.sample_hz),
             seconds=study.seconds,
-            double_from_truth_arcsec=FromTruth(float(truth.max()), float(truth[-1])) if truth.size else None,
-            needs=[NeedsRow.of(name, budget) for name, budget in study.needs.items()],
+            double_from_truth_arcsec=AttitudeError(float(truth.max()), float(truth[-1]))
+            if truth.size
+            else None,
+            needs=[ResourceRow.of(name, budget) for name, budget in study.needs.items()],
             from_double=list(map(DifferenceRow.of, study.errors)),
         )
 
@@ -281,7 +283,7 @@ def _lines(result: SystemStudyResult) -> Iterator[str]:
     yield from ["", *_load(result.needs).lines(), "", *fill(_PRINTED, "", 100).splitlines()]
 
 
-def _load(needs: Sequence[NeedsRow]) -> TextTable:
+def _load(needs: Sequence[ResourceRow]) -> TextTable:
     """Return memory, code and load of each back end in C."""
     cpu = next((row.cpu for row in needs if row.cpu), "")
     columns = [Column("back end", "<"), Column("state, bytes"), Column("constants, bytes")]

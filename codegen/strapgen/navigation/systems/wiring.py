@@ -33,7 +33,7 @@ from strapgen.navigation.systems.system_file import SystemText
 
 @dataclass(frozen=True)
 class Description:
-    """A described system: its structure, and what is stated for each stage."""
+    """A described system: its structure, and the settings of each stage."""
 
     system: DescribedSystem
     #: The kernel of each stage, with its constants, by the name of the stage
@@ -110,7 +110,7 @@ def wired(text: SystemText) -> Description:
 
 @dataclass
 class _Wiring:
-    """The wiring while it is worked out."""
+    """The wiring of a system, under construction."""
 
     text: SystemText
     stages: Sequence[Ports]
@@ -140,7 +140,7 @@ class _Wiring:
         self._check_used()
 
     def rates(self) -> tuple[Rate, ...]:
-        """Return what happens at each rate, from the fastest."""
+        """Return the steps of each rate, from the fastest."""
         result = []
         for every in sorted({stage.text.every for stage in self.stages} | set(self.pushes)):
             steps: list[tuple[int, int, Push | SystemStage]] = [
@@ -217,7 +217,7 @@ class _Wiring:
         return earlier or f"{other.name}_{state}"
 
     def _settle(self, stage: Ports) -> None:
-        """Find out what "any" stands for in a stage, and check units and frames of its wires."""
+        """Determine the units and frames that are "any" in a stage, and check those of its wires."""
         for name, reference in stage.text.wires.items():
             where = f"stage {stage.name}: {name} = {reference!r}"
             signal, source = stage.inputs[name], self._source(where, reference)
@@ -236,7 +236,7 @@ class _Wiring:
                 raise InputError(f"{where}: {what} {there or 'none'} meets {what} {needed or 'none'}")
 
     def _source(self, where: str, reference: str) -> Source:
-        """Return what a reference names: "input", "stage.output" or "stage.state"."""
+        """Return the source of a reference: "input", "stage.output" or "stage.state"."""
         name, _, signal = reference.partition(".")
         if not signal:
             if name not in self.described:

@@ -79,7 +79,7 @@ def two_speed(
 
 
 def _result(sources: Sources, loops: Sequence[Sources], written: Sequence[Path], said: str) -> TwoSpeedResult:
-    """Return what was generated, with what `generate` says of each loop."""
+    """Return the generated code as a result, with operations and contracts of each loop."""
     from strapgen.catalogue import Choice
     from strapgen.cli.generated_result import GeneratedSources
 
@@ -95,7 +95,7 @@ def _result(sources: Sources, loops: Sequence[Sources], written: Sequence[Path],
 
 
 class TwoSpeedRequest(NamedTuple):
-    """What one call of ``strapgen two-speed`` generates, as `two_speed_sources.sources` takes it."""
+    """The arguments of `two_speed_sources.sources` for one call of ``strapgen two-speed``."""
 
     algorithm: str
     sculling: int
@@ -104,7 +104,7 @@ class TwoSpeedRequest(NamedTuple):
 
 
 def request(algorithm: str, sculling: int, target: str, fixed: FixedOptions) -> TwoSpeedRequest:
-    """Return what the options ask for."""
+    """Return the request of the options."""
     return TwoSpeedRequest(algorithm, sculling, target, _settings(target, fixed))
 
 
@@ -123,7 +123,7 @@ def _settings(target: str, fixed: FixedOptions) -> Settings | None:
 
 @dataclass(frozen=True)
 class TwoSpeedResult(Result):
-    """What was generated of an algorithm in two speeds."""
+    """The code of an algorithm in two speeds."""
 
     kernel: str
     target: str

@@ -237,7 +237,7 @@ class LoopSources:
 
 
 def loop_sources(algorithm: str, sculling: int, target: str, settings: Settings | None) -> LoopSources:
-    """Return what runs on a target; parameters are those of `two_speed_sources.loops`."""
+    """Return the loops for a target; parameters are those of `two_speed_sources.loops`."""
     system = two_speed_sources.description(algorithm, sculling).system
     if target in BUILT_IN and BUILT_IN[target].fixed:
         loops = tuple(two_speed_sources.loops(algorithm, sculling, target, settings))
@@ -251,7 +251,7 @@ def loop_sources(algorithm: str, sculling: int, target: str, settings: Settings 
 
 @dataclass(frozen=True)
 class Cycles:
-    """What a run of the loops takes, in the numbers that they compute with."""
+    """Samples and start of a run of the loops, in the numbers of their code."""
 
     samples: Mapping[str, Array]  # of every cycle by the names of the loops' inputs, (count, elements)
     start: Mapping[str, Array]  # values at the start that are not zero, (1, elements)
@@ -291,7 +291,7 @@ class Loops:
         return stored(values, self.number, argument, kernel)
 
     def in_si(self, name: str, values: Array) -> Array:
-        """Return what a loop returned, by the name of the argument, as numbers in SI units."""
+        """Return an output of a loop, by the name of the argument, as numbers in SI units."""
         return in_si(values, self._arguments.get(name, (None, ""))[0])
 
     def run(self, cycles: Cycles) -> tuple[Array, Array]:
@@ -343,7 +343,7 @@ class Loops:
         return {signal.name: np.zeros((1, signal.size), kind) for signal in self.wires.memory}
 
     def _fast_cycles(self, cycles: Cycles) -> dict[str, Array]:
-        """Return what the fast loop hands to each slow cycle.
+        """Return the outputs of the fast loop for each slow cycle.
 
         In floating point the sums begin at zero in every slow cycle, so that all slow cycles run side by side.
         """

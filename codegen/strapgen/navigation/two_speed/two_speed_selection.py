@@ -44,7 +44,7 @@ from strapgen.lab.quantization_noise import polynomial_noise
 from strapgen.lab.runs import Run, drift_between
 from strapgen.navigation.systems import system_file, system_generation
 from strapgen.navigation.systems.budget import measured_budget
-from strapgen.navigation.systems.fitting import Fitted, fitted
+from strapgen.navigation.systems.fitting import GeneratedStages, fitted
 from strapgen.navigation.systems.system_runner import system_runner
 from strapgen.navigation.systems.system_runs import simulate_system
 from strapgen.navigation.systems.wiring import Description, wired
@@ -245,13 +245,13 @@ class TwoSpeedLoops:
         return vector + float(turning_of_matrices(proper)) * local / (shortest - local)
 
     @cached_property
-    def fixed(self) -> Fitted:
+    def fixed(self) -> GeneratedStages:
         """The generated loops in fixed point; samples have the format of their sum."""
         settings = Settings.of(word=self.brief.processor.word)
         loose = fitted(self._description(""), "c-fixed", settings)
         return fitted(self._description(self._formats(loose)), "c-fixed", settings)
 
-    def _formats(self, loose: Fitted) -> str:
+    def _formats(self, loose: GeneratedStages) -> str:
         """Return the line of a file that has samples in the format of their sum."""
         text = loose.arguments["fast_angle_sum"].format
         return f'formats = {{ increment = "{text}", previous_increment = "{text}" }}\n'
@@ -297,7 +297,7 @@ class TwoSpeedLoops:
         return self
 
     def runner(self) -> TwoSpeedLoops:
-        """Return what has `propagate` and `matrices`, see `random_runs.SteadyRuns`."""
+        """Return the object with `propagate` and `matrices`, see `random_runs.SteadyRuns`."""
         return self
 
     def propagate(self, increments: Any, record_every: int = 1, initial: Any = None) -> Any:
@@ -333,7 +333,7 @@ class TwoSpeedLoops:
         runner = system_runner(self._description(""), "numpy")
         return simulate_system(runner, motion, steps * self.step, record)
 
-    def rounded_apart(self, motion: Motion, steps: int, carry: str) -> float:
+    def rounding_drift(self, motion: Motion, steps: int, carry: str) -> float:
         """Return the drift between the integer model and its reference on the same motion."""
         name, steps = reference(self.brief, steps)
         settings = Settings.of(word=self.brief.processor.word)

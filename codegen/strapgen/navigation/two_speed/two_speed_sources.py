@@ -308,7 +308,7 @@ def whole(name: str, title: str, command: str, system: DescribedSystem, loops: S
 
 
 def _cost(which: str, loop: Sources) -> str:
-    """Return the operations of a loop and what a call of it may be off, in words."""
+    """Return the operations of a loop and the error bounds of a call, in words."""
     errors = ", ".join(f"{name} {above(error, 4)}" for name, error in loop.largest_errors.items())
     bound = f"error of a call at most: {errors}" if errors else "no error bound is known"
     return f"_{which}: {loop.cost}; {bound}"
@@ -332,7 +332,7 @@ def _numbers(loop: Sources) -> _Numbers:
 
 
 def _contracts(loops: Sequence[Sources]) -> dict[str, object]:
-    """Return what the header says about fixed point: arguments by name, and the error feedback of each loop."""
+    """Return the contract of fixed point for the header: arguments by name, and the error feedback of each loop."""
     interfaces = {which: loop.fixed for which, loop in zip(LOOPS, loops, strict=True) if loop.fixed}
     arguments: dict[str, Argument] = {}
     for interface in interfaces.values():

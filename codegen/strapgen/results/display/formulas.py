@@ -138,7 +138,7 @@ class KernelResult(Result):
         )
 
     def text(self) -> str:
-        """Return what is shown: the formulas, their LaTeX, the program or its operations."""
+        """Return the selected part: the formulas, their LaTeX, the program or its operations."""
         if self.shown == "latex":
             return as_latex(self.of_kernel)
         if self.of_program is None or self.shown == "text":
