@@ -31,6 +31,9 @@ cli.generate_command generate
 cli.generate_command request
 cli.options MethodOptions.choose
 catalogue.choosing choose
+catalogue.choice named
+ir.checks require
+registry Merged.__contains__
 catalogue.choosing _choose_method
 cli.fixed_options FixedOptions.check_increments
 storage.cache cached.<locals>.decorate.<locals>.recall

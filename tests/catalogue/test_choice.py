@@ -239,7 +239,7 @@ def test_the_default_is_fourth_order_on_two_increments():
         (("dcm", "rk5"), ["method 'rk5'", "rk4", "strapgen list methods shows all"]),
         (("dcm", "rk4", 0), ["increments", "0", "1 to 8"]),
         (("dcm", "rk4", MOST_INCREMENTS + 1), ["increments", "9", "1 to 8"]),
-        (("dcm", "rk4", 2.0), ["increments", "2.0", "1 to 8"]),
+        (("dcm", "rk4", 2.5), ["increments", "2.5", "1 to 8"]),
         (("dcm", "rk4", True), ["increments", "True", "1 to 8"]),
         (("error-matrix", "rk4"), ["error-matrix", "method", "rk4", *ALGORITHMS]),
         (("error-matrix", None, 2), ["error-matrix", "increments", "2", *ALGORITHMS]),

@@ -161,7 +161,7 @@ def test_nobody_is_the_administrator_only_where_the_namespace_has_neither(
     users, owner, is_outside, monkeypatch
 ):
     files = {"/proc/self/uid_map": users, "/proc/sys/kernel/overflowuid": f"{STRANGER}\n"}
-    monkeypatch.setattr(Path, "read_text", lambda self: files[str(self)])
+    monkeypatch.setattr(Path, "read_text", lambda self, **_: files[str(self)])
     assert ownership._is_outside.__wrapped__(owner) is is_outside
 
 
