@@ -227,7 +227,7 @@ def orthonormalized() -> Kernel:
         for number, row in enumerate(rows, 1)
     ]
     for signal, row, other, factor in zip(ROWS, rows, rows[::-1], factors, strict=True):
-        build.feedback(signal, factor * row - half * other)
+        build.output(after(signal), factor * row - half * other)
     return build.kernel(
         "dcm-two-rows-orthonormalize",
         f"{_TITLE}: made orthonormal, to first order",
