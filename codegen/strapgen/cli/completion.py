@@ -48,7 +48,7 @@ def answer(run: Callable[[list[str]], Any]) -> int:
     """
     asks_for_files = os.environ.get("_TYPER_COMPLETE_FISH_ACTION") == "is-args"
     status: Any = int(asks_for_files)
-    with contextlib.redirect_stderr(io.StringIO()):
+    with contextlib.redirect_stderr(io.StringIO()), _one_line_each():
         try:
             run(_line())
             sys.stdout.flush()
@@ -58,6 +58,19 @@ def answer(run: Callable[[list[str]], Any]) -> int:
             with contextlib.suppress(OSError, ValueError):  # the shell has gone
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return int(bool(status)) if asks_for_files else 0
+
+
+@contextlib.contextmanager
+def _one_line_each() -> Iterator[None]:
+    """Let Rich, through which Typer writes meanings, break no line: fish would read the rest as another word."""
+    before = os.environ.get("COLUMNS")
+    os.environ["COLUMNS"] = "10000"
+    try:
+        yield
+    finally:
+        os.environ.pop("COLUMNS")
+        if before is not None:
+            os.environ["COLUMNS"] = before
 
 
 def _line() -> list[str]:
