@@ -14,7 +14,7 @@ from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.catalogue.methods.coning_coefficients import design
 from strapgen.firmware.check_code import coning_causes as causes
-from strapgen.firmware.check_code.check_foreign import ForeignResult, check_foreign
+from strapgen.firmware.check_code.check_foreign import check_foreign
 from strapgen.firmware.check_code.foreign import Convention, ForeignStep
 from strapgen.firmware.check_code.foreign_arguments import ForeignSource, read_arguments
 from strapgen.firmware.check_code.ladder import closed_form_deg_h, cone
@@ -171,7 +171,7 @@ def test_a_fault_is_seen_and_named(name):
     outcome = check_foreign(example(name))
     assert (outcome.holds, outcome.cause) == (False, FAULTS[name])
     assert failed(outcome) == (["runs"] if name == "state_kept.c" else ["coefficients", "order", "drift"])
-    data = json.loads(ForeignResult(outcome, "integrator_update").written("json"))
+    data = json.loads(outcome.written("json"))
     old = {"file", "holds", "order", "drift_deg_h", "closed_form_deg_h", "cause", "checks"}
     assert data.keys() == old | {"schema", "drift_by_axis_deg_h", "coefficients", "coefficient_ratio"}
     assert math.hypot(*data["drift_by_axis_deg_h"]) == pytest.approx(outcome.drift_deg_h)

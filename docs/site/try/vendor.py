@@ -140,7 +140,7 @@ def write(folder: Path, downloads: Path) -> None:
         "bytes": len(data)
         + sum((folder / "pyodide" / n).stat().st_size for n in _PYTHON if not n.endswith(".js")),
         "version": strapgen.__version__,
-        "algorithms": ALGORITHMS,
+        "algorithms": dict(ALGORITHMS),
         "methods": {title: {name: METHODS[name] for name in names} for title, names in GROUPS.items()},
         "most_increments": MOST_INCREMENTS,
     }
