@@ -33,7 +33,7 @@ class PlainCommand(TyperCommand):
         if not ctx.resilient_parsing:  # else a shell completes the line
             _refuse_missing_values(self, ctx, args)
             _refuse_second_values(self, ctx, args)
-            if name := _value_of("--variant", args):
+            if name := value_of(args, "--variant"):
                 ctx.default_map = _words_of_variant(self, ctx, name, args)
         return list(super().parse_args(ctx, args))
 
@@ -72,12 +72,12 @@ def _words_of_variant(command: Any, context: Any, name: str, words: Sequence[str
     }
 
 
-def _value_of(option: str, words: Sequence[str]) -> str:
-    """Return the value of an option of a command line; "" if it is not there."""
+def value_of(words: Sequence[str], *options: str) -> str:
+    """Return the value of an option, by any of its names, in a command line; "" if it is not there."""
     for word, following in pairwise([*words, ""]):
         if word == "--":
             break
-        if word.partition("=")[0] == option:
+        if word.partition("=")[0] in options:
             return word.partition("=")[2] or following
     return ""
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -197,7 +196,7 @@ def _words(
         if (
             key == "word"
             and "backend" in keys
-            and _given(arguments, "--backend", "--backends") != "fixed-model"
+            and program.value_of(arguments, "--backend", "--backends") != "fixed-model"
         ):
             continue  # the back end has its word
         if key == "word" and isinstance(value, list | tuple):
@@ -214,10 +213,10 @@ def _is_fixed(variant: Variant, options: CommandOptions, arguments: Sequence[str
     from strapgen.targets import TARGETS
 
     if "backend" in {_key(option) for option in options.options.values()}:
-        named = _given(arguments, "--backend", "--backends") or _backend(variant)
+        named = program.value_of(arguments, "--backend", "--backends") or _backend(variant)
         return all(name in BACKENDS and BACKENDS[name].fixed for name in named.split(","))
     # Several targets of which one alone is fixed are refused by the command.
-    targets = (_given(arguments, "--target") or ",".join(variant.targets)).split(",")
+    targets = (program.value_of(arguments, "--target") or ",".join(variant.targets)).split(",")
     return any(name not in TARGETS or TARGETS[name].fixed for name in targets)
 
 
@@ -228,7 +227,7 @@ def _is_compiled(target: str) -> bool:
 
 
 def _target(variant: Variant, arguments: Sequence[str]) -> str:
-    return (_given(arguments, "--target") or variant.targets[0]).partition(",")[0]
+    return (program.value_of(arguments, "--target") or variant.targets[0]).partition(",")[0]
 
 
 def _backend(variant: Variant) -> str:
@@ -240,16 +239,6 @@ def _backend(variant: Variant) -> str:
     return next(
         (name for name in fitting if BACKENDS[name].word in (None, word)), next(iter(fitting), "numpy")
     )
-
-
-def _given(arguments: Sequence[str], *names: str) -> str:
-    """Return the value of an option of a command line; "" if it is not there."""
-    for word, following in pairwise([*arguments, ""]):
-        if word in names:
-            return following
-        if word.partition("=")[0] in names:
-            return word.partition("=")[2]
-    return ""
 
 
 # The keys of a variant
