@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice, state_name
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
@@ -51,8 +51,8 @@ class TwoSpeed:
 
     Parameters
     ----------
-    algorithm : str
-        "dcm" or "euler".
+    algorithm : str, Choice or AttitudeAlgorithm
+        "dcm" or "euler"; of an object its state counts alone, since the loops have a method of their own.
     sculling : int, optional
         Form of the sculling integral: 1 has the rotation compensation in the fast loop, 2 in the slow loop.
     backend : str, optional
@@ -95,14 +95,15 @@ class TwoSpeed:
 
     def __init__(
         self,
-        algorithm: str,
+        algorithm: AnyAlgorithm,
         sculling: int = 2,
         backend: str = "numpy",
         settings: Settings | None = None,
     ) -> None:
         target = BACKENDS[checks.choice("backend", backend, BACKENDS)].target
         chosen = fit_settings(backend, settings)
-        self._load(backend, loop_sources(algorithm, sculling, target, chosen))
+        state = state_name("TwoSpeed", algorithm, two_speed_sources.ALGORITHMS)
+        self._load(backend, loop_sources(state, sculling, target, chosen))
 
     @classmethod
     def of_sources(cls, name: str, sources: LoopSources) -> TwoSpeed:
