@@ -19,6 +19,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.comparison import certified_angle
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion
@@ -312,14 +313,15 @@ def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float
     return increments[:, choice.previous : choice.previous + choice.increments_per_step]
 
 
-def expected_noise(case: Case, pulse: float, increments: Any) -> float:
+@renamed_parameters(increments="samples")
+def expected_noise(case: Case, pulse: float, samples: Any) -> float:
     """Return the root mean square of the angle in deg that pulses cause in a run, if their errors are independent.
 
-    `pulse`: angle in rad. `increments` (N, K, 3): exact increments of the run in rad.
+    `pulse`: angle in rad. `samples` (N, K, 3): exact increments of the run in rad.
     """
     noise = noise_of(case.algorithm, case.method, case.increments)
-    turned = np.square(increments.sum(axis=1)).sum()
-    return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(increments))))
+    turned = np.square(samples.sum(axis=1)).sum()
+    return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(samples))))
 
 
 @lru_cache(maxsize=64)

@@ -179,7 +179,7 @@ def covers(choice: Choice, backend: str) -> bool:
         or window.gyro is not None
     ):
         return False
-    return window.increments == 1 and len(window.one_sided) == window.samples - 1
+    return window.increments == 1 and len(window.one_sided) == window.total_increments - 1
 
 
 def propagate_whole(

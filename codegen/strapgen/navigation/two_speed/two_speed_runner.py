@@ -19,6 +19,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem
 from strapgen.navigation.systems.system_runner import EXACT_BITS, SystemMemory, SystemRun, carried
@@ -134,9 +135,10 @@ class TwoSpeed:
         """The generated function of each loop by itself."""
         return tuple(map(self._runner.evaluator, self.loops))
 
+    @renamed_parameters(increments="samples")
     def run(
         self,
-        increments: Any,
+        samples: Any,
         velocity_increments: Any,
         *,
         fast_cycles: int,
@@ -149,7 +151,7 @@ class TwoSpeed:
 
         Parameters
         ----------
-        increments : array_like, (N, 3)
+        samples : array_like, (N, 3)
             Angle increments of the fast cycles in rad, body axes.
         velocity_increments : array_like, (N, 3)
             Velocity increments of the fast cycles in m/s, body axes.
@@ -175,7 +177,7 @@ class TwoSpeed:
         """
         fast_cycles = checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
         slow_cycles = checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
-        angles, velocities = _samples(increments, velocity_increments, fast_cycles * slow_cycles)
+        angles, velocities = _checked(samples, velocity_increments, fast_cycles * slow_cycles)
         ends = len(angles) // fast_cycles + 1
         rates = np.zeros((ends, 3)) if turns is None else turns
         rates = checks.real_array("turns", rates, (3,), np.float64)
@@ -212,18 +214,18 @@ class TwoSpeed:
         return run
 
 
-def _samples(increments: Any, velocity_increments: Any, cycle: int) -> tuple[Array, Array]:
-    """Check the increments, which fill whole navigation cycles of `cycle` fast cycles, and return them."""
-    angles = checks.real_array("increments", increments, (3,), np.float64)
+def _checked(samples: Any, velocity_increments: Any, cycle: int) -> tuple[Array, Array]:
+    """Check the samples, which fill whole navigation cycles of `cycle` fast cycles, and return them."""
+    angles = checks.real_array("samples", samples, (3,), np.float64)
     velocities = checks.real_array("velocity_increments", velocity_increments, (3,), np.float64)
     if angles.ndim != 2 or len(angles) % cycle:
         raise InputError(
-            f"increments has shape {angles.shape}; (N, 3) with N a multiple of {cycle}, "
+            f"samples has shape {angles.shape}; (N, 3) with N a multiple of {cycle}, "
             "whole navigation cycles, is needed"
         )
     if velocities.shape != angles.shape:
         raise InputError(
-            f"velocity_increments has shape {velocities.shape}; that of increments, {angles.shape}, is needed"
+            f"velocity_increments has shape {velocities.shape}; that of samples, {angles.shape}, is needed"
         )
     return angles, velocities
 
