@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -18,22 +18,20 @@ from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
 from strapgen.ir.renamed import renamed
+from strapgen.lab.recordings.log_file import LogFile, open_log
+from strapgen.lab.recordings.long_columns import (
+    PART,
+    Columns,
+    SampleIntervals,
+    largest_magnitude,
+    parts,
+    release,
+)
 from strapgen.lab.recordings.recorded_header import (
     ColumnLayout,
     known_unit,
     named_layout,
     rates_layout,
-)
-from strapgen.lab.recordings.recorded_rows import (
-    PART,
-    Columns,
-    LineNumbers,
-    RecordedRows,
-    SampleIntervals,
-    largest_magnitude,
-    parts,
-    read_rows,
-    release,
 )
 from strapgen.lab.runs import require_finite, require_proper
 from strapgen.run.backends import Backend
@@ -49,6 +47,12 @@ _INCREMENT_COLUMNS = {"t": "s", "dx": "rad", "dy": "rad", "dz": "rad"}
 _INERTIAL_COLUMNS = {**_INCREMENT_COLUMNS, "dvx": "m/s", "dvy": "m/s", "dvz": "m/s"}
 #: Largest relative departure of an interval from the median in an even recording.
 _EVEN = 1e-3
+
+#: From this interval on times in no stated unit may be in ms, us, ns or numbers of packets, in s.
+_LONG_INTERVAL = 0.5
+
+#: Returns where the columns stand, from the cells of the header and the number of cells of a row.
+_Find = Callable[[Sequence[str] | None, int], ColumnLayout]
 
 #: From this multiple of the median on, an interval is a gap in which the motion is not known.
 GAP = 10
@@ -330,7 +334,7 @@ def read_rates(
         raise InputError("bridge_gaps needs resample_hz, an even grid for the rate across a gap")
     has_time = sample_hz is None
     find = partial(rates_layout, unit=unit, columns=columns, time_unit=time_unit, has_time=has_time)
-    rows, layout = read_rows(path, find, sample_hz)
+    rows, layout = _read_rows(path, find, sample_hz)
     if layout.unit is None:
         raise InputError(
             f"{path} states no unit of the rates; --rate-unit is needed, {', '.join(RATE_UNITS)}"
@@ -339,12 +343,12 @@ def read_rates(
     remarks: list[str] = []
     if drop_repeated:
         rows = without_repeated(path, rows, remarks)
-    time, lines = rows.time, rows.lines
+    time = rows.time
     intervals, median = _checked_intervals(path, rows, bridge_gaps)
     if bridge_gaps:
         remarks += gap_remarks(rows, median)
     if resample_hz is None:
-        _require_even(path, intervals, median, lines, "resample_hz integrates them over an even grid")
+        _require_even(path, intervals, median, rows.place, "resample_hz integrates them over an even grid")
         interval = float((time[-1] - time[0]) / intervals.count)
         increments = integrals(rows, factor)
     else:
@@ -430,18 +434,99 @@ def propagate(
     return History(time, states, step, unused, backend.elements, backend)
 
 
+@dataclass(frozen=True)
+class RecordedRows:
+    """The rows of a file."""
+
+    #: (N,): times in s
+    time: Array
+    #: (N, columns): the other columns, as they stand
+    values: Array
+    #: Where a row stands in the file
+    place: Callable[[int], str]
+
+
+def _read_rows(
+    path: Path, find: _Find, sample_hz: float | str | Fraction | None = None
+) -> tuple[RecordedRows, ColumnLayout]:
+    """Read the columns of a table that are found by its header.
+
+    `sample_hz`: sampling rate in Hz of a file without times.
+    """
+    log = open_log(path)
+    names = log.topics[0].names
+    header = None if names == tuple(str(number + 1) for number in range(len(names))) else names
+    if not names:
+        raise _too_few(path, 0)
+    try:
+        layout = find(header, len(names))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    wanted = [names[place] for place in layout.places]
+    read = log.read("", wanted)
+    count = len(read[wanted[0]])
+    if count < 2:
+        raise _too_few(path, count)
+    values = Columns(len(wanted) - layout.has_time)
+    of_values = [read[name] for name in wanted[layout.has_time :]]
+    for first in range(0, count, PART):
+        values.append(np.column_stack([column[first : first + PART] for column in of_values]))
+        for column in of_values:
+            release(column)
+    if sample_hz is not None:
+        step = 1 / float(checks.number("sample_hz", sample_hz, positive=True))
+        stamps = step * np.arange(count, dtype=np.float64)
+    else:
+        times = Columns(1)
+        for _, part in parts(read[wanted[0]]):
+            times.append(part * float(units.TIMES[layout.time_unit or "s"]))
+        stamps = times.array()[:, 0]
+    rows = RecordedRows(stamps, values.array(), partial(log.place, ""))
+    _require_finite(log, rows, layout)
+    if layout.has_time and layout.time_unit is None:
+        _require_plausible(path, stamps)
+    return rows, layout
+
+
+def _too_few(path: Path, count: int) -> InputError:
+    return InputError(f"{path} holds {counted(count, 'row')} of numbers; at least 2 are needed")
+
+
+def _require_finite(log: LogFile, rows: RecordedRows, layout: ColumnLayout) -> None:
+    for first, part in parts(rows.values):
+        table = np.column_stack([rows.time[first : first + len(part)], part])[:, not layout.has_time :]
+        bad = ~np.isfinite(table)
+        if bad.any():
+            row, column = np.argwhere(bad)[0]
+            raise InputError(
+                f"{log.path}, {rows.place(first + int(row))}: column {layout.places[column] + 1} is "
+                f"{table[row, column]}; a finite number is needed"
+            )
+
+
+def _require_plausible(path: Path, time: Array) -> None:
+    """Refuse times without a unit whose intervals are no gyro's in s."""
+    with np.errstate(over="ignore"):  # times that are too far apart are refused as such
+        median = float(np.median(np.abs(np.diff(time[: 1 << 12]))))
+    if _LONG_INTERVAL <= median < np.inf:
+        raise InputError(
+            f"{path}: the time states no unit and grows by {median:g} from row to row; --time-unit s, ms, us or ns "
+            "says what it is, or --sample-hz the sampling rate"
+        )
+
+
 def _checked_intervals(
     path: Path, rows: RecordedRows, bridged: bool = False
 ) -> tuple[SampleIntervals, float]:
     """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
-    time, lines = rows.time, rows.lines
+    time, place = rows.time, rows.place
     if not math.isfinite(float(time[-1]) - float(time[0])):
         raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
     intervals = SampleIntervals(time)
     shortest, worst = intervals.shortest
     if shortest <= 0:
         raise InputError(
-            f"{path}, line {lines[worst + 1]}: "
+            f"{path}, {place(worst + 1)}: "
             f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
             + ("; --drop-repeated leaves out rows with the same time" if shortest == 0 else "")
         )
@@ -449,7 +534,7 @@ def _checked_intervals(
     longest, widest = intervals.longest
     if longest > GAP * median and not bridged:
         raise InputError(
-            f"{path}, line {lines[widest + 1]}: a gap of {longest:.6g} s; "
+            f"{path}, {place(widest + 1)}: a gap of {longest:.6g} s; "
             f"the median interval is {median:.6g} s, and up to {GAP} times that is allowed; --bridge-gaps with "
             "--resample-hz takes the rate as linear across it"
         )
@@ -457,13 +542,13 @@ def _checked_intervals(
 
 
 def _require_even(
-    path: Path, intervals: SampleIntervals, median: float, lines: LineNumbers, remedy: str
+    path: Path, intervals: SampleIntervals, median: float, place: Callable[[int], str], remedy: str
 ) -> None:
     departure, worst = intervals.farthest(median)
     interval = intervals.at(worst)
     if departure > _EVEN * median:
         raise InputError(
-            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {interval:.6g} s "
+            f"{path}, {place(worst + 1)}: sample times are not even: the interval of {interval:.6g} s "
             f"before it is the worst, the median is {median:.6g} s; {remedy}"
         )
 
@@ -474,9 +559,9 @@ def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, flo
     def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
         return named_layout(header, width, [*columns], [*columns.values()])
 
-    rows, _ = read_rows(path, find)
+    rows, _ = _read_rows(path, find)
     intervals, median = _checked_intervals(path, rows)
-    _require_even(path, intervals, median, rows.lines, "increments are needed at even times")
+    _require_even(path, intervals, median, rows.place, "increments are needed at even times")
     interval = float((rows.time[-1] - rows.time[0]) / intervals.count)
     return float(rows.time[0]) - interval, interval, rows.values
 
@@ -495,21 +580,19 @@ def without_repeated(path: Path, rows: RecordedRows, remarks: list[str]) -> Reco
     dropped = int(len(is_new) - is_new.sum())
     if not dropped:
         return rows
-    first = rows.lines[int(np.argmin(is_new))]
+    first = rows.place(int(np.argmin(is_new)))
     remarks.append(
-        f"{counted(dropped, 'row')} with the time of the row before left out, the first in line {first}"
+        f"{counted(dropped, 'row')} with the time of the row before left out, the first in {first}"
     )
-    lines = LineNumbers()
-    for place, row in enumerate(np.flatnonzero(is_new)):
-        lines.add(place, [rows.lines[int(row)]])
-    return RecordedRows(rows.time[is_new], rows.values[is_new], lines)
+    kept = np.flatnonzero(is_new)
+    return RecordedRows(rows.time[is_new], rows.values[is_new], lambda row: rows.place(int(kept[row])))
 
 
 def gap_remarks(rows: RecordedRows, median: float) -> list[str]:
     """Return a remark for each gap that is bridged."""
     steps = np.diff(rows.time)
     return [
-        f"a gap of {steps[place]:.6g} s before line {rows.lines[int(place) + 1]}, from {rows.time[place]:.6g} s on, is "
+        f"a gap of {steps[place]:.6g} s before {rows.place(int(place) + 1)}, from {rows.time[place]:.6g} s on, is "
         "bridged: the rate is taken as linear across it"
         for place in np.flatnonzero(steps > GAP * median)
     ]
