@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strapgen.lab.recordings.recorded_header import ColumnLayout, named_layout
 
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings import recorded_rows, recording
-from strapgen.lab.recordings.recorded_header import ColumnLayout, named_layout
 from strapgen.lab.recordings.recorded_rows import (
     Columns,
     LineNumbers,

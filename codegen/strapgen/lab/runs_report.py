@@ -245,7 +245,12 @@ def _matrix_lines(run: Run, record: int) -> list[str]:
 def history_table(history: History) -> TextTable:
     """Return an attitude history as a table."""
     rows = np.column_stack([history.time, history.states.reshape(len(history.time), -1)]).tolist()
-    return table_of(["time_s", *history_elements(history)], rows)
+    names = ["time_s", *history_elements(history)]
+    if history.piece is not None:
+        names.insert(1, "piece")
+        for row, piece in zip(rows, history.piece.tolist(), strict=True):
+            row.insert(1, piece)
+    return table_of(names, rows)
 
 
 def settings_text(settings: dict[str, Any]) -> str:
@@ -266,13 +271,16 @@ class AttitudeRecords:
     time_s: Array
     #: The elements at each time
     attitude: Array
+    #: Number of the piece between gaps of the recording
+    piece: Array | None = field(default=None, metadata=entry(optional=True))
 
     @staticmethod
     def of(history: History) -> AttitudeRecords:
         """Return the records of a history."""
         time, states = history.time, history.states.reshape(len(history.time), -1)
         length = float(time[-1] - time[0])
-        return AttitudeRecords(history.step, length, history.unused, history_elements(history), time, states)
+        elements = history_elements(history)
+        return AttitudeRecords(history.step, length, history.unused, elements, time, states, history.piece)
 
 
 @dataclass(frozen=True)
