@@ -1,38 +1,33 @@
-"""Rows of recorded files: numpy reads blocks of plain ones, and the result is that of reading each by itself."""
+"""Tables of text: numpy reads blocks of plain rows, and the result is that of reading each cell by itself."""
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import lzma
+import math
 import tempfile
 import tracemalloc
-from collections.abc import Sequence
-from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strapgen.lab.recordings.recorded_header import ColumnLayout, named_layout
 
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.recordings import recorded_rows, recording
-from strapgen.lab.recordings.recorded_rows import (
-    Columns,
-    LineNumbers,
-    SampleIntervals,
-    largest_magnitude,
-    parts,
-    read_rows,
-)
-
-NAMES = ("t", "dx", "dy", "dz")
+from strapgen.lab.recordings import long_columns, recording
+from strapgen.lab.recordings.formats import csv_table
+from strapgen.lab.recordings.formats.csv_table import CsvTable, LineNumbers
+from strapgen.lab.recordings.formats.decimals import Marks
+from strapgen.lab.recordings.log_file import LogColumn, open_log
+from strapgen.lab.recordings.long_columns import Columns, SampleIntervals, largest_magnitude, parts
 
 PLAIN = st.sampled_from(
     ["0", "1.5", "-2e-3", " 3 ", "+4", ".5", "1e400", "1_0", "nan", "", "x", "0x1p3", "٣", '"7"', '"8\n"']
 )
 ROWS = st.lists(PLAIN, min_size=3, max_size=6).map(",".join) | st.sampled_from(
-    ["", " ", "t,dx,dy,dz", "dz,dy,dx,t"]
+    ["", " ", "t,dx,dy,dz", "dz,dy,dx,t", "# 1", "#1,2,3,4"]
 )
 
 READERS = {
@@ -44,51 +39,140 @@ READERS = {
 steps = st.floats(1e-300, 1e300) | st.sampled_from([1e-3, 1e-3 * (1 + 1e-15), 2e-3])
 
 
-def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
-    """Return the layout of a file of increments, whose times are in s."""
-    layout = named_layout(header, width, NAMES, ("s", "rad", "rad", "rad"))
-    return replace(layout, time_unit="s")
-
-
-def outcome(path: Path) -> object:
+def outcome(path: Path) -> str:
     """Return what a file holds, or why it is refused."""
     try:
-        rows, _ = read_rows(path, find)
+        log = open_log(path)
+        columns = log.read("", log.topics[0].names)
     except InputError as error:
         return str(error)
-    count = len(rows.time)
-    return rows.time.tolist(), rows.values.tolist(), [rows.lines[k] for k in range(count)]
+    values = {name: (column.dtype, column.tolist()) for name, column in columns.items()}
+    count = len(columns["1"])
+    return repr((values, [log.place("", row) for row in range(count)]))
 
 
-@given(st.lists(ROWS, max_size=30), st.sampled_from(["\n", "\r\n", "\r"]))
-def test_blocks_equal_single_rows(lines, end):
+@given(st.lists(ROWS, max_size=30), st.sampled_from(["\n", "\r\n", "\r"]), st.sampled_from([16, 50, 1000]))
+def test_blocks_equal_single_cells(lines, end, block):
     path = Path(tempfile.gettempdir()) / f"rows-{np.random.default_rng().integers(1 << 60)}.csv"
-    good = [f"{k},{k},{k},{k}" for k in range(4)]
+    good = [f"{k},{k},{k},{k}" for k in range(20)]
     path.write_bytes(end.join([*good, *lines, *good, ""]).encode())
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(recorded_rows, "_BLOCK", 3)
-            by_block = outcome(path)
-            patch.setattr(recorded_rows._Reading, "_plain", lambda self, block: None)
-            assert outcome(path) == by_block
+            patch.setattr(csv_table, "_SAMPLE", 20)
+            patch.setattr(csv_table, "_BLOCK", 1000)
+            whole = outcome(path)
+            patch.setattr(CsvTable, "_marks", lambda self, block: None)
+            assert outcome(path) == whole
+            patch.undo()
+            patch.setattr(csv_table, "_SAMPLE", 4)
+            patch.setattr(csv_table, "_BLOCK", block)
+            assert outcome(path) == whole
     finally:
         path.unlink()
 
 
 def test_most_blocks_are_read_by_numpy(tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded_rows, "_BLOCK", 10)
+    monkeypatch.setattr(csv_table, "_BLOCK", 80)
     path = tmp_path / "gyro.csv"
-    path.write_text("t,dz,dy,dx\n" + "".join(f"{k},3,2,1\n" for k in range(100)))
-    plain, taken = recorded_rows._Reading._plain, []
-    monkeypatch.setattr(
-        recorded_rows._Reading,
-        "_plain",
-        lambda self, block: taken.append(numbers := plain(self, block)) or numbers,
+    path.write_text("t,dz,dy,dx\n" + "".join(f"{k},3,2,1\n" for k in range(10, 110)))
+    monkeypatch.setattr(csv_table, "csv_rows", lambda *_: pytest.fail("row by row"))
+    log = open_log(path)
+    columns = log.read("", ["t", "dx", "dz"])
+    assert [columns[name].tolist() for name in columns] == [[*range(10, 110)], [1] * 100, [3] * 100]
+    assert [log.place("", row) for row in (0, 8, 9, 99)] == ["line 2", "line 10", "line 11", "line 101"]
+
+
+decimal = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False).map(repr),
+    st.floats(-10, 10).map("{:.18e}".format),
+    st.floats(-1e5, 1e5).map("{:.6f}".format),
+    st.integers(-(2**64), 2**64).map(str),
+    st.from_regex(r"\A[-+]?[0-9]{0,20}[.]?[0-9]{0,20}([eE][-+]?[0-9]{0,4})?\Z"),
+    st.text("0123456789.eE+- x", max_size=12),
+)
+
+
+@given(st.lists(st.tuples(decimal, decimal), min_size=1, max_size=20))
+def test_decimals_are_rounded_as_python_rounds_them(rows):
+    marks = Marks("".join(f"{x};{y}\n" for x, y in rows).encode(), b";", 2)
+    assert marks.is_plain and marks.rows == len(rows)
+    for place, cells in enumerate(zip(*rows, strict=True)):
+        doubles, integers, is_read, are_integers = marks.numbers(place)
+        for cell, double, integer, good in zip(cells, doubles, integers, is_read, strict=True):
+            if good:  # others are left to Python
+                assert math.copysign(1, double) == math.copysign(1, float(cell)) and double == float(cell)
+                assert not are_integers or integer == int(cell)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    ["0", "-0", "12", "-7.25", "3.141592653589793", "1e-3", "-2.5E+03", "1403636579758555392", "+.5", "5."],
+)
+def test_usual_decimals_are_not_left_to_python(cell):
+    assert Marks(f"{cell}\n".encode(), b",", 1).numbers(0)[2].all()
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("t,x\n0,1\n1,2\n", "t,x"),
+        ("0,1\n1,2\n", "1,2"),
+        ("# log of today\n# t;x\n0;1\n1;2\n", "t,x"),
+        ("t|x\n0|1\n1|2\n", "t,x"),
+        ("t\tx\n0\t1\n1\t2\n", "t,x"),
+        ("t  x \n 0  1\n 1  2\n", "t,x"),
+        ("t;x\n0,0;1,0\n1,0;2,0\n", "t,x"),
+        ("0,0 1,0\n1,0 2,0\n", "1,2"),
+        ('"t","x"\n"0","1"\n"1","2"\n', "t,x"),
+        ("t,x,\n0,1,\n1,2,\n", "t,x"),
+        ("t,x\n0,1,\n1,2,\n", "t,x"),
+        ("Logger 7\nRate,100,Hz\n\nt,x\ns,deg/s\n0,1\n\n1,2\n", "t,x"),
+        ("x,x\n0,1\n1,2\n", "x,x.2"),
+        (",x\n0,1\n1,2\n", "1,x"),
+        ("t,x\n0,1\n# a break\n1,2\n", "t,x"),
+    ],
+)
+def test_tables_as_loggers_write_them(text, names, tmp_path):
+    path = tmp_path / "gyro.csv"
+    path.write_text(text)
+    log = open_log(path)
+    assert log.topics[0].names == tuple(names.split(","))
+    assert [column.tolist() for column in log.read("", names.split(",")).values()] == [[0, 1], [1, 2]]
+
+
+def test_units_in_brackets_or_below_the_header(tmp_path):
+    path = tmp_path / "gyro.csv"
+    path.write_text("#timestamp [ns],w_RS_S_x [rad s^-1],gyro[2],T (°C)\n1,2,3,4\n", encoding="latin-1")
+    units = [column.unit for column in open_log(path).topics[0].columns]
+    assert units == ["ns", "rad/s", None, "degc"]
+    path.write_text("Time,GyroX,Label\n(s),(deg/s),\n1,2,3\n")
+    assert open_log(path).topics[0].columns == (
+        LogColumn("Time", "s"),
+        LogColumn("GyroX", "deg/s"),
+        LogColumn("Label"),
     )
-    rows, _ = read_rows(path, find)
-    assert len(taken) == 11 and all(numbers is not None for numbers in taken)
-    assert rows.values.tolist() == [[1, 2, 3]] * 100
-    assert [rows.lines[k] for k in (0, 8, 9, 99)] == [2, 10, 11, 101]
+
+
+def test_stamps_keep_their_digits(tmp_path):
+    path = tmp_path / "gyro.csv"
+    stamps = [2**63 - 1, 1403636579758555392, -(2**53) - 1]
+    path.write_text("".join(f"{stamp},0.5\n" for stamp in stamps))
+    column = open_log(path).read("", ["1"])["1"]
+    assert column.dtype == np.int64 and column.tolist() == stamps
+    path.write_text("".join(f"{stamp},0.5\n" for stamp in [*stamps, 2**63]))
+    column = open_log(path).read("", ["1"])["1"]
+    assert column.dtype == np.float64 and column.tolist() == [float(stamp) for stamp in [*stamps, 2**63]]
+
+
+@pytest.mark.parametrize("compress", [gzip.compress, bz2.compress, lzma.compress])
+def test_compressed_tables(compress, tmp_path):
+    path = tmp_path / "gyro.csv"
+    whole = compress("".join(f"{k},{k * k}\n" for k in range(5000)).encode())
+    path.write_bytes(whole)
+    assert open_log(path).read("", ["2"])["2"].tolist() == [k * k for k in range(5000)]
+    path.write_bytes(whole[:-20])
+    with pytest.raises(InputError, match=r"^.*gyro.csv cannot be read \("):
+        open_log(path).read("", ["2"])
 
 
 @given(st.lists(st.tuples(st.booleans(), st.lists(st.integers(1, 3), min_size=1, max_size=5)), max_size=8))
@@ -106,10 +190,10 @@ def test_line_numbers_come_back(blocks):
 
 @pytest.fixture
 def on_disk(monkeypatch):
-    monkeypatch.setattr(recorded_rows, "_IN_MEMORY", 1000)
-    for module in (recorded_rows, recording):
+    monkeypatch.setattr(long_columns, "_IN_MEMORY", 1000)
+    for module in (long_columns, recording):
         monkeypatch.setattr(module, "PART", 1000)
-    monkeypatch.setattr(recorded_rows, "_BLOCK", 1000)
+    monkeypatch.setattr(csv_table, "_BLOCK", 10_000)
 
 
 def long_file(path: Path, count: int) -> Path:
@@ -164,7 +248,7 @@ def test_grid_points_at_part_boundaries_give_the_same_bits(rng, tmp_path, monkey
     rates = rng.normal(size=(200, 3)).tolist()
     path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
     at_once = recording.read_rates(path, "rad/s", 64).samples
-    for module in (recorded_rows, recording):
+    for module in (long_columns, recording):
         monkeypatch.setattr(module, "PART", 4)
     np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).samples, at_once)
 
@@ -172,8 +256,8 @@ def test_grid_points_at_part_boundaries_give_the_same_bits(rng, tmp_path, monkey
 @pytest.fixture
 def few_on_disk(monkeypatch, tmp_path):
     """Keep all but the shortest columns on the disk, and work on few rows together."""
-    monkeypatch.setattr(recorded_rows, "_IN_MEMORY", 10)
-    monkeypatch.setattr(recorded_rows, "PART", 4)
+    monkeypatch.setattr(long_columns, "_IN_MEMORY", 10)
+    monkeypatch.setattr(long_columns, "PART", 4)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
 
@@ -219,7 +303,7 @@ def test_interval_statistics_agree_with_numpy(numbers):
     time = np.cumsum([0.0, *numbers])
     exact = np.diff(time)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recorded_rows, "PART", 3)
+        patch.setattr(long_columns, "PART", 3)
         intervals = SampleIntervals(time)
         if intervals.shortest[0] <= 0:
             return  # refused before it is used
@@ -231,7 +315,7 @@ def test_interval_statistics_agree_with_numpy(numbers):
 
 
 def read(path: Path) -> list[tuple[int, list[str]]]:
-    return [*recorded_rows.csv_rows(path, chain.from_iterable(recorded_rows.line_blocks(path)))]
+    return [*csv_table.csv_rows(path, csv_table.line_blocks(path))]
 
 
 def test_rows_have_the_numbers_of_the_lines_at_which_they_end(tmp_path):
@@ -241,29 +325,29 @@ def test_rows_have_the_numbers_of_the_lines_at_which_they_end(tmp_path):
 
 
 def test_rows_at_the_limits_are_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded_rows, "MOST_ROWS", 3)
+    monkeypatch.setattr(csv_table, "MOST_ROWS", 3)
     path = tmp_path / "x.csv"
     path.write_text(
-        "1\n" + "x" * (recorded_rows.MOST_CHARACTERS - 1) + "\n" + "," * (recorded_rows.MOST_CELLS - 1) + "\n"
+        "1\n" + "x" * (csv_table.MOST_CHARACTERS - 1) + "\n" + "," * (csv_table.MOST_CELLS - 1) + "\n"
     )
-    assert [len(cells) for _, cells in read(path)] == [1, 1, recorded_rows.MOST_CELLS]
+    assert [len(cells) for _, cells in read(path)] == [1, 1, csv_table.MOST_CELLS]
 
 
-@pytest.mark.parametrize("block", [1, 2, 8192])
+@pytest.mark.parametrize("block", [8, 3000, 1 << 20])
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("1\n2\n3\n4\n", "{path} has over 3 lines; that is too many"),
         (
-            "1\n" + "x" * recorded_rows.MOST_CHARACTERS + "\n",
+            "1\n" + "x" * (csv_table.MOST_CHARACTERS + 1) + "\n",
             "{path}, line 2: over 20000 characters, which no line may have",
         ),
         ("1\n2\n" + "," * 1000, "{path}, line 3: 1001 cells; at most 1000 are allowed"),
     ],
 )
 def test_rows_beyond_the_limits_are_refused(text, said, block, tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded_rows, "MOST_ROWS", 3)
-    monkeypatch.setattr(recorded_rows, "_BLOCK", block)
+    monkeypatch.setattr(csv_table, "MOST_ROWS", 3)
+    monkeypatch.setattr(csv_table, "_BLOCK", block)
     path = tmp_path / "x.csv"
     path.write_text(text)
     with pytest.raises(InputError) as refusal:
@@ -274,16 +358,16 @@ def test_rows_beyond_the_limits_are_refused(text, said, block, tmp_path, monkeyp
 @pytest.mark.long
 def test_an_endless_line_is_refused():
     """The device never ends a line, nor itself."""
-    with pytest.raises(InputError, match="line 1: over 20000 characters"):
-        next(recorded_rows.line_blocks(Path("/dev/zero")))
+    with pytest.raises(InputError, match="zero bytes"):
+        next(csv_table.line_blocks(Path("/dev/zero")))
 
 
 def test_blocks_are_read_lazily(tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded_rows, "_BLOCK", 2)
+    monkeypatch.setattr(csv_table, "_BLOCK", 5)
     path = tmp_path / "x.csv"
     path.write_text("1\n2\n3\n4\n5\n")
-    blocks = recorded_rows.line_blocks(path)
-    assert next(blocks) == ["1\n", "2\n"]
+    blocks = csv_table.line_blocks(path)
+    assert next(blocks) == b"1\n2\n"
     with path.open("a") as file:
-        file.write("6\n")
-    assert [*blocks] == [["3\n", "4\n"], ["5\n", "6\n"]]
+        file.write("6")
+    assert b"".join(blocks) == b"3\n4\n5\n6\n"

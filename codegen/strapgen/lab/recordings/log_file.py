@@ -1,0 +1,41 @@
+"""A file of recorded tables, whatever its format: what is in it, and columns of numbers from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from strapgen.ir import checks
+from strapgen.lab.recordings.formats.csv_table import CsvTable
+from strapgen.lab.recordings.log_topic import LogColumn, LogTopic
+
+__all__ = ["LogColumn", "LogFile", "LogTopic", "open_log"]
+
+
+class LogFile(Protocol):
+    """An opened file."""
+
+    path: Path
+    #: "csv", "ulog", "dataflash", "tlog", "ros1", "ros2", "mcap", "mat", "hdf5", "parquet" or "feather"
+    format: str
+    topics: tuple[LogTopic, ...]
+    #: What is to be said of the file, a sentence each, as that it is truncated and what was whole
+    remarks: tuple[str, ...]
+
+    def read(self, topic: str, columns: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return columns of a topic, (rows,) each; integers stay integers, and long ones are on the disk.
+
+        A cell without a number is nan.
+        """
+
+    def place(self, topic: str, row: int) -> str:
+        """Return where a row stands that has been read, for an error: "line 17", "message 17", "row 17"."""
+
+
+def open_log(path: str | Path) -> LogFile:
+    """Open a file; its format follows from its first bytes and its suffix."""
+    path = checks.path("path", path)
+    return CsvTable(path)
