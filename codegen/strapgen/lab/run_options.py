@@ -253,7 +253,7 @@ class RecordingOptions:
         return self.place[0]
 
     def load(self, *, force: bool = False) -> Recording:
-        """Read the recorded data, and say what was taken for what."""
+        """Read the recorded data."""
         from strapgen.lab.recordings import recording
         from strapgen.lab.recordings.reading import Reading
 
@@ -282,9 +282,12 @@ class RecordingOptions:
             *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz),
         )
         with waiting(f"reading {file.name}"):
-            data = recording.recorded(file, topic, reading)
+            return recording.recorded(file, topic, reading)
+
+    def say_remarks(self, data: Recording) -> None:
+        """Say what was taken for what, once a run along a recording is not refused."""
         for remark in data.remarks:
-            terminal.remark(f"strapgen: {file}: {remark}")
+            terminal.remark(f"strapgen: {self.file}: {remark}")
         old = {
             "--increments-csv is now --recording, with --input increments": self.increments_csv,
             "--rates-csv is now --recording, with --input instants": self.rates_csv,
@@ -292,7 +295,6 @@ class RecordingOptions:
         }
         for text in (text for text, value in old.items() if value is not None):
             terminal.remark(f"strapgen: {text}")
-        return data
 
 
 @dataclass(frozen=True)
@@ -431,6 +433,7 @@ class SampleSource(RecordingOptions):
             raise InputError(
                 f"the recording holds {len(data.samples)} increments; a step needs {samples + beside}"
             )
+        self.say_remarks(data)
         say_unused(self.file, len(data.samples) - beside - steps * samples, samples)
         increments = windows(data.samples[: beside + steps * samples], samples, beside)
         length = data.interval * samples

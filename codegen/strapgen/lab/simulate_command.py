@@ -171,6 +171,7 @@ def _on_recording(
             )
         else:
             history = recording.propagate(backend, data, *options, start)
+    source.say_remarks(data)
     say_unused(source.file, history.unused, choice.increments_per_step)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = step_facts(backend, choice) | {"source": source.source} | source.facts

@@ -151,6 +151,7 @@ def strapdown(
     data = inertial(source, errors)
     covered = _course(algorithm, data, counts, backend, fixed, start)
     of_cycle = counts["fast_cycles"] * counts["slow_cycles"]
+    source.say_remarks(data)
     say_unused(source.file, covered.unused, of_cycle, "navigation cycle")
     facts = {"algorithm": f"{algorithm} in two speeds", "backend": backend, "source": source.source}
     facts |= {} if errors is None else {"errors": errors}

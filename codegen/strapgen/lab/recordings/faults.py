@@ -135,7 +135,7 @@ def _take_out_not_finite(samples: Samples, names: Sequence[str]) -> None:
         (name, cell) for name, cell in zip(names, cells[-len(names) :], strict=True) if not np.isfinite(cell)
     )
     several = "" if len(rows) == 1 else f"; {len(rows)} rows hold none"
-    samples.note("nan", len(rows), first, f"{name} is {cell:g}, and a finite number is needed{several}")
+    samples.note("nan", len(rows), first, f"column {name} is {cell:g}; a finite number is needed{several}")
     kept = np.ones(len(samples.time), bool)
     kept[rows] = False
     samples.keep(kept, [*map(int, rows)])
@@ -146,7 +146,9 @@ def _put_in_order(samples: Samples) -> None:
     if not back.size:
         return
     first = int(back[0]) + 1
-    words = f"time {samples.time[first]:.9g} s does not come after {samples.time[first - 1]:.9g} s"
+    words = (
+        f"its time lies {samples.time[first - 1] - samples.time[first]:.6g} s before that of the row before"
+    )
     order = np.argsort(samples.time, kind="stable")
     if np.abs(order - np.arange(len(order))).max() <= _DISPLACED:
         samples.note("order", len(back), first, f"{words}; {counted(len(back), 'row')} out of order")
@@ -166,13 +168,18 @@ def _take_out_repeated(samples: Samples) -> bool:
     if not repeated.size:
         return False
     first = int(repeated[0]) + 1
-    words = f"time {samples.time[first]:.9g} s is that of the row before"
+    words = "its time is that of the row before"
     if len(repeated) > _COARSE * len(samples.time):
         samples.note(
             "clock", len(repeated), first, f"{words}, as in {len(repeated)} rows: the clock is coarse"
         )
         return True
-    samples.note("repeats", len(repeated), first, f"{words}; {counted(len(repeated), 'row')} repeat a time")
+    samples.note(
+        "repeats",
+        len(repeated),
+        first,
+        f"{words}; {counted(len(repeated), 'row')} {'repeats' if len(repeated) == 1 else 'repeat'} a time",
+    )
     kept = np.ones(len(samples.time), bool)
     kept[repeated + 1] = False
     samples.keep(kept)
@@ -180,13 +187,21 @@ def _take_out_repeated(samples: Samples) -> bool:
 
 
 def _take_out_stuck(samples: Samples) -> None:
-    equal = np.zeros(len(samples.values), bool)
+    found: list[Array] = []
     for first, part in parts(samples.values, 1):
-        equal[first + 1 : first + len(part)] = (part[1:, :3] == part[:-1, :3]).all(axis=1)
-    if not equal.any() or equal.mean() > _RESTING:
+        found.append(first + 1 + np.flatnonzero((part[1:, :3] == part[:-1, :3]).all(axis=1)))
+        if sum(map(len, found)) > _RESTING * len(samples.values):
+            return
+    equal = np.concatenate(found)
+    if not equal.size:
         return
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
-    runs = [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2) if end - begin >= _STUCK - 1]
+    begins = np.flatnonzero(np.diff(equal, prepend=-2) > 1)
+    ends = np.append(begins[1:], len(equal))
+    runs = [
+        (int(equal[begin]), int(equal[end - 1]) + 1)
+        for begin, end in zip(begins, ends, strict=True)
+        if end - begin >= _STUCK - 1
+    ]
     if not runs:
         return
     count = sum(end - begin for begin, end in runs)
@@ -227,12 +242,10 @@ def _find_gaps(samples: Samples, is_coarse: bool, keep_times: bool) -> None:
     samples.gaps = [
         (int(k) + 1, max(1, round(float(step) / interval) - 1)) for k, step in zip(long, steps, strict=True)
     ]
-    is_long = np.zeros(len(time) - 1, bool)
-    is_long[long] = True
     worst = 0
     for first, part in parts(time, 1):
         departures = np.abs(np.diff(part) - interval) / interval
-        departures[is_long[first : first + len(departures)]] = 0
+        departures[long[(long >= first) & (long < first + len(departures))] - first] = 0
         place = int(departures.argmax())
         if departures[place] > samples.departure:
             samples.departure, worst = float(departures[place]), first + place

@@ -78,6 +78,8 @@ class Reading:
             has_time=self.sample_hz is None,
             with_force=self.force,
         )
+        if not any(one.columns for one in log.topics):
+            raise InputError(f"{log.path} holds 0 rows of numbers; at least 2 are needed")
         try:
             found, remark = meanings.find(log.topics, topic, stated)
         except InputError as error:
@@ -150,7 +152,7 @@ def increments(log: LogFile, topic: str, reading: Reading) -> Increments:
             f"{log.path} states no unit of the forces; --force-unit is needed, {', '.join(units.FORCES)}"
         )
     edges = [0, *(place for place, _ in samples.gaps), len(samples.time)]
-    every = _every(reading, samples.interval, remarks)
+    every = _every(reading, samples.interval, len(samples.time), remarks)
     table, breaks, left = Columns(samples.values.shape[1]), [], 0
     for first, last in pairwise(edges):
         before = table.rows
@@ -238,11 +240,14 @@ def _between(time: Array, start: Any, end: Any) -> tuple[int, int]:
     return first, max(first, last)
 
 
-def _every(reading: Reading, interval: float, remarks: list[str]) -> int:
+def _every(reading: Reading, interval: float, count: int, remarks: list[str]) -> int:
     """Return how many samples are summed into one."""
     if reading.near_hz is None:
         return int(reading.every)
-    every = max(1, round(1 / (interval * float(reading.near_hz))))
+    ratio = 1 / (interval * float(checks.number("resample_hz", reading.near_hz, positive=True)))
+    if not ratio < count:
+        raise InputError(f"resample_hz {reading.near_hz} makes no whole increment of {count} samples")
+    every = max(1, round(ratio))
     remarks.append(
         f"{counted(every, 'whole sample')} make an increment, {1 / (interval * every):.6g} Hz; --every {every} says so"
     )

@@ -91,6 +91,7 @@ def _on_recording(
     history = along_pieces(
         data, lambda piece: system_history(runner, piece, intervals.start()), runner.system.cycle
     )
+    source.say_remarks(data)
     facts = facts_of(runner, name) | {"source": source.source} | source.facts
     title = f"{name}, {backend}: attitude along {source.file.name}"
     replace(output, format=output.format or "csv").show(
@@ -227,6 +228,7 @@ def system_along(
         memory, _ = begun(runner, start.matrix())
     with waiting(f"running {name}"):
         course = system_course(runner, data, memory)
+    source.say_remarks(data)
     facts = facts_of(runner, name) | {"source": source.source}
     facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
