@@ -296,10 +296,12 @@ if not _typing.TYPE_CHECKING:  # a type checker would take any name for one that
 
     def __getattr__(name: str) -> object:
         # Loaded when first used: the command line answers before SymPy or numpy are imported.
-        if name in _EXPORTS:
-            return getattr(_importlib.import_module(f"{__name__}.{_EXPORTS[name]}"), name)
-        if name in _NAMESPACES:
-            return _importlib.import_module(f"{__name__}.{_NAMESPACES[name]}")
+        if place := _EXPORTS.get(name) or _NAMESPACES.get(name):
+            from strapgen.ir.applications import needing
+
+            with needing(f"strapgen.{name}"):
+                module = _importlib.import_module(f"{__name__}.{place}")
+            return getattr(module, name) if name in _EXPORTS else module
         if name in _RENAMED:
             from strapgen.ir.renamed import warn
 

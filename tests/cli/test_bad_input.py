@@ -475,8 +475,8 @@ BAD = {
     f"simulate euler --increments-csv {DATA}/increments.csv --resample-hz 50": "--resample-hz needs --rates-csv",
     # simulate: recorded data
     "simulate euler --increments-csv none.csv": "none.csv cannot be read (No such file or directory)",
-    "simulate euler --increments-csv nan.csv": "nan.csv, line 3: column 3 is 'nan'; a finite number is needed",
-    "simulate euler --rates-csv nan.csv --columns t,dx,dy,dz --rate-unit rad/s": "nan.csv, line 3: column 3 is 'nan'",
+    "simulate euler --increments-csv nan.csv": "nan.csv, line 3: column 3 is nan; a finite number is needed",
+    "simulate euler --rates-csv nan.csv --columns t,dx,dy,dz --rate-unit rad/s": "nan.csv, line 3: column 3 is nan",
     "simulate euler --increments-csv gap.csv": "gap.csv, line 5: a gap of 0.97 s",
     "simulate euler --rates-csv gap.csv --columns t,dx,dy,dz --rate-unit rad/s --resample-hz 100": "line 5: a gap",
     f"simulate euler --rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s": "sample times are not even",
