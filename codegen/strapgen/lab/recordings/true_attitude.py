@@ -8,20 +8,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.ir import checks
+from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
-from strapgen.lab.recordings import quaternions
+from strapgen.lab.recordings import meanings, quaternions
 from strapgen.lab.recordings.attitude_output import QUATERNIONS, SENSES, attitude_of
+from strapgen.lab.recordings.log_file import LogFile, open_log
+from strapgen.lab.recordings.meanings import AttitudeColumns
 from strapgen.lab.recordings.recording import History, Recording
+from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]
 
@@ -34,6 +38,8 @@ ALIGNMENTS = {
 }
 #: From this multiple of the median interval on, the attitude between two stamps is not known.
 GAP = 10
+#: From this interval on times in no stated unit may be in ms, us or ns, in s.
+_LONG_INTERVAL = 1.5
 #: Clocks that overlap by half the shorter record are taken as one, but for so many seconds.
 _SAME_CLOCK = 5.0
 #: Least overlap of two clocks as a part of the shorter record, and least correlation that tells an offset.
@@ -150,6 +156,67 @@ class TrueAttitude:
             stamps[kept], q if sense == "body-to-reference" else quaternions.inverse(q), tuple(remarks)
         )
 
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        topic: str = "",
+        *,
+        columns: str | None = None,
+        order: str | None = None,
+        sense: str = "body-to-reference",
+        time_unit: str | None = None,
+    ) -> TrueAttitude:
+        """Read a true attitude from a log of any format that `read` takes.
+
+        Parameters
+        ----------
+        path : path
+        topic : str, optional
+            Name of the table, by default the first that has an attitude.
+        columns : str, optional
+            Names or numbers of the columns where the log leaves them open, with commas between: the time, and a
+            quaternion or roll, pitch and heading.
+        order : str, optional
+            "xyzs" or "sxyz": the order of the quaternion, where names do not say it.
+        sense : str, optional
+            "body-to-reference" or "reference-to-body": what each turns.
+        time_unit : str, optional
+            "s", "ms", "us" or "ns", where the log has none.
+
+        Returns
+        -------
+        TrueAttitude
+
+        Raises
+        ------
+        InputError
+            If the log cannot be read, its columns are open, or `of` refuses what it holds.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> log = Path(tempfile.mkdtemp()) / "poses.tum"
+        >>> _ = log.write_text("0 0 0 0 0 0 0 1\\n1 0 0 0 0 0 1 0\\n")
+        >>> TrueAttitude.read(log).quaternions[1].tolist()
+        [0.0, 0.0, 1.0, 0.0]
+        """
+        log = open_log(path)
+        names = [one.name for one in log.topics]
+        if topic:
+            checks.choice("topic", topic, names)
+        for one in log.topics:
+            if topic not in ("", one.name):
+                continue
+            try:
+                layout = meanings.attitude(one, columns, order, time_unit)
+            except InputError as error:
+                if topic or len(names) == 1:
+                    raise InputError(f"{log.path}: {error}") from None
+                continue
+            return _of_columns(cls, log, one.name, layout, sense)
+        raise InputError(f"{log.path}: no topic has a time and an attitude; it has {checks.some(names)}")
+
     @cached_property
     def longest(self) -> float:
         """The interval in s from which on the attitude between two stamps is not known."""
@@ -161,6 +228,32 @@ class TrueAttitude:
         known = (time >= self.time[0]) & (time <= self.time[-1])
         known &= np.diff(self.time)[place] <= self.longest
         return quaternions.interpolated(self.time, self.quaternions, time), known
+
+
+def _of_columns(
+    cls: type[TrueAttitude], log: LogFile, topic: str, layout: AttitudeColumns, sense: str
+) -> TrueAttitude:
+    """Return the true attitude of some columns of a log."""
+    read = log.read(topic, [layout.time, *layout.columns])
+    time = read[layout.time] * float(units.TIMES[layout.time_unit or "s"])
+    values = np.column_stack([np.asarray(read[name], np.float64) for name in layout.columns])
+    if layout.time_unit is None and len(time) > 1 and np.median(np.abs(np.diff(time))) >= _LONG_INTERVAL:
+        raise InputError(
+            f"{log.path}: the truth's time states no unit and grows by {np.median(np.diff(time)):g} from row to row; "
+            "--true-time-unit s, ms, us or ns says what it is"
+        )
+    if not layout.order:
+        if layout.unit is None and np.nanmax(np.abs(values), initial=0) > 2 * math.pi:
+            raise InputError(
+                f"{log.path}: the angles state no unit, and are above 2 pi; a quaternion is needed"
+            )
+        angles = np.radians(values) if layout.unit == "deg" else values
+        values = evaluator("dcm-from-euler-angles")(angles)
+    try:
+        found = cls.of(time, values, order=layout.order or "xyzs", sense=sense)
+    except InputError as error:
+        raise InputError(f"{log.path}: {error}") from None
+    return replace(found, remarks=(*log.remarks, *found.remarks))
 
 
 def _left_out(rows: NDArray[np.bool_], what: str) -> list[str]:
@@ -444,7 +537,7 @@ class AttitudeError(Records):
             self.offset.in_words(),
             f"frames: {ALIGNMENTS[self.align]}{turns}",
             f"error angle: rms {math.sqrt(np.mean(angle**2)):.4g} deg, largest {angle.max():.4g} deg, at the end "
-            f"{angle[-1]:.4g} deg, at {len(angle)} instants from {self.time[0]:.6g} s to {self.time[-1]:.6g} s",
+            f"{angle[-1]:.4g} deg, at {len(angle)} instants from {self.time[0]:.12g} s to {self.time[-1]:.12g} s",
             f"slope of the angle {slope.deg_h:.4g} +- {slope.uncertainty_deg_h:.2g} deg/h; of the error about the "
             f"reference axes {by_axis} deg/h (least squares; standard deviations from the slopes between ten "
             "parts)",
@@ -511,8 +604,8 @@ def attitude_error(
         at, true, found = shown[known], true[known], computed[known]
     if len(at) < 2:
         raise InputError(
-            f"the truth is from {truth.time[0]:.9g} s to {truth.time[-1]:.9g} s, and the attitude from "
-            f"{shown[0]:.9g} s to {shown[-1]:.9g} s on its clock; they have to overlap"
+            f"the truth is from {truth.time[0]:.12g} s to {truth.time[-1]:.12g} s, and the attitude from "
+            f"{shown[0]:.12g} s to {shown[-1]:.12g} s on its clock; they have to overlap"
         )
     body = _mounting(at, found, true) if align == "mounting" else np.array([0.0, 0, 0, 1])
     found = quaternions.product(found, body)
