@@ -625,7 +625,11 @@ def test_python_s_warnings_of_a_coefficient_are_not_shown(entry, folder, capsys)
 
 
 @pytest.mark.parametrize(
-    "source", ["--motion constant --set x_deg_s=1 --step 1e-3 --duration 3e3", "--input increments --recording log.csv"]
+    "source",
+    [
+        "--motion constant --set x_deg_s=1 --step 1e-3 --duration 3e3",
+        "--input increments --recording log.csv",
+    ],
 )
 def test_more_records_than_can_be_written(source, folder, capsys, monkeypatch):
     from strapgen.lab import simulate_command

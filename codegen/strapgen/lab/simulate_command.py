@@ -177,5 +177,7 @@ def _on_recording(
     facts = step_facts(backend, choice) | {"source": source.source} | source.facts
     facts |= {} if intervals.initial is None else {"initial_deg": written(intervals.initial)}
     replace(output, format=output.format or "csv").show(
-        HistoryResult(facts, replace(history, elements=backend.elements), output.title, title)
+        HistoryResult(
+            facts, replace(history, elements=backend.elements, backend=backend), output.title, title
+        )
     )
