@@ -255,9 +255,9 @@ def _matrix_lines(run: Run, record: int) -> list[str]:
 
 def history_columns(
     history: History, form: AttitudeForm = _STATE, error: AttitudeError | None = None
-) -> dict[str, Any]:
+) -> dict[str, Array]:
     """Return the time and the attitude in a form by name, and the error beside the truth; nan where it is not known."""
-    columns: dict[str, Any] = {"time_s": history.time}
+    columns = {"time_s": history.time}
     if history.piece is not None:
         columns["piece"] = history.piece
     columns |= form.columns(history)
@@ -273,10 +273,10 @@ def history_table(
 ) -> TextTable:
     """Return an attitude history as a table; an error that is not known is an empty cell."""
     columns = history_columns(history, form, error)
-    rows = [[*row] for row in zip(*(values.tolist() for values in columns.values()), strict=True)]
+    rows = [list(row) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
     if error is not None:
         rows = [[None if math.isnan(value) else value for value in row] for row in rows]
-    return table_of([*columns], rows)
+    return table_of(columns, rows)
 
 
 def settings_text(settings: dict[str, Any]) -> str:

@@ -237,10 +237,10 @@ class History(Records):
         Number of increments at the end that do not fill a step.
     elements : tuple of str
         Names of the elements of a state, row-major; empty where they are not known.
-    piece : array, (N,), optional
-        Number of the piece of the recording, from 1 on; None where it has no gaps.
     backend : Backend, optional
         The back end whose states they are; None where the states are no attitudes.
+    piece : array, (N,), optional
+        Number of the piece of the recording, from 1 on; None where it has no gaps.
 
     Examples
     --------
@@ -255,8 +255,8 @@ class History(Records):
     step: float
     unused: int
     elements: tuple[str, ...] = ()
-    piece: NDArray[Any] | None = None
     backend: Backend | None = field(default=None, repr=False, compare=False)
+    piece: NDArray[Any] | None = None
 
     __repr__ = short_repr
 
@@ -621,7 +621,7 @@ def _along(
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
     require_proper(backend, states, time)
-    return History(time, states, step, unused, backend.elements, backend=backend)
+    return History(time, states, step, unused, backend.elements, backend)
 
 
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
