@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from strapgen.lab.recordings.attitude_output import (
-    TRAJECTORIES,
     AttitudeForm,
     attitude_of,
+    kitti,
     parquet,
     roll_pitch_heading,
+    tum,
 )
 from strapgen.lab.recordings.quaternions import inverse, product, rotation_vectors
 from strapgen.lab.recordings.recording import History
@@ -107,6 +108,12 @@ class RunSettings:
     specific_force_m_s2: tuple[float, ...] | None = field(metadata=entry(optional=True))
     #: File of the sensor errors
     errors: str | None = field(metadata=entry(optional=True))
+    #: Rate that is taken off a recording, about x, y, z
+    bias_deg_s: tuple[float, ...] | None = field(metadata=entry(optional=True))
+    #: Standard deviation of that of a rest
+    bias_uncertainty_deg_s: tuple[float, ...] | None = field(metadata=entry(optional=True))
+    #: Latitude at which the Earth's rate is taken off
+    latitude_deg: float | None = field(metadata=entry(optional=True))
 
 
 @dataclass(frozen=True)
@@ -281,7 +288,11 @@ def history_table(
 
 def settings_text(settings: dict[str, Any]) -> str:
     """Return settings that have values as text."""
-    return ", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)
+    stated = {key: value for key, value in settings.items() if value is not None}
+    return ", ".join(
+        f"{key} {' '.join(f'{x:g}' for x in value) if isinstance(value, list) else value}"
+        for key, value in stated.items()
+    )
 
 
 @dataclass(frozen=True)
@@ -387,7 +398,8 @@ class HistoryResult(Result):
 
     def written(self, format: str) -> str:
         """Return the attitude in a format of `Result`, or as a trajectory: "tum" or "kitti"."""
-        return TRAJECTORIES[format](self.history) if format in TRAJECTORIES else super().written(format)
+        trajectories = {"tum": tum, "kitti": kitti}
+        return trajectories[format](self.history) if format in trajectories else super().written(format)
 
     def parquet(self) -> bytes:
         """Return the attitude at each time as a Parquet file."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -28,3 +29,9 @@ class LogTopic:
     def names(self) -> tuple[str, ...]:
         """Names of the columns."""
         return tuple(column.name for column in self.columns)
+
+
+def split_topic(text: str) -> tuple[Path, str]:
+    """Return the file and the topic of FILE or FILE:TOPIC; the topic is empty where a file has the whole name."""
+    path, (name, colon, topic) = Path(text), text.rpartition(":")
+    return (Path(name), topic) if colon and not path.exists() and Path(name).exists() else (path, "")

@@ -42,7 +42,8 @@ INPUTS = ("increments", "rates", "instants")
 
 #: The elements of an attitude by the names that logs have for them: w, x, y, z, and roll, pitch, heading.
 _QUATERNIONS = tuple(
-    (r"(?:.*_)?(?:q|quat\w*|orientation|attitude)(?:_.*)?_?{}", names)
+    (rf"(?:.*_)?(?:q|quat\w*|orientation|attitude){frame}_?{{}}", names)
+    for frame in ("", "(?:_.*)?")
     for names in (("w", "x", "y", "z"), ("s", "x", "y", "z"), ("0", "1", "2", "3"), ("1", "2", "3", "4"))
 )
 _ANGLE_NAMES = tuple(
@@ -217,8 +218,8 @@ def attitude(
         words = [word.strip() for word in columns.split(",")]
         if len(words) not in (4, 5):
             raise InputError(
-                f"--true-columns {columns} names {len(words)} columns; the time and a quaternion of four, or roll, pitch "
-                "and heading, are needed"
+                f"--true-columns {columns} names {len(words)} columns; the time and a quaternion, or roll, pitch and "
+                "heading, are needed"
             )
         time, *found = [_named(known, word, "--true-columns") for word in words]
         order = (order or _order(found)) if len(found) == 4 else ""
