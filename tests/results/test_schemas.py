@@ -6,13 +6,17 @@ import json
 import shlex
 from pathlib import Path
 from shutil import which
+from types import GenericAlias, SimpleNamespace
+from typing import TypeVar
 
+import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
+from numpy.typing import NDArray
 
 from strapgen import registration
 from strapgen.cli import main
-from strapgen.results.records import UNITS
+from strapgen.results.records import UNITS, type_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
@@ -151,6 +155,31 @@ def test_every_schema_is_valid_and_in_docs(name):
 
 def test_docs_have_no_other_schemas():
     assert {path.stem for path in (ROOT / "docs" / "schemas").iterdir()} == {*RESULTS}
+
+
+Number = TypeVar("Number")
+
+
+@pytest.mark.parametrize(
+    ("meant", "parts", "schema"),
+    [
+        (NDArray[np.float64], (), {"type": "array", "items": {"type": ["number", "array"]}}),
+        (list[Number], (float,), {"type": "array", "items": {"type": "number"}}),
+        (
+            list[Number] | None,
+            (int,),
+            {"anyOf": [{"type": "array", "items": {"type": "integer"}}, {"type": "null"}]},
+        ),
+    ],
+)
+def test_names_of_types_stand_for_what_they_mean(meant, parts, schema):
+    """A statement ``type Array[Number] = ...``, which Python 3.11 has not; NDArray of NumPy 2.5 is one."""
+    name = SimpleNamespace(__value__=meant)
+    assert (
+        type_schema(GenericAlias(name, parts) if parts else name)
+        == schema
+        == type_schema(meant[parts] if parts else meant)
+    )
 
 
 def test_numbers_have_the_units_that_their_names_end_with():

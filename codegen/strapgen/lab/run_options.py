@@ -33,6 +33,8 @@ _Text = str | None
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
 _RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
 
+#: The settings of the motion of a line, for a shell to complete
+MOTION_SETTINGS = f"{__name__}:motion_settings"
 MotionSettings = Annotated[
     dict[str, str] | None,
     option(
@@ -40,6 +42,7 @@ MotionSettings = Annotated[
         metavar="KEY=VALUE...",
         help="Parameters of the motion; strapgen list motions shows their names.",
         panel="Input",
+        words=MOTION_SETTINGS,
     ),
 ]
 
@@ -71,6 +74,14 @@ _MOST = 1024
 def a_motion(option: str, text: str) -> str:
     """Read a motion with a closed form, or the file of one."""
     return text if is_file(text) else names("strapgen.catalogue:MOTIONS")(option, text)
+
+
+def motion_settings(values: Mapping[str, Any]) -> list[str]:
+    """Return the settings of the motion that a command line names."""
+    from strapgen.lab.motions.motions import keys
+
+    motion = values.get("motion")
+    return [f"{key}=" for choices in keys(str(motion)).values() for key in choices] if motion else []
 
 
 def _motion_of_a_run(option: str, text: str) -> str:
