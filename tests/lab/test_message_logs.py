@@ -68,7 +68,7 @@ def dataflash(*, units: bool = True) -> bytes:
     if units:
         for letter, unit in zip("sEod", ("s", "rad/s", "m/s/s", "deg"), strict=True):
             log += b"\xa3\x95\x01" + struct.pack("<Qb64s", 0, ord(letter), unit.encode())
-        for letter, factor in zip("F0B-", (1e-6, 1, 0.01, 0), strict=True):
+        for letter, factor in zip("F0B-", (np.float32(1e-6), 1, np.float32(0.01), 0), strict=True):
             log += b"\xa3\x95\x02" + struct.pack("<Qbd", 0, ord(letter), factor)
         log += b"\xa3\x95\x03" + struct.pack("<QB16s16s", 0, 4, b"s#EEEooo", b"F-000000")
         log += b"\xa3\x95\x03" + struct.pack("<QB16s16s", 0, 5, b"sdd-", b"FBB-")

@@ -42,6 +42,8 @@ _UNITS = {
     **dict.fromkeys(("IMU", "IMU2", "IMU3", "GYR", "ACC"), _IMU),
     **dict.fromkeys(("ATT", "AHR2", "NKF1", "XKF1"), _ANGLES),
 }
+#: Angles by what they are counted from.
+_ANGLE_UNITS = dict.fromkeys(("degheading", "deglatitude", "deglongitude"), "deg")
 #: A factor that makes a unit another.
 _SCALED = {("s", 1e-6): "us", ("s", 1e-3): "ms", ("s", 1e-9): "ns"}
 
@@ -104,7 +106,8 @@ class DataFlash(MessageLog):
                 if name == "UNIT" and letters == "QbZ":
                     units[data[start + 8]] = data[start + 9 : start + 73].split(b"\0")[0].decode("latin-1")
                 elif name == "MULT" and letters == "Qbd":
-                    factors[data[start + 8]] = float(np.frombuffer(data, "<f8", 1, start + 9)[0])
+                    number = float(np.frombuffer(data, "<f8", 1, start + 9)[0])
+                    factors[data[start + 8]] = float(f"{number:.6g}")  # it was a float before
                 elif name == "FMTU" and letters == "QBNN":
                     of_format[data[start + 8]] = data[start + 9 : start + 25], data[start + 25 : start + 41]
         return units, factors, of_format
@@ -140,7 +143,8 @@ def _fields(
         unit = known_units(_UNITS, name, label)
         if stated_as is not None and place < 16:
             of_unit, of_factor = stated_as[0][place], stated_as[1][place]
-            unit = stated(units.get(of_unit, "").removesuffix("heading")) or unit
+            says = units.get(of_unit, "")
+            unit = stated(_ANGLE_UNITS.get(says, says.replace("UNKNOWN", ""))) or unit
             factor = factors.get(of_factor, factor) or 1.0
             if (str(unit), factor) in _SCALED:
                 unit, factor = _SCALED[str(unit), factor], 1.0

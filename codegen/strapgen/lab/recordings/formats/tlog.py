@@ -156,7 +156,7 @@ class TLog(MessageLog):
                 messages = self._messages[topic]
                 # Version 2 leaves zeros at the end of a payload out.
                 whole = data[position : position + 8] + data[begin : begin + size]
-                whole = whole[: messages.size()].ljust(messages.size(), b"\0")
+                whole = whole[: messages.size()] + bytes(max(0, messages.size() - len(whole)))
                 messages.starts.append(length)
                 payloads.append(whole)
                 length += len(whole)
