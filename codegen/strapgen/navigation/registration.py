@@ -25,7 +25,7 @@ REGISTRATION = Registration(
         "strapdown": Command(
             f"{__package__}.strapdown_command:strapdown",
             "Run",
-            summary="Run an algorithm in two speeds along a recording of gyros and accelerometers",
+            summary="Run an algorithm in two speeds along an inertial recording",
         ),
         "study system": Command(f"{__package__}.study_commands:study_system"),
         "study attitude-form": Command(f"{__package__}.study_commands:study_attitude_form"),

@@ -124,7 +124,7 @@ def strapdown(
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
     output: CourseOutput,
 ) -> None:
-    """Run an algorithm in two speeds along a recording of gyros and accelerometers.
+    """Run an algorithm in two speeds along an inertial recording.
 
     The recording has increments of fast cycles, angles in rad and velocities in m/s, or rates and specific forces.
 

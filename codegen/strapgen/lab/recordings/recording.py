@@ -527,7 +527,7 @@ def propagate(
     recording : Recording
     orthonormalize, record : number, optional
         Intervals in s of orthonormalization (by default there is none) and of records (by default every step), each a
-        multiple of the step to a hundredth of a step.
+        multiple of the step to a hundredth.
     pulse : number, optional
         Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
     initial : array_like, (3, 3), or Rotation, optional
@@ -625,8 +625,8 @@ def _along(
 
 
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
-    """Return the number of steps in an interval in s, to a hundredth of a step."""
+    """Return the number of steps in an interval in s, which is a multiple of the step to a hundredth."""
     ratio = float(checks.number(what, value, positive=True)) / step
-    if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
+    if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01 * max(1, ratio):
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")
     return round(ratio)
