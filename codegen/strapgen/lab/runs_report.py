@@ -280,10 +280,13 @@ def history_table(
 ) -> TextTable:
     """Return an attitude history as a table; an error that is not known is an empty cell."""
     columns = history_columns(history, form, error)
-    rows = [list(row) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
-    if error is not None:
-        rows = [[None if math.isnan(value) else value for value in row] for row in rows]
-    return table_of(columns, rows)
+    return table_of([*columns], _rows_of(columns))
+
+
+def _rows_of(columns: dict[str, Any]) -> list[list[Any]]:
+    """Return columns as rows, None for what is no number."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [[None if value != value else value for value in row] for row in rows]
 
 
 def settings_text(settings: dict[str, Any]) -> str:
@@ -413,8 +416,7 @@ class HistoryResult(Result):
         }
         heads = [TIME_COLUMN, *(Column(name, spec=".9f", least=12, gap=1) for name in [*columns][1:])]
         title = {} if self.title is None else {"title": self.title}
-        rows = np.column_stack([*columns.values()]).tolist()
-        lines = [settings_text(title | {**self.settings}), "", *TextTable(heads, rows).lines()]
+        lines = [settings_text(title | {**self.settings}), "", *TextTable(heads, _rows_of(columns)).lines()]
         if len(shown) < len(history.time):
             lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
         if history.unused:

@@ -52,7 +52,7 @@ class BiasOptions:
         str | None,
         option(
             "--bias",
-            metavar="rest|X,Y,Z",
+            metavar="X,Y,Z",
             help="Rate to take off, in deg/s; rest is that of the longest rest, found by its variance.",
             read=_bias,
         ),
@@ -127,7 +127,7 @@ class TruthOptions(BiasOptions):
         str | None,
         option(
             "--level-axes",
-            metavar="ned|enu",
+            metavar="NAME",
             help="Level axes with --latitude-deg: north, east, down or east, north, up.  [default: ned]",
             read=names(LEVEL_AXES),
         ),
@@ -162,7 +162,7 @@ class TruthOptions(BiasOptions):
         str | None,
         option(
             "--true-sense",
-            metavar="SENSE",
+            metavar="NAME",
             help="What the true attitude turns.  [default: body-to-reference]",
             read=names(SENSES),
         ),
@@ -350,7 +350,7 @@ class FormOptions:
         str | None,
         option(
             "--sense",
-            metavar="SENSE",
+            metavar="NAME",
             help="What a quaternion, matrix or rotation vector turns: body-to-reference, as everywhere else, or "
             "reference-to-body.  [default: body-to-reference]",
             read=names(SENSES),
