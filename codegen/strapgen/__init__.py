@@ -12,6 +12,7 @@ Functions take the object, a name or a Choice alike:
 
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
   motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
+  recordings  propagate; rests; TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
@@ -100,6 +101,11 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.recordings.recording import read_increments as read_increments
     from strapgen.lab.recordings.recording import read_inertial as read_inertial
     from strapgen.lab.recordings.recording import read_rates as read_rates
+    from strapgen.lab.recordings.rest import rests as rests
+    from strapgen.lab.recordings.true_attitude import AttitudeError as AttitudeError
+    from strapgen.lab.recordings.true_attitude import TrueAttitude as TrueAttitude
+    from strapgen.lab.recordings.true_attitude import attitude_error as attitude_error
+    from strapgen.lab.recordings.true_attitude import time_offset as time_offset
     from strapgen.lab.runs import Run as Run
     from strapgen.lab.runs import simulate as simulate
     from strapgen.lab.scipy_rotations import from_rotation as from_rotation
@@ -235,6 +241,13 @@ _NAMES = {
         "read_increments",
         "read_inertial",
         "read_rates",
+    ),
+    "lab.recordings.rest": ("rests",),
+    "lab.recordings.true_attitude": (
+        "AttitudeError",
+        "TrueAttitude",
+        "attitude_error",
+        "time_offset",
     ),
     "lab.runs": (
         "Run",

@@ -172,5 +172,7 @@ def _on_recording(
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
     facts = step_facts(backend, choice) | {"source": str(source.file)} | source.facts
     replace(output, format=output.format or "csv").show(
-        HistoryResult(facts, replace(history, elements=backend.elements), output.title, title)
+        HistoryResult(
+            facts, replace(history, elements=backend.elements, backend=backend), output.title, title
+        )
     )

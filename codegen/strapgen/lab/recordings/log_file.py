@@ -9,8 +9,14 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError
+from strapgen.lab.recordings.formats import dataflash, tlog, ulog
 from strapgen.lab.recordings.formats.csv_table import CsvTable
 from strapgen.lab.recordings.log_topic import LogColumn, LogTopic
+from strapgen.storage import streams
+
+#: Bytes by which a format is recognized.
+_HEAD = 512
 
 __all__ = ["LogColumn", "LogFile", "LogTopic", "open_log"]
 
@@ -38,4 +44,19 @@ class LogFile(Protocol):
 def open_log(path: str | Path) -> LogFile:
     """Open a file; its format follows from its first bytes and its suffix."""
     path = checks.path("path", path)
+    head = _head(path)
+    if head.startswith(ulog.MAGIC):
+        return ulog.ULog(path)
+    if head.startswith(dataflash.MAGIC):
+        return dataflash.DataFlash(path)
+    if tlog.is_tlog(head):
+        return tlog.TLog(path)
     return CsvTable(path)
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with streams.opened(path) as file:
+            return file.read(_HEAD)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from None

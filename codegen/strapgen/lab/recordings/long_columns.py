@@ -29,6 +29,11 @@ class Columns:
         self._parts: list[Array] = []
         self._file: IO[bytes] | None = None
 
+    @property
+    def is_integer(self) -> bool:
+        """Whether all rows so far are of integers."""
+        return bool(self._kind != np.float64)
+
     def append(self, part: Any) -> None:
         """Add rows, (N, width) or (N,)."""
         part = np.asarray(part).reshape(-1, self.width)

@@ -137,6 +137,8 @@ class History(Records):
         Number of increments at the end that do not fill a step.
     elements : tuple of str
         Names of the elements of a state, row-major; empty where they are not known.
+    backend : Backend, optional
+        The back end whose states they are; None where the states are no attitudes.
 
     Examples
     --------
@@ -151,8 +153,52 @@ class History(Records):
     step: float
     unused: int
     elements: tuple[str, ...] = ()
+    backend: Backend | None = field(default=None, repr=False, compare=False)
 
     __repr__ = short_repr
+
+    def matrices(self) -> Array:
+        """Return the direction cosine matrices of the states, body to reference, (N, 3, 3)."""
+        if self.backend is None:
+            raise InputError("the states are not known as attitudes of a back end")
+        return self.backend.matrices(self.states)
+
+    def to_frame(
+        self, attitude: str = "quaternion", quaternion: str = "xyzs", sense: str = "body-to-reference"
+    ) -> Any:
+        """Return the attitude as a data frame of pandas, polars or pyarrow, the first that is installed.
+
+        Parameters
+        ----------
+        attitude : str, optional
+            "state", "rpy" for roll, pitch and heading in deg, "quaternion", "matrix", or "rotation-vector" in rad.
+        quaternion : str, optional
+            "xyzs" or "sxyz": the order of a quaternion.
+        sense : str, optional
+            "body-to-reference" or "reference-to-body": what a quaternion, matrix or rotation vector turns.
+
+        Returns
+        -------
+        data frame
+            A column of the time in s, and the attitude's elements.
+
+        Raises
+        ------
+        InputError
+            If a name is not known, or the states are no attitudes.
+        MissingExtraError
+            If no library of data frames is installed.
+
+        Examples
+        --------
+        >>> from strapgen import backend
+        >>> history = propagate(backend("dcm"), Recording(0.0, 0.5, np.full((4, 3), (0, 0, 0.1))))
+        >>> [*history.to_frame("rpy")]
+        ['time_s', 'roll_deg', 'pitch_deg', 'heading_deg']
+        """
+        from strapgen.lab.recordings.attitude_output import AttitudeForm, frame
+
+        return frame({"time_s": self.time, **AttitudeForm(attitude, quaternion, sense).columns(self)})
 
     def _in_words(self) -> str:
         times = f"{self.time[0]:g} s to {self.time[-1]:g} s, steps of {self.step:g} s"
@@ -385,7 +431,7 @@ def propagate(
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
     require_proper(backend, states, time)
-    return History(time, states, step, unused, backend.elements)
+    return History(time, states, step, unused, backend.elements, backend)
 
 
 @dataclass(frozen=True)
