@@ -11,7 +11,7 @@ What there is, each a table of names: ALGORITHMS, METHODS, KERNELS, MOTIONS, TAR
 Functions take the object, a name or a Choice alike:
 
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
-  motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
+  motions     motion, read_motion; read, Recording, InertialRecording; simulate, propagate
   recordings  propagate; rests; TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
@@ -98,6 +98,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.recordings.recording import InertialRecording as InertialRecording
     from strapgen.lab.recordings.recording import Recording as Recording
     from strapgen.lab.recordings.recording import propagate as propagate
+    from strapgen.lab.recordings.recording import read as read
     from strapgen.lab.recordings.recording import read_increments as read_increments
     from strapgen.lab.recordings.recording import read_inertial as read_inertial
     from strapgen.lab.recordings.recording import read_rates as read_rates
@@ -238,6 +239,7 @@ _NAMES = {
         "InertialRecording",
         "Recording",
         "propagate",
+        "read",
         "read_increments",
         "read_inertial",
         "read_rates",

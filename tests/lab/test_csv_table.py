@@ -33,7 +33,7 @@ ROWS = st.lists(PLAIN, min_size=3, max_size=6).map(",".join) | st.sampled_from(
 READERS = {
     "increments": recording.read_increments,
     "rates": lambda path: recording.read_rates(path, "deg/s"),
-    "resampled": lambda path: recording.read_rates(path, "deg/s", 300),
+    "summed": lambda path: recording.read(path, rate_unit="deg/s", every=3),
 }
 
 steps = st.floats(1e-300, 1e300) | st.sampled_from([1e-3, 1e-3 * (1 + 1e-15), 2e-3])
@@ -191,8 +191,7 @@ def test_line_numbers_come_back(blocks):
 @pytest.fixture
 def on_disk(monkeypatch):
     monkeypatch.setattr(long_columns, "_IN_MEMORY", 1000)
-    for module in (long_columns, recording):
-        monkeypatch.setattr(module, "PART", 1000)
+    monkeypatch.setattr(long_columns, "PART", 1000)
     monkeypatch.setattr(csv_table, "_BLOCK", 10_000)
 
 
@@ -233,24 +232,14 @@ def test_recordings_on_disk_and_in_memory_are_equal(read, tmp_path, request):
     np.testing.assert_array_equal(data.samples, in_memory.samples)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("hz", [3, 999, 1000, 7777])
-def test_resampling_in_parts_gives_the_same_bits(hz, tmp_path, request):
+@pytest.mark.parametrize("kind", ["rates", "instants"])
+@pytest.mark.parametrize("every", [1, 3, 7])
+def test_sums_over_part_boundaries_give_the_same_bits(kind, every, tmp_path, request):
     path = long_file(tmp_path / "gyro.csv", 2_500)
-    at_once = recording.read_rates(path, "rad/s", hz).samples
+    at_once = recording.read(path, rate_unit="rad/s", input=kind, every=every).samples
     request.getfixturevalue("on_disk")
-    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", hz).samples, at_once)
-
-
-def test_grid_points_at_part_boundaries_give_the_same_bits(rng, tmp_path, monkeypatch):
-    """The sum of whole intervals rounds otherwise than a piece up to a row: the part that begins there has it."""
-    path = tmp_path / "gyro.csv"
-    rates = rng.normal(size=(200, 3)).tolist()
-    path.write_text("".join(f"{k / 64},{x},{y},{z}\n" for k, (x, y, z) in enumerate(rates)))
-    at_once = recording.read_rates(path, "rad/s", 64).samples
-    for module in (long_columns, recording):
-        monkeypatch.setattr(module, "PART", 4)
-    np.testing.assert_array_equal(recording.read_rates(path, "rad/s", 64).samples, at_once)
+    in_parts = recording.read(path, rate_unit="rad/s", input=kind, every=every).samples
+    np.testing.assert_array_equal(in_parts, at_once)
 
 
 @pytest.fixture

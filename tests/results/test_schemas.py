@@ -30,7 +30,7 @@ COMMANDS = {
     f"simulate euler {RUN} --matrices --title a --initial-deg 1,2,3": "run",
     f"simulate euler --rates --method rk1 {RUN}": "run",
     "simulate two-speed-euler --motion constant --set y_deg_s=10 --duration 1": "run",
-    "simulate dcm --increments-csv tests/data/increments.csv --title a": "attitude",
+    "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
     "cost euler --cpu cortex-m3": "cost",
@@ -49,12 +49,12 @@ COMMANDS = {
     "generate --all --target numpy --out OUT": "catalogue",
     "two-speed dcm --sculling 1 --target c-fixed --out OUT": "two-speed",
     "system examples/strapdown.toml --target c-fixed --word 16": "system",
-    "strapdown examples/strapdown.toml --increments-csv examples/inertial_log.csv": "system-outputs",
+    "strapdown examples/strapdown.toml --recording examples/inertial_log.csv": "system-outputs",
     "compare two-speed-euler --backend c,c-fixed16 --motion constant --set y_deg_s=10 --duration 0.1": (
         "system-comparison"
     ),
     "study system examples/strapdown.toml --sample-hz 100 --duration 1 --backend c-float": "system-study",
-    "strapdown euler --increments-csv examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
+    "strapdown euler --recording examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
     "redundancy examples/hexad.toml --out OUT": "redundant-sensors",
     "study redundancy --trials 10": "redundancy",
     "study calibration examples/positions-20.toml --rate-deg-s 10,0,0": "calibration",

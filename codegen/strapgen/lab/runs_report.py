@@ -257,7 +257,10 @@ def history_columns(
     history: History, form: AttitudeForm = _STATE, error: AttitudeError | None = None
 ) -> dict[str, Array]:
     """Return the time and the attitude in a form by name, and the error beside the truth; nan where it is not known."""
-    columns = {"time_s": history.time, **form.columns(history)}
+    columns = {"time_s": history.time}
+    if history.piece is not None:
+        columns["piece"] = history.piece
+    columns |= form.columns(history)
     if error is None:
         return columns
     vector = np.degrees(error.at(history.time))
@@ -270,7 +273,7 @@ def history_table(
 ) -> TextTable:
     """Return an attitude history as a table; an error that is not known is an empty cell."""
     columns = history_columns(history, form, error)
-    rows = np.column_stack([*columns.values()]).tolist()
+    rows = [list(row) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
     if error is not None:
         rows = [[None if math.isnan(value) else value for value in row] for row in rows]
     return table_of(columns, rows)
@@ -294,6 +297,8 @@ class AttitudeRecords:
     time_s: Array
     #: The elements at each time
     attitude: Array
+    #: Number of the piece between gaps of the recording
+    piece: Array | None = field(default=None, metadata=entry(optional=True))
 
 
 @dataclass(frozen=True)
@@ -368,7 +373,9 @@ class HistoryResult(Result):
         """The attitude at each time."""
         history, columns = self.history, self.form.columns(self.history)
         values, length = np.column_stack([*columns.values()]), float(history.time[-1] - history.time[0])
-        return AttitudeRecords(history.step, length, history.unused, tuple(columns), history.time, values)
+        return AttitudeRecords(
+            history.step, length, history.unused, tuple(columns), history.time, values, history.piece
+        )
 
     def rows(self) -> Any:
         """Return the records of the history, as their times."""
