@@ -177,7 +177,7 @@ class _OnRecording:
 
         pulse = source.pulse
         data = source.recorded()
-        judge = Judge.of(self.truth, data, intervals.start())
+        judge = Judge.of(self.truth, source, data, intervals.start())
         data, bias, said = judge.taken_off(data)
         length = data.interval * choice.increments_per_step
         _refuse_many(len(data.samples) / choice.increments_per_step, length, intervals.record)

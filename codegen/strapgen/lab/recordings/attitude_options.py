@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from strapgen.lab.recordings.recording import History, Recording
     from strapgen.lab.recordings.rest import Rest
     from strapgen.lab.recordings.true_attitude import AttitudeError, TimeOffset, TrueAttitude
+    from strapgen.lab.run_options import RecordingOptions
 
 _REST = "rest"
 
@@ -200,8 +201,8 @@ class TruthOptions(BiasOptions):
         """The file that is read."""
         return (None if self.true_attitude is None else split_topic(str(self.true_attitude))[0],)
 
-    def read(self) -> TrueAttitude | None:
-        """Read the true attitude; None without one."""
+    def read(self, recording: RecordingOptions) -> TrueAttitude | None:
+        """Read the true attitude, at the sampling rate of a recording in the same file; None without one."""
         from strapgen.lab.recordings.true_attitude import TrueAttitude
 
         if self.true_attitude is None:
@@ -214,6 +215,7 @@ class TruthOptions(BiasOptions):
             order=self.true_quaternion,
             sense=self.true_sense or "body-to-reference",
             time_unit=self.true_time_unit,
+            sample_hz=recording.sample_hz if file == recording.file else None,
         )
 
 
@@ -231,11 +233,11 @@ class Judge:
     interval: float
 
     @classmethod
-    def of(cls, options: TruthOptions, data: Recording, initial: Any) -> Judge:
+    def of(cls, options: TruthOptions, recording: RecordingOptions, data: Recording, initial: Any) -> Judge:
         """Read the true attitude, and compare the clocks."""
         from strapgen.lab.recordings.true_attitude import TimeOffset, time_offset
 
-        truth = options.read()
+        truth = options.read(recording)
         offset = None
         if truth is not None:
             stated = options.time_offset

@@ -191,7 +191,8 @@ def of_topic(topic: LogTopic, stated: Stated) -> Meanings:
 class AttitudeColumns:
     """The columns of an attitude with its time."""
 
-    time: str
+    #: None where the sampling rate is stated
+    time: str | None
     #: A quaternion, or roll, pitch and heading, in the order of the file's names
     columns: tuple[str, ...]
     #: "sxyz" or "xyzs"; "" for angles
@@ -203,7 +204,12 @@ class AttitudeColumns:
 
 
 def attitude(
-    topic: LogTopic, columns: str | None = None, order: str | None = None, time_unit: str | None = None
+    topic: LogTopic,
+    columns: str | None = None,
+    order: str | None = None,
+    time_unit: str | None = None,
+    *,
+    has_time: bool = True,
 ) -> AttitudeColumns:
     """Return the columns of the time and of an attitude, as a user or their names say.
 
@@ -214,21 +220,24 @@ def attitude(
     (('q[0]', 'q[1]', 'q[2]', 'q[3]'), 'sxyz')
     """
     known = [_column(one) for one in topic.columns]
+    time: _Column | None
     if columns is not None:
         words = [word.strip() for word in columns.split(",")]
-        if len(words) not in (4, 5):
+        if len(words) - has_time not in (3, 4):
+            time_too = "the time and " if has_time else ""
             raise InputError(
-                f"--true-columns {columns} names {len(words)} columns; the time and a quaternion, or roll, pitch and "
+                f"--true-columns {columns} names {len(words)} columns; {time_too}a quaternion, or roll, pitch and "
                 "heading, are needed"
             )
-        time, *found = [_named(known, word, "--true-columns") for word in words]
+        found = [_named(known, word, "--true-columns") for word in words]
+        time = found.pop(0) if has_time else None
         order = (order or _order(found)) if len(found) == 4 else ""
     elif (
         all(one.text.isdigit() for one in known) and len(known) == 8
     ):  # a trajectory of the TUM RGB-D benchmark
         time, found, order = known[0], known[4:], order or "xyzs"
     else:
-        time, found = _attitude_time(known), []
+        time, found = _time(known) if has_time else None, []
         for pattern, names in (*_QUATERNIONS, *_ANGLE_NAMES):
             each = [[one for one in known if re.fullmatch(pattern.format(name), one.name)] for name in names]
             if all(len(one) == 1 for one in each):
@@ -242,14 +251,8 @@ def attitude(
             "attitude, --true-quaternion the order"
         )
     unit = next((one.unit for one in found if one.unit in ("rad", "deg")), None)
-    stamps = _unit("--true-time-unit", time_unit, [time] if time.unit else [], units.TIMES, "times")
-    return AttitudeColumns(time.text, tuple(one.text for one in found), order, stamps, unit)
-
-
-def _attitude_time(columns: Sequence[_Column]) -> _Column:
-    found = _time(columns)
-    assert found is not None
-    return found
+    stamps = _unit("--true-time-unit", time_unit, [time] if time and time.unit else [], units.TIMES, "times")
+    return AttitudeColumns(time and time.text, tuple(one.text for one in found), order, stamps, unit)
 
 
 def _order(columns: Sequence[_Column]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -160,6 +161,7 @@ class TrueAttitude:
         order: str | None = None,
         sense: str = "body-to-reference",
         time_unit: str | None = None,
+        sample_hz: float | str | Fraction | None = None,
     ) -> TrueAttitude:
         r"""Read a true attitude from a log of any format that `read` takes.
 
@@ -177,6 +179,8 @@ class TrueAttitude:
             "body-to-reference" or "reference-to-body": what each turns.
         time_unit : str, optional
             "s", "ms", "us" or "ns", where the log has none.
+        sample_hz : number, optional
+            Sampling rate in Hz, in place of a column of times.
 
         Returns
         -------
@@ -203,12 +207,12 @@ class TrueAttitude:
             if topic not in ("", one.name):
                 continue
             try:
-                layout = meanings.attitude(one, columns, order, time_unit)
+                layout = meanings.attitude(one, columns, order, time_unit, has_time=sample_hz is None)
             except InputError as error:
                 if topic or len(names) == 1:
                     raise InputError(f"{log.path}: {error}") from None
                 continue
-            return _of_columns(cls, log, one.name, layout, sense)
+            return _of_columns(cls, log, one.name, layout, sense, sample_hz)
         raise InputError(f"{log.path}: no topic has a time and an attitude; it has {checks.some(names)}")
 
     @cached_property
@@ -228,13 +232,23 @@ class TrueAttitude:
 
 
 def _of_columns(
-    cls: type[TrueAttitude], log: LogFile, topic: str, layout: AttitudeColumns, sense: str
+    cls: type[TrueAttitude],
+    log: LogFile,
+    topic: str,
+    layout: AttitudeColumns,
+    sense: str,
+    sample_hz: float | str | Fraction | None,
 ) -> TrueAttitude:
     """Return the true attitude of some columns of a log."""
-    read = log.read(topic, [layout.time, *layout.columns])
-    time = read[layout.time] * float(units.TIMES[layout.time_unit or "s"])
+    read = log.read(topic, [*layout.columns] if layout.time is None else [layout.time, *layout.columns])
+    if layout.time is None:
+        step = 1 / float(checks.number("sample_hz", sample_hz or 0, positive=True))
+        time = step * np.arange(len(read[layout.columns[0]]), dtype=np.float64)
+    else:
+        time = read[layout.time] * float(units.TIMES[layout.time_unit or "s"])
     values = np.column_stack([np.asarray(read[name], np.float64) for name in layout.columns])
-    if layout.time_unit is None and len(time) > 1 and np.median(np.abs(np.diff(time))) >= _LONG_INTERVAL:
+    is_open = layout.time is not None and layout.time_unit is None
+    if is_open and len(time) > 1 and np.median(np.abs(np.diff(time))) >= _LONG_INTERVAL:
         raise InputError(
             f"{log.path}: the truth's time states no unit and grows by {np.median(np.diff(time)):g} from row to row; "
             "--true-time-unit s, ms, us or ns says what it is"
