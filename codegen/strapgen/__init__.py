@@ -11,7 +11,7 @@ What there is, each a table of names: ALGORITHMS, METHODS, KERNELS, MOTIONS, TAR
 Functions take the object, a name or a Choice alike:
 
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
-  motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
+  motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate; StampedGrid
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
@@ -124,6 +124,10 @@ if _typing.TYPE_CHECKING:
     from strapgen.run.backends import build as build
     from strapgen.run.backends import evaluator as evaluator
     from strapgen.run.compiler import compile_together as compile_together
+    from strapgen.stamped.grid_clock import StampError as StampError
+    from strapgen.stamped.grid_clock import StampStatus as StampStatus
+    from strapgen.stamped.stamped_grid import GridSamples as GridSamples
+    from strapgen.stamped.stamped_grid import StampedGrid as StampedGrid
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
 
@@ -148,6 +152,14 @@ _NAMES = {
         "SampleKind",
     ),
     "run.backend_names": ("BACKENDS",),
+    "stamped.grid_clock": (
+        "StampError",
+        "StampStatus",
+    ),
+    "stamped.stamped_grid": (
+        "GridSamples",
+        "StampedGrid",
+    ),
     "navigation.systems.system_runner": (
         "SystemRunner",
         "system_runner",
