@@ -29,10 +29,10 @@ def angle(t):
     return np.stack([x, y, G * t], axis=-1)
 
 
-def increments(step, steps, samples, previous=0, ahead=0):
-    """Return the integrals of the rate, (steps, previous + samples + ahead, 3)."""
-    first = np.arange(steps)[:, None] * samples + np.arange(-previous, samples + ahead)
-    width = step / samples
+def increments(step, steps, increments, previous=0, ahead=0):
+    """Return the integrals of the rate, (steps, previous + increments + ahead, 3)."""
+    first = np.arange(steps)[:, None] * increments + np.arange(-previous, increments + ahead)
+    width = step / increments
     return angle((first + 1) * width) - angle(first * width)
 
 

@@ -52,7 +52,7 @@ def worst_drift(shape: ConingShape, coefficients: tuple[Fraction, ...], of: Line
     """Return the drift for the worst phases in deg/h."""
     errors = coning_drift.errors(shape, coefficients, of.radians)
     total = sum(w * abs(float(e)) for w, e in zip(of.products, errors, strict=True))
-    return math.degrees(total / (shape.samples / float(of.sample_hz))) * 3600
+    return math.degrees(total / (shape.increments / float(of.sample_hz))) * 3600
 
 
 @pytest.mark.long
@@ -105,7 +105,9 @@ def test_built_in_file_is_the_output_of_its_command(shaped):
 )
 def test_no_coefficients_have_a_smaller_largest_drift(shape, powers, band):
     """A linear programme on another grid, in the same unknowns, reaches no lower level."""
-    result = design(ConingBrief(shape.samples, shape.previous, "band", band, powers=powers, gyro=shape.gyro))
+    result = design(
+        ConingBrief(shape.increments, shape.previous, "band", band, powers=powers, gyro=shape.gyro)
+    )
     level = coning_drift.largest(shape, result.coefficients, band)
     for row, right in coning_drift.powers(shape, powers):
         assert sum(a * c for a, c in zip(row, result.coefficients, strict=True)) == right

@@ -132,7 +132,7 @@ def test_a_symmetric_window_of_two_samples_is_its_filters():
         window, filters=(first, (others[0][0] + Fraction(1, 10**30), *others[0][1:]), *others[1:])
     )
     assert window.parity and not uneven.parity
-    samples = strapgen.motion("random", rate_deg_s=200).samples(Fraction(1, 100), 0, window.samples)
+    samples = strapgen.motion("random", rate_deg_s=200).samples(Fraction(1, 100), 0, window.total_increments)
     steps = [strapgen.backend("euler", one) for one in (window, uneven)]
     ends = [step.step(step.identity, samples) for step in steps]
     np.testing.assert_allclose(*ends, rtol=0, atol=1e-15)

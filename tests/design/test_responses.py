@@ -23,7 +23,7 @@ GYRO = GyroResponse(Fraction(40), Fraction(7071, 10000), Fraction(100))
 
 def answers(window, b):
     """Return what the samples of a window are for a unit of rate at frequencies, (n, samples)."""
-    j = np.arange(window.samples) - window.previous
+    j = np.arange(window.total_increments) - window.previous
     gyro = np.ones_like(b, dtype=complex)
     if window.gyro is not None:
         x = 1j * b * float(window.gyro.sample_hz) / (2 * np.pi * float(window.gyro.bandwidth_hz))

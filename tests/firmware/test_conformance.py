@@ -182,7 +182,7 @@ def one_by_one(samples: int, factor: float, distance: int = 1) -> Products:
 def test_a_published_correction_has_no_fault(chosen):
     assert causes.cause(tables(*chosen)) is None
     standard = causes.standard_design(tables(*chosen))
-    assert (standard.samples, standard.previous) == chosen[:2]
+    assert (standard.increments, standard.previous) == chosen[:2]
 
 
 @pytest.mark.parametrize(
@@ -253,7 +253,7 @@ def test_samples_that_are_turned_one_by_one_are_known(samples):
     assert causes.cause(one_by_one(samples, 1)) is None
     assert causes.wanted(one_by_one(samples, -1)) == pytest.approx(one_by_one(samples, 1).at_once)
     standard = causes.standard_design(one_by_one(samples, 1))
-    assert (standard.samples, standard.previous) == (1, 1)
+    assert (standard.increments, standard.previous) == (1, 1)
     named = {factor: causes.cause(one_by_one(samples, factor)) for factor in (0, -1, 2, 0.5)}
     wanted = [causes.ABSENT, causes.WRONG_SIGN, causes.FACTOR_TWO, causes.FACTOR_TWO]
     assert list(named.values()) == wanted

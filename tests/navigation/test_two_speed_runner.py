@@ -258,19 +258,19 @@ def test_values_out_of_range_are_refused():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"increments": np.zeros((5, 3))}, "multiple of 4"),
-        ({"increments": np.zeros((4, 2))}, "increments has shape"),
-        ({"velocity_increments": np.zeros((8, 3))}, "that of increments"),
+        ({"samples": np.zeros((5, 3))}, "multiple of 4"),
+        ({"samples": np.zeros((4, 2))}, "samples has shape"),
+        ({"velocity_increments": np.zeros((8, 3))}, "that of samples"),
         ({"turns": np.zeros((2, 3))}, "turns has shape"),
         ({"fast_cycles": 0}, "fast_cycles"),
         ({"initial": np.eye(2)}, "initial"),
     ],
 )
 def test_mismatched_shapes_are_refused(given, said):
-    wanted = {"increments": np.zeros((4, 3)), "velocity_increments": np.zeros((4, 3)), "fast_cycles": 2}
+    wanted = {"samples": np.zeros((4, 3)), "velocity_increments": np.zeros((4, 3)), "fast_cycles": 2}
     wanted |= {"slow_cycles": 2} | given
     with pytest.raises((InputError, InputTypeError), match=said) as caught:
-        made("dcm", 2, "numpy").run(wanted.pop("increments"), wanted.pop("velocity_increments"), **wanted)
+        made("dcm", 2, "numpy").run(wanted.pop("samples"), wanted.pop("velocity_increments"), **wanted)
     assert "\n" not in str(caught.value)
 
 

@@ -6,7 +6,7 @@ loaded when it is derived.
 
 from __future__ import annotations
 
-from strapgen.catalogue.choice import AnyAlgorithm, Choice, named, orthonormalizations
+from strapgen.catalogue.choice import AnyAlgorithm, Choice, named, orthonormalizations, state_name
 from strapgen.catalogue.choosing import choose, choose_step, standard
 from strapgen.catalogue.derivation import companion, derive, enough, nodes, rounding
 from strapgen.catalogue.kernels.kernel_names import MOTIONS, TWO_SPEED, UPDATE_ORDERS
@@ -53,4 +53,5 @@ __all__ = [
     "reserved",
     "rounding",
     "standard",
+    "state_name",
 ]

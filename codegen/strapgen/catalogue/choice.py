@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Context, Decimal
 from fractions import Fraction
@@ -195,6 +195,17 @@ def named(function: str, algorithm: AnyAlgorithm) -> str | os.PathLike[str] | Ch
     value = getattr(algorithm, "choice", algorithm)
     checks.require(function, value, str, os.PathLike, Choice)
     return value  # type: ignore[return-value]
+
+
+def state_name(function: str, algorithm: AnyAlgorithm, allowed: Iterable[str]) -> str:
+    """Return the name of the state of an algorithm, one of those allowed, for a function whose method is its own.
+
+    >>> state_name("course", Choice("euler", "rk4", 2), ("dcm", "euler"))
+    'euler'
+    """
+    chosen = named(function, algorithm)
+    name = chosen.name if isinstance(chosen, Choice) else os.fspath(chosen)
+    return checks.choice("algorithm", name, allowed)
 
 
 def orthonormalizations(algorithm: str) -> list[str]:

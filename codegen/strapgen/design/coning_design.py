@@ -47,7 +47,7 @@ class ConingBrief:
     """The requirements on coning coefficients."""
 
     #: N samples of the step, and samples from before it
-    samples: int
+    increments: int
     previous: int
     #: "band", "worst" or "random", see `shaped_coning.OBJECTIVES`
     objective: str
@@ -70,15 +70,15 @@ class ConingBrief:
     @property
     def shape(self) -> ConingShape:
         """The samples and the gyro, which determine the drift beside the coefficients."""
-        return ConingShape(self.samples, self.previous, self.gyro)
+        return ConingShape(self.increments, self.previous, self.gyro)
 
     @property
     def full_title(self) -> str:
         """The title, by default from the samples, what the coefficients are for, and the gyro."""
         purpose = "a spectrum" if self.band is None else f"{float(self.band):g} rad"
-        parts = [f"Coning {self.samples}+{self.previous} to {purpose}"]
+        parts = [f"Coning {self.increments}+{self.previous} to {purpose}"]
         if self.band is None:
-            parts = [f"Coning {self.samples}+{self.previous} for a spectrum, {self.objective} phases"]
+            parts = [f"Coning {self.increments}+{self.previous} for a spectrum, {self.objective} phases"]
         if self.gyro is not None:
             parts.append(f"gyro {float(self.gyro.bandwidth_hz):g} Hz")
         return self.title or ", ".join(parts)
@@ -114,7 +114,7 @@ def design(brief: ConingBrief) -> ShapedConing:
         slug(title),
         title,
         SOURCES[brief.objective],
-        brief.samples,
+        brief.increments,
         brief.previous,
         brief.objective,
         coefficients,
@@ -233,7 +233,7 @@ def _mean_square(problem: ConingProblem, answers: Responses, brief: ConingBrief)
     matrix = [[_product(weighted, column) for _, column in rows] for weighted, _ in rows]
     right = [_product(weighted, answers.right) for weighted, _ in rows]
     lines = brief.lines
-    interval = brief.samples / float(lines.sample_hz)
+    interval = brief.increments / float(lines.sample_hz)
     size = interval * lines.increment_square(brief.gyro) / lines.square_unit
     for quadratic, weight in ((_squares, brief.noise**2), (_differences, brief.pulse**2 / 12)):
         factor = REAL.mpf(weight.numerator) / weight.denominator * REAL.mpf(size)
@@ -379,7 +379,7 @@ def written(shape: ShapedConing, command: str, figures: Sequence[str] = ()) -> s
     head: dict[str, str | int] = {
         "name": shape.title,
         "source": shape.source,
-        "samples": shape.samples,
+        "samples": shape.increments,
         "previous": shape.previous,
         "objective": shape.objective,
         "powers": shape.powers,

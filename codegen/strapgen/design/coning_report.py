@@ -53,9 +53,9 @@ class ConingResult(Result):
     @staticmethod
     def of(design: Design, terms: bool = False) -> ConingResult:
         """Return a design, with its terms of third and fourth order if they are asked for."""
-        names = sample_names(design.samples, design.previous)
+        names = sample_names(design.increments, design.previous)
         drift = design.residual()
-        third, fourth = sample_terms(design.samples, design.previous) if terms else ({}, {})
+        third, fourth = sample_terms(design.increments, design.previous) if terms else ({}, {})
         by_sample = {names[k]: _products(row, names) for k, row in third.items()}
         by_pair = {f"{names[k]} x {names[m]}": _products(row, names) for (k, m), row in fourth.items()}
         return ConingResult(
@@ -64,7 +64,7 @@ class ConingResult(Result):
             residual=drift.expression,
             leading=drift.leading_expression,
             pairs=[[names[older], names[newer]] for older, newer in design.pairs],
-            order=by_form(design.form).step_order(design.samples, design.previous).step,
+            order=by_form(design.form).step_order(design.increments, design.previous).step,
             third_order=by_sample if terms else None,
             fourth_order=by_pair if terms else None,
         )
@@ -106,7 +106,7 @@ class ConingResult(Result):
                 lines += ["", f"terms of {kind} order: each vector times its sum of scalar products"]
             for vector, row in rows.items():
                 lines.append(f"  {vector} * ({' + '.join(f'{c} {product}' for product, c in row.items())})")
-        option = f"--method coning-{design.form} --increments {design.samples}"
+        option = f"--method coning-{design.form} --increments {design.increments}"
         if design.previous:
             option += f" --previous {design.previous}"
         lines += [
@@ -131,9 +131,9 @@ def _products(row: Scalars, names: list[str]) -> dict[str, str]:
 
 
 def _samples_text(design: Design) -> str:
-    one = design.samples == 1
+    one = design.increments == 1
     before = f" and {design.previous} before {'it' if one else 'them'}" if design.previous else ""
-    return f"{design.samples} {'sample' if one else 'samples'}{before}"
+    return f"{design.increments} {'sample' if one else 'samples'}{before}"
 
 
 def _pair_lines(result: ConingResult) -> list[str]:
@@ -154,7 +154,7 @@ class ShapedDrift:
 
     @property
     def _of(self) -> ConingShape:
-        return ConingShape(self.shape.samples, self.shape.previous, self.shape.gyro)
+        return ConingShape(self.shape.increments, self.shape.previous, self.shape.gyro)
 
     @cached_property
     def annulling(self) -> tuple[Fraction, ...]:
@@ -193,7 +193,7 @@ class ShapedDrift:
         assert self.lines is not None, "a design for a spectrum has one"
         errors = coning_drift.errors(self._of, coefficients, self.lines.radians)
         rates = np.array(self.lines.products) * np.array([float(value) for value in errors])
-        step = self.shape.samples / float(self.lines.sample_hz)
+        step = self.shape.increments / float(self.lines.sample_hz)
         _, factor = READABLE_UNITS["rad/s"]
         return (
             float(np.abs(rates).sum()) / step * factor,
@@ -276,7 +276,6 @@ class ShapedResult(Result):
             "name",
             "title",
             "source",
-            "samples",
             "previous",
             "objective",
             "powers",
@@ -285,6 +284,7 @@ class ShapedResult(Result):
         )
         return ShapedResult(
             shaped=drift,
+            samples=shape.increments,
             **{name: getattr(shape, name) for name in same},
             band_rad_sample=None if shape.band is None else float(shape.band),
             gyro=gyro,
@@ -295,7 +295,7 @@ class ShapedResult(Result):
     def text(self) -> str:
         """Return the coefficients and their drift."""
         drift, shape = self.shaped, self.shaped.shape
-        names = sample_names(shape.samples, shape.previous)
+        names = sample_names(shape.increments, shape.previous)
         rows = [
             (f"{names[older]} x {names[newer]}", f"{float(c): .15g}")
             for (older, newer), c in reversed(shape.pairs.items())

@@ -32,7 +32,7 @@ def window_image(result: WindowResult, path: str | Path) -> bytes:
     now = [one for one in window.one_sided if one.ahead < window.ahead]
     curves |= {_label(one): one for one in (now[len(now) // 2 :: max(1, len(now) - len(now) // 2 - 1)])}
     fit = replace(window, filters=responses.polynomial_fit(window))
-    curves[f"polynomial through {window.samples} samples"] = fit
+    curves[f"polynomial through {window.total_increments} samples"] = fit
     degrees = range(0 if window.gyro else 1, window.degree + 1)
     figure, grid = figures.grid_of_axes(
         (len(degrees) + 1) // 2, 2, (9.5, 1.4 + 2.5 * ((len(degrees) + 1) // 2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
@@ -13,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from strapgen import catalogue
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice, choose_step, named
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.comparison import certified_angle
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion
@@ -140,7 +141,8 @@ class Study:
 
     Parameters
     ----------
-    algorithm : str
+    algorithm : str, path, Choice or AttitudeAlgorithm
+        An object has its own method and increments.
     increments : int
         Increments per step.
     methods, words, roundings, carries, steps, pulses_arcsec : sequence
@@ -152,7 +154,7 @@ class Study:
         Parameters of the motion; by default those of the thesis's table 5, and none for the file of a motion.
     """
 
-    algorithm: str = "euler"
+    algorithm: AnyAlgorithm = "euler"
     increments: int = 2
     methods: Sequence[str] = ("rk4",)
     words: Sequence[int] = (8, 10, 12, 14, 16, 18, 20, 24, 28, 32)
@@ -166,6 +168,21 @@ class Study:
 
     __repr__ = short_repr
 
+    def __post_init__(self) -> None:
+        choice = named("study", self.algorithm)
+        if not isinstance(choice, Choice):
+            object.__setattr__(self, "algorithm", os.fspath(choice))
+            return
+        method, increments = choice.method, choice.increments
+        if not isinstance(method, str) or choice != choose_step(choice.name, method, increments):
+            raise InputError(f"a study takes a method and increments by name alone; {choice.kernel} has more")
+        for option, own in {"methods": (method,), "increments": increments}.items():
+            stated = getattr(self, option)
+            if stated not in (own, getattr(Study, option)):
+                raise InputError(f"{option} is {stated!r}, but the choice of {choice.kernel} has its own")
+            object.__setattr__(self, option, own)
+        object.__setattr__(self, "algorithm", choice.name)
+
     def cases(self) -> list[Case]:
         """Return every combination, unchecked."""
         default = {} if is_file(self.motion_name) else {"a_deg_s": "10", "b_deg_s": "10", "g_deg_s": "10"}
@@ -175,7 +192,7 @@ class Study:
         )
         return [
             Case(
-                algorithm=self.algorithm,
+                algorithm=str(self.algorithm),
                 method=method,
                 increments=self.increments,
                 word=word,
@@ -226,7 +243,7 @@ def cases(study: Study | None = None, **values: Any) -> list[Case]:
         pulses_arcsec=_several(study.pulses_arcsec),
     )
     for method in study.methods:
-        catalogue.choose_step(study.algorithm, method, study.increments)
+        choose_step(study.algorithm, method, study.increments)
     planned = study.cases()
     if not 0 < len(planned) <= _MOST_CASES:
         raise InputError(f"the study has {len(planned)} cases; 1 to {_MOST_CASES} are allowed")
@@ -256,7 +273,7 @@ def run_case(case: Case) -> Outcome:
 def _run(case: Case) -> Outcome:
     h = checks.number("step", case.step, positive=True)
     steps = checks.multiple("duration", checks.number("duration", case.duration, positive=True), "step", h)
-    choice = catalogue.choose_step(case.algorithm, case.method, case.increments)
+    choice = choose_step(case.algorithm, case.method, case.increments)
     exact = case.profile.increments(h, steps, case.increments, choice.previous, choice.ahead)
     pulse = float(checks.number("pulse_arcsec", case.pulse_arcsec)) / 3600
     measured = pulses(exact, math.radians(pulse), choice.previous + choice.ahead) if pulse else exact
@@ -296,14 +313,15 @@ def _within(choice: Choice, increments: NDArray[np.float64]) -> NDArray[np.float
     return increments[:, choice.previous : choice.previous + choice.increments_per_step]
 
 
-def expected_noise(case: Case, pulse: float, increments: Any) -> float:
+@renamed_parameters(increments="samples")
+def expected_noise(case: Case, pulse: float, samples: Any) -> float:
     """Return the root mean square of the angle in deg that pulses cause in a run, if their errors are independent.
 
-    `pulse`: angle in rad. `increments` (N, K, 3): exact increments of the run in rad.
+    `pulse`: angle in rad. `samples` (N, K, 3): exact increments of the run in rad.
     """
     noise = noise_of(case.algorithm, case.method, case.increments)
-    turned = np.square(increments.sum(axis=1)).sum()
-    return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(increments))))
+    turned = np.square(samples.sum(axis=1)).sum()
+    return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(samples))))
 
 
 @lru_cache(maxsize=64)
@@ -311,7 +329,7 @@ def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
     """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
     from strapgen.lab.quantization_noise import quantization_noise
 
-    return quantization_noise(catalogue.choose_step(algorithm, method, increments))
+    return quantization_noise(choose_step(algorithm, method, increments))
 
 
 def run(

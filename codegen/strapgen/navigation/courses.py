@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.catalogue import AnyAlgorithm, state_name
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
@@ -83,7 +84,7 @@ RESTING = NavigationFrame()
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def course(
-    algorithm: str,
+    algorithm: AnyAlgorithm,
     recording: InertialRecording,
     *,
     fast_cycles: int,
@@ -99,8 +100,8 @@ def course(
 
     Parameters
     ----------
-    algorithm : str
-        "dcm" or "euler".
+    algorithm : str, Choice or AttitudeAlgorithm
+        "dcm" or "euler"; of an object its state counts alone, since the loops have a method of their own.
     recording : InertialRecording
         One increment for each fast cycle.
     fast_cycles, slow_cycles : int
@@ -135,6 +136,7 @@ def course(
     >>> along.velocity_changes[-1].round(6)
     array([0.   , 0.   , 1.962])
     """
+    algorithm = state_name("course", algorithm, two_speed_sources.ALGORITHMS)
     checks.choice("backend", backend, BACKENDS)
     fast_cycles = checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
     slow_cycles = checks.count("slow_cycles", slow_cycles, largest=checks.MOST)

@@ -79,7 +79,7 @@ def test_to_first_order_in_the_rate_a_window_has_the_closed_form(name):
     """dv = a0 + c0 x a0/2 + sum (c_m x a_(m+1) - c_(m+1) x a_m)/(2(2m+1)(2m+3))."""
     window = named_window(name)
     derived, rng = kernel(choose(NAME, name)), np.random.default_rng(1)
-    count = window.samples
+    count = window.total_increments
     angles, forces = (
         [[Fraction(int(x), 64) for x in rng.integers(-9, 10, 3)] for _ in range(count)] for _ in range(2)
     )

@@ -206,17 +206,17 @@ def response(gyro: GyroResponse | None, b: float) -> complex:
 def test_the_drift_is_that_of_cross_products_of_samples(shape, b):
     """On a small cone x + iy of the angles is e^{ibt}; u x v about z is Im(conj(u) v)."""
     coefficients = [Fraction(1, 7), Fraction(-1, 30), Fraction(1, 90)][: shape.unknowns]
-    ends = np.exp(1j * b * np.arange(-shape.previous, shape.samples + 1)) * response(shape.gyro, b)
+    ends = np.exp(1j * b * np.arange(-shape.previous, shape.increments + 1)) * response(shape.gyro, b)
     samples = np.diff(ends)
     lever = sum(float(c) * samples[-1 - s] for s, c in enumerate(coefficients, 1))
-    true = (shape.samples * b - math.sin(shape.samples * b)) / 2
+    true = (shape.increments * b - math.sin(shape.increments * b)) / 2
     # The computed vector of the step, beside the first-order change of angles, whose own product with them remains.
     computed = (np.conj(lever) * samples[-1]).imag
     start, change = ends[shape.previous], ends[-1] - ends[shape.previous]
     # Half of the angle at the start crossed with the change is what the attitude turns by to second order; its mean
     # over the phase is that of its value here, and for an ideal gyro it is what the true rotation vector leaves out.
     leaves = (np.conj(start) * change).imag / 2
-    expected = computed + leaves - shape.samples * b / 2
+    expected = computed + leaves - shape.increments * b / 2
     (value,) = coning_drift.errors(shape, coefficients, [b])
     assert float(value) == pytest.approx(expected, abs=1e-14)
     if shape.gyro is None:

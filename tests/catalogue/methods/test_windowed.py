@@ -75,14 +75,14 @@ def rotation_vector(name: str, samples: list[Vector]) -> Vector:
 @pytest.mark.parametrize("name", ["window-3-3", "window-4-2", "window-0-6"])
 def test_the_lean_form_is_the_published_series_exactly(name):
     window = WINDOWS[name]
-    samples = random_samples(window.samples)
+    samples = random_samples(window.total_increments)
     coefficients = [added(*zip(row, samples, strict=True)) for row in window.filters]
     assert rotation_vector(name, samples) == published(coefficients)
 
 
 @pytest.mark.parametrize(("name", "mirrored"), [("window-3-3", "window-3-3"), ("window-5-1", "window-1-5")])
 def test_a_motion_that_runs_backwards_turns_backwards(name, mirrored):
-    samples = random_samples(WINDOWS[name].samples)
+    samples = random_samples(WINDOWS[name].total_increments)
     backwards = [[-x for x in sample] for sample in reversed(samples)]
     assert rotation_vector(mirrored, backwards) == [-x for x in rotation_vector(name, samples)]
 

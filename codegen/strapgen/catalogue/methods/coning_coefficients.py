@@ -48,7 +48,7 @@ class Design:
     """Coefficients of the cross products of samples."""
 
     form: str  # one of `FORMS`, or "shaped" for coefficients of a file
-    samples: int  # of the slow cycle
+    increments: int  # of the slow cycle
     previous: int  # samples from before it
     #: Coefficients of the cross products older x newer, by the numbers of the two samples, of which the oldest is 0; in
     #: the order of the newer sample, then of the older one.
@@ -58,26 +58,26 @@ class Design:
     _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
-        return f"{self.form}, {self.samples} samples, {self.previous} before them, {len(self.pairs)} coefficients"
+        return f"{self.form}, {self.increments} samples, {self.previous} before them, {len(self.pairs)} coefficients"
 
     @cached_property
     def degree(self) -> int:
         """The total degree up to which products of two powers of time in the rate are integrated exactly."""
         for total in count(1):
-            for row, value in polynomial_conditions(self.samples, self.previous, total):
+            for row, value in polynomial_conditions(self.increments, self.previous, total):
                 if sum(row[pair] * c for pair, c in self.pairs.items()) != value:
                     return total - 1
         raise AssertionError("the samples are finite in number")
 
     def residual(self) -> _ResidualDrift:
         """Return the drift on coning that the design does not compensate."""
-        sines: dict[int, Fraction] = {self.samples: Fraction(1, 2)}
+        sines: dict[int, Fraction] = {self.increments: Fraction(1, 2)}
         for (older, newer), c in self.pairs.items():
             distance = newer - older
             for multiple, weight in ((distance, 2), (distance + 1, -1), (distance - 1, -1)):
                 sines[multiple] = sines.get(multiple, Fraction(0)) + weight * c
         nonzero = {m: c for m, c in sorted(sines.items()) if m and c}
-        return _ResidualDrift(self.samples, nonzero)
+        return _ResidualDrift(self.increments, nonzero)
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class _ResidualDrift:
     alpha^2 / (N T) times the sum of c_m sin(m lambda), minus N lambda / 2.
     """
 
-    samples: int  # N
+    increments: int  # N
     sines: dict[int, Fraction]  # c_m by m
 
     def series(self) -> Iterator[tuple[int, Fraction]]:
@@ -99,7 +99,7 @@ class _ResidualDrift:
             power = 2 * q + 1
             total = sum((c * m**power for m, c in self.sines.items()), Fraction(0))
             total *= Fraction((-1) ** q, math.factorial(power))
-            total -= Fraction(self.samples, 2) if q == 0 else 0
+            total -= Fraction(self.increments, 2) if q == 0 else 0
             if total:
                 yield power, total
 
@@ -111,18 +111,18 @@ class _ResidualDrift:
     @property
     def expression(self) -> str:
         """The drift in rad/s as text that SymPy can read, in alpha (rad), omega (rad/s) and T (s)."""
-        interval = _times(self.samples, "T")
-        terms = [f"-{_times(Fraction(self.samples, 2), 'omega*T')}"]
+        interval = _times(self.increments, "T")
+        terms = [f"-{_times(Fraction(self.increments, 2), 'omega*T')}"]
         for m, c in self.sines.items():
             sine = f"sin({_times(m, 'omega*T')})"
             terms.append(f"{'+' if c > 0 else '-'} {_times(abs(c), sine)}")
-        return f"alpha**2/{interval if self.samples == 1 else f'({interval})'}*({' '.join(terms)})"
+        return f"alpha**2/{interval if self.increments == 1 else f'({interval})'}*({' '.join(terms)})"
 
     @property
     def leading_expression(self) -> str:
         """The leading term of the drift in rad/s, in the same symbols."""
         power, c = self.leading
-        return f"{c / self.samples}*alpha**2*omega*(omega*T)**{power - 1}"
+        return f"{c / self.increments}*alpha**2*omega*(omega*T)**{power - 1}"
 
 
 def _times(c: Fraction | int, factor: str) -> str:

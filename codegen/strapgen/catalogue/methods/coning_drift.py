@@ -30,14 +30,14 @@ _POINTS = 1200
 class ConingShape(NamedTuple):
     """The samples and the gyro of a step, on which the drift on coning depends beside the coefficients."""
 
-    samples: int  # N, of the step
+    increments: int  # N, of the step
     previous: int  # samples from before the step
     gyro: GyroResponse | None = None  # None for increments that are integrals of the rate
 
     @property
     def unknowns(self) -> int:
         """Number of coefficients K_s."""
-        return self.samples + self.previous - 1
+        return self.increments + self.previous - 1
 
 
 def terms(shape: ConingShape, b: Any, context: Any) -> tuple[list[Any], Any]:
@@ -55,7 +55,7 @@ def terms(shape: ConingShape, b: Any, context: Any) -> tuple[list[Any], Any]:
         power = 1 / (constant + b * b * (square + b * b * fourth))
     factor = 2 * power * (1 - context.cos(b))
     columns = [factor * context.sin(s * b) for s in range(1, shape.unknowns + 1)]
-    return columns, (shape.samples * b - power * context.sin(shape.samples * b)) / 2
+    return columns, (shape.increments * b - power * context.sin(shape.increments * b)) / 2
 
 
 def _inverse_power(gyro: GyroResponse) -> tuple[Fraction, Fraction, Fraction]:
@@ -75,7 +75,7 @@ def powers(shape: ConingShape, count: int) -> list[tuple[list[Fraction], Fractio
     inverse = (Fraction(1),) if shape.gyro is None else _inverse_power(shape.gyro)
     conditions = []
     for q in range(1, count + 1):
-        power, n = 2 * q + 1, Fraction(shape.samples)
+        power, n = 2 * q + 1, Fraction(shape.increments)
         # The sum of K_s 2 sin(s b) (1 - cos b) is N b/(2 H) - sin(N b)/2.
         right = -(n**power) / 2
         if q < len(inverse):
@@ -98,7 +98,7 @@ def products(shape: ConingShape, degree: int) -> list[tuple[list[Fraction], Frac
     return [
         ([row[newest - s, newest] for s in range(1, newest + 1)], value)
         for total in range(1, degree + 1)
-        for row, value in polynomial_conditions(shape.samples, shape.previous, total)
+        for row, value in polynomial_conditions(shape.increments, shape.previous, total)
     ]
 
 

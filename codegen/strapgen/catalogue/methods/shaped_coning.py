@@ -23,6 +23,7 @@ from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.renamed import renamed
 from strapgen.registry import Merged, Registry, Titles
 
 #: Objective of the design: the largest drift over a band, or the drift under a spectrum whose phases are
@@ -37,6 +38,7 @@ MOST_DIGITS = 12
 _MISSED = Decimal("1e-6")
 
 
+@renamed(samples="increments")
 @dataclass(frozen=True)
 class ShapedConing:
     """Coning coefficients for a band or a spectrum.
@@ -48,7 +50,7 @@ class ShapedConing:
     ----------
     name, title, source : str
         Name on the command line, name for a reader, and where the coefficients come from.
-    samples, previous : int
+    increments, previous : int
         Samples of the step (N), and samples from before it (p).
     objective : str
         One of `OBJECTIVES`.
@@ -70,14 +72,14 @@ class ShapedConing:
     Examples
     --------
     >>> shape = SHAPES["coning-shaped-8"]
-    >>> shape.samples, shape.previous, float(shape.band), str(shape.level)
+    >>> shape.increments, shape.previous, float(shape.band), str(shape.level)
     (1, 8, 1.3, '7.00799E-10')
     """
 
     name: str
     title: str
     source: str
-    samples: int
+    increments: int
     previous: int
     objective: str
     coefficients: tuple[Fraction, ...]
@@ -92,7 +94,7 @@ class ShapedConing:
     _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:
-        return f"{self.name}: {self.title}\n{counted(self.samples, 'sample')}, {self.previous} before"
+        return f"{self.name}: {self.title}\n{counted(self.increments, 'sample')}, {self.previous} before"
 
     @property
     def option(self) -> str:
@@ -104,7 +106,7 @@ class ShapedConing:
     @property
     def own_samples(self) -> int:
         """Increments in a step."""
-        return self.samples
+        return self.increments
 
     @property
     def recipe(self) -> tuple[str, str, tuple[Any, ...]]:
@@ -116,15 +118,15 @@ class ShapedConing:
         if asked.rates:
             raise InputError(f"{self.name} takes increments; rates at nodes do not go with it")
         stated = {"increments": asked.increments, "previous": asked.previous, "ahead": asked.ahead}
-        for (what, value), needed in zip(stated.items(), (self.samples, self.previous, 0), strict=True):
+        for (what, value), needed in zip(stated.items(), (self.increments, self.previous, 0), strict=True):
             if value is not None and checks.count(what, value, smallest=0) != needed:
                 raise InputError(f"{what} is {value}; a step of {self.name} has {needed}")
-        return self, (self.samples, self.previous, 0)
+        return self, (self.increments, self.previous, 0)
 
     @property
     def pairs(self) -> dict[tuple[int, int], Fraction]:
         """The coefficient of each cross product older x newest, by the numbers of the samples; the oldest is 0."""
-        newest = self.samples + self.previous - 1
+        newest = self.increments + self.previous - 1
         return {(newest - s, newest): c for s, c in reversed([*enumerate(self.coefficients, 1)])}
 
 
@@ -225,7 +227,7 @@ def verify(shape: ShapedConing) -> None:
     """Check that the conditions hold exactly, and that the level is right to its digits."""
     from strapgen.catalogue.methods import coning_drift
 
-    of = coning_drift.ConingShape(shape.samples, shape.previous, shape.gyro)
+    of = coning_drift.ConingShape(shape.increments, shape.previous, shape.gyro)
     for q, (row, right) in enumerate(coning_drift.powers(of, shape.powers), 1):
         total = sum((a * c for a, c in zip(row, shape.coefficients, strict=True)), Fraction(0))
         if total != right:

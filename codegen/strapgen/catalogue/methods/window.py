@@ -13,6 +13,7 @@ from strapgen.ir import checks
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.renamed import renamed
 
 #: A filter: a weight for each sample of the window, the oldest first.
 Taps = tuple[Fraction, ...]
@@ -27,6 +28,7 @@ class GyroResponse:
     sample_hz: Annotated[Fraction, Key("Sampling frequency", "Hz", above=0)]
 
 
+@renamed(samples="total_increments")
 @dataclass(frozen=True)
 class Window:
     """Filters that estimate the rate over a step from samples before it, in it and ahead of it.
@@ -72,7 +74,7 @@ class Window:
     --------
     >>> from strapgen.catalogue.methods.windows import WINDOWS
     >>> window = WINDOWS["window-3-3"]
-    >>> window.samples, window.degree, [float(round(tap, 4)) for tap in window.filters[1]]
+    >>> window.total_increments, window.degree, [float(round(tap, 4)) for tap in window.filters[1]]
     (7, 4, [-0.0134, 0.0996, -0.4089, 0.0, 0.4089, -0.0996, 0.0134])
     >>> [(one.name, one.previous, one.ahead) for one in window.one_sided][:2]
     [('window-4-2', 4, 2), ('window-5-1', 5, 1)]
@@ -144,8 +146,8 @@ class Window:
         return chosen, (chosen.increments, chosen.previous, chosen.ahead)
 
     @property
-    def samples(self) -> int:
-        """Number of samples that the filters take: p + N + L."""
+    def total_increments(self) -> int:
+        """Number of increments that the filters take: p + N + L."""
         return self.previous + self.increments + self.ahead
 
     @property

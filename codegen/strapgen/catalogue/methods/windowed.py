@@ -135,7 +135,7 @@ class Filtered:
     def _pair(self, j: int, sign: int) -> sp.Matrix:
         """Return the sum or the difference of the samples j after the step and j before it."""
         if (j, sign) not in self._folded:
-            weights = [sp.Integer(0)] * self._window.samples
+            weights = [sp.Integer(0)] * self._window.total_increments
             weights[self._window.previous + self._window.increments - 1 + j] = sp.Integer(1)
             weights[self._window.previous - j] = sp.Integer(sign)
             name, what = (f"pair_{j}", "sum") if sign > 0 else (f"gap_{j}", "difference")
@@ -145,7 +145,7 @@ class Filtered:
 
     def _sample(self, k: int) -> sp.Matrix:
         return self._samples.combination(
-            "", [sp.Integer(int(k == other)) for other in range(self._window.samples)], ""
+            "", [sp.Integer(int(k == other)) for other in range(self._window.total_increments)], ""
         )
 
 

@@ -327,7 +327,9 @@ def _stored_filters(
     for number, table in enumerate(tables, 1):
         size = table.previous, table.ahead
         if size not in sizes or size in stored:
-            twice = "there twice" if size in stored else f"not among those for {window.samples} samples"
+            twice = (
+                "there twice" if size in stored else f"not among those for {window.total_increments} samples"
+            )
             raise InputError(
                 f"{key}[{number}]: {counted(size[0], 'sample')} before and {size[1]} ahead are {twice}"
             )

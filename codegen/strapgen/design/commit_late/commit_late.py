@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from strapgen.catalogue import AnyAlgorithm
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.commit_late import commit_late_sources
 from strapgen.design.commit_late.late_unit import (
@@ -47,8 +48,9 @@ class CommitLate:
     ----------
     window : str or Window
         A window of the catalogue by its name, or a family of filters.
-    algorithm : str, optional
-        "euler", Euler parameters, scalar last, or "dcm", the direction cosine matrix; body to reference.
+    algorithm : str, Choice or AttitudeAlgorithm, optional
+        "euler", Euler parameters, scalar last, or "dcm", the direction cosine matrix; body to reference. Of an object
+        the state counts; a window as its method has to be this one.
     backend : str, optional
         "numpy" or "fixed-model", generated functions called from Python, or "c", "c-float" or "c-fixed32", generated C.
         In fixed point what rounding a sample leaves goes on to the next one, as in a gyro that counts pulses.
@@ -88,7 +90,7 @@ class CommitLate:
     def __init__(
         self,
         window: str | Window = "window-7-7",
-        algorithm: str = "euler",
+        algorithm: AnyAlgorithm = "euler",
         backend: str = "numpy",
         sample_hz: float | str | Fraction | None = None,
         settings: Settings | None = None,
@@ -101,7 +103,7 @@ class CommitLate:
     def _load(
         self,
         window: str | Window,
-        algorithm: str,
+        algorithm: AnyAlgorithm,
         backend: str,
         sample_hz: float | str | Fraction | None,
         settings: Settings | None,
@@ -109,8 +111,10 @@ class CommitLate:
         """Return the unit on a back end; in fixed point, note its formats."""
         checks.choice("backend", backend, BACKENDS)
         target, settings = BACKENDS[backend].target, fit_settings(backend, settings)
+        filters = commit_late_sources.family(window, sample_hz)
+        state = commit_late_sources.state_name("CommitLate", algorithm, filters)
         if target in commit_late_sources.TARGETS:
-            whole = commit_late_sources.sources(window, algorithm, target, sample_hz, settings=settings)
+            whole = commit_late_sources.sources(window, state, target, sample_hz, settings=settings)
             self._note(whole)
             return LateUnitInC(whole)
         interpreted = ("numpy", "fixed-model")
@@ -118,8 +122,7 @@ class CommitLate:
             able = (*interpreted, *commit_late_sources.TARGETS)
             names = [name for name, entry in BACKENDS.items() if entry.target in able]
             raise InputError(f"backend is {backend!r}; these commit late: {', '.join(names)}")
-        filters = commit_late_sources.family(window, sample_hz)
-        parts = commit_late_sources.parts(filters, algorithm, target, settings)
+        parts = commit_late_sources.parts(filters, state, target, settings)
         self._note(parts.step)
         return LateUnit(parts) if settings is None else LateUnitOnIntegers(parts)
 

@@ -10,8 +10,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
-from strapgen import pipeline, targets
-from strapgen.catalogue import Choice, choose_step
+from strapgen import catalogue, pipeline, targets
+from strapgen.catalogue import AnyAlgorithm, Choice, choose_step, named
 from strapgen.catalogue.methods.window import Window
 from strapgen.catalogue.methods.windows import named_window
 from strapgen.design.commit_late import commit_late_fixed
@@ -89,6 +89,18 @@ def kernels(filters: LateFilters, algorithm: str) -> tuple[Choice, Choice, Choic
         Choice(f"{algorithm}-legendre-{'exact-' if filters.exact else ''}{filters.degree}"),
         Choice(NORMALIZATIONS[algorithm]),
     )
+
+
+def state_name(function: str, algorithm: AnyAlgorithm, filters: LateFilters) -> str:
+    """Return the name of the state that a function commits late; an object with another window is refused.
+
+    >>> state_name("CommitLate", choose_step("dcm", "window-7-7"), family("window-7-7"))
+    'dcm'
+    """
+    choice, window = named(function, algorithm), filters.window
+    if isinstance(choice, Choice) and choice.window not in (None, window):
+        raise InputError(f"window is {window.name}, but the choice of {choice.kernel} has its own")
+    return catalogue.state_name(function, algorithm, NORMALIZATIONS)
 
 
 def family(window: str | Window, sample_hz: float | str | Fraction | None = None) -> LateFilters:

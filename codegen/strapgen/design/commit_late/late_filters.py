@@ -65,7 +65,7 @@ class LateFilters:
                 f"the rotation of {self.window.name} has {self.window.terms} terms; one of {EXACT_TERMS} can be "
                 "committed late"
             )
-        if len(self.window.one_sided) + 1 != self.window.samples:
+        if len(self.window.one_sided) + 1 != self.window.total_increments:
             raise InputError(f"{self.window.name} has no one-sided filters; a whole family is needed")
 
     @property
@@ -76,7 +76,7 @@ class LateFilters:
     @property
     def samples(self) -> int:
         """Samples of a window: p + 1 + L."""
-        return self.window.samples
+        return self.window.total_increments
 
     @property
     def capacity(self) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.commit_late import commit_late_sources
 from strapgen.design.commit_late.commit_late_sources import NORMALIZATIONS
@@ -34,7 +34,7 @@ def recording_attitudes(
     samples: Any,
     kinds: Sequence[int] | None = None,
     *,
-    algorithm: str = "euler",
+    algorithm: AnyAlgorithm = "euler",
     backend: str = "numpy",
     initial: Any = None,
     sample_hz: float | str | Fraction | None = None,
@@ -49,8 +49,8 @@ def recording_attitudes(
         Angle increments of the intervals in rad, body axes; of no meaning where they were lost.
     kinds : sequence of int, (N,), optional
         What each sample is, as for `CommitLate.push`; by default all are good.
-    algorithm : str, optional
-        "euler" or "dcm".
+    algorithm : str, Choice or AttitudeAlgorithm, optional
+        "euler" or "dcm", as for `CommitLate`.
     backend : str, optional
         A back end in floating point: "numpy", "c" or "c-float".
     initial : array_like, (state shape), optional
@@ -79,12 +79,13 @@ def recording_attitudes(
            [0.      , 0.      , 0.707107, 0.707107]])
     """
     filters = commit_late_sources.family(window, sample_hz)
+    state = commit_late_sources.state_name("recording_attitudes", algorithm, filters)
     checks.choice("backend", backend, ("numpy", "c", "c-float"))
     row = checks.real_array("samples", samples, (3,))
     if row.ndim != 2:
         raise InputError(f"samples has shape {row.shape}; (N, 3) is needed")
     row = _restore(row, np.zeros(len(row), int) if kinds is None else np.asarray(kinds), filters)
-    step, rotation, normalization = commit_late_sources.kernels(filters, algorithm)
+    step, rotation, normalization = commit_late_sources.kernels(filters, state)
     loop = attitude_backend(step, backend=backend)
     turn = evaluator(rotation, backend)
     start = loop.identity if initial is None else initial
@@ -100,7 +101,7 @@ def recording_attitudes(
         first.append(_advance(turn, first[-1], row[:count], place, filters))
     part = StepWindows(lambda begin, stop: row[begin:stop], 1, previous + ahead)
     inside = loop.propagate_parts(part, len(row) - previous - ahead)
-    inside = evaluator(f"{algorithm}-product", backend)(first[-1], inside)
+    inside = evaluator(f"{state}-product", backend)(first[-1], inside)
     last = [inside[-1]]
     for place in range(count - ahead, count):
         last.append(_advance(turn, last[-1], row[-count:], place, filters))
@@ -178,7 +179,7 @@ def covers(choice: Choice, backend: str) -> bool:
         or window.gyro is not None
     ):
         return False
-    return window.increments == 1 and len(window.one_sided) == window.samples - 1
+    return window.increments == 1 and len(window.one_sided) == window.total_increments - 1
 
 
 def propagate_whole(
@@ -188,11 +189,12 @@ def propagate_whole(
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
     pulse: float | str | Fraction | None = None,
+    initial: Any = None,
 ) -> History:
-    """Run a window over all recorded increments, from zero rotation.
+    """Run a window over all recorded increments.
 
     The intervals at both ends have filters with fewer samples on one side. The states are normalized, whatever the
-    interval of orthonormalization.
+    interval of orthonormalization. `initial` (3, 3): direction cosine matrix at the start; by default no rotation.
 
     >>> from strapgen import choose
     >>> history = propagate_whole(choose("euler", "window-3-3"), "numpy", Recording(0.0, 0.01, np.full((9, 3), 1e-3)))
@@ -212,6 +214,10 @@ def propagate_whole(
         raise InputError(f"record {record} s is longer than the recording, {len(row) * step:.6g} s")
     if pulse is not None:
         row = pulses(row[:, None], pulse)[:, 0]
-    states = recording_attitudes(window, row, algorithm=choice.name, backend=backend)[::every]
+    if initial is not None and choice.name != "dcm":
+        initial = evaluator(f"{choice.name}-from-dcm")(np.asarray(initial, float))
+    states = recording_attitudes(window, row, algorithm=choice.name, backend=backend, initial=initial)[
+        ::every
+    ]
     time = recording.start + step * every * np.arange(len(states), dtype=np.float64)
     return History(time, states, step, 0)

@@ -214,7 +214,9 @@ class _Search:
         self._window = window
         self._unit = Fraction(1, 1 << bits)
         self._exact = sum(power < exact for power in unknowns.powers)
-        self._grid = search_grid(window.band, window.samples - 1, window.gyro, _POINTS, window.increments)
+        self._grid = search_grid(
+            window.band, window.total_increments - 1, window.gyro, _POINTS, window.increments
+        )
 
     def best(self, taps: Taps) -> Taps:
         """Return the taps of the least largest error."""

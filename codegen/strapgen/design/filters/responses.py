@@ -36,7 +36,7 @@ def level(window: Window, m: int) -> float:
     >>> f"{level(WINDOWS['window-3-3'], 1):.6e}"
     '2.160751e-03'
     """
-    grid = search_grid(window.band, window.samples - 1, window.gyro, increments=window.increments)
+    grid = search_grid(window.band, window.total_increments - 1, window.gyro, increments=window.increments)
     errors = [magnitude(*e) for e in grid.errors(m, _integers(window, m), window.previous)]
     place = max(range(len(errors)), key=lambda k: errors[k])
     largest = errors[place]
@@ -72,7 +72,7 @@ def largest_gain(window: Window) -> float:
     1.0
     """
     b = np.linspace(0.0, np.pi, _GAIN_POINTS + 1)
-    places = np.arange(window.samples) - window.previous
+    places = np.arange(window.total_increments) - window.previous
     response = np.exp(1j * np.outer(b, places)) @ np.array([float(tap) for tap in window.filters[0]])
     response = response * np.sinc(b / (2 * np.pi))
     if window.gyro is not None:
@@ -87,7 +87,9 @@ def errors(window: Window, m: int, points: Sequence[float]) -> NDArray[Any]:
     `points` (n,): angular frequencies in rad a sample, up to pi. Returns (n,): |sum_j F_j A_j - C_m|, for each
     unit of rate times the sampling interval.
     """
-    grid = BandGrid([REAL.mpf(b) for b in points], window.samples - 1, window.gyro, window.increments)
+    grid = BandGrid(
+        [REAL.mpf(b) for b in points], window.total_increments - 1, window.gyro, window.increments
+    )
     return np.array([magnitude(*e) / ONE for e in grid.errors(m, _integers(window, m), window.previous)])
 
 
@@ -98,7 +100,7 @@ def polynomial_fit(window: Window) -> tuple[tuple[Fraction, ...], ...]:
     >>> [str(tap) for tap in polynomial_fit(WINDOWS["window-3-3"])[1][4:]]
     ['7843/20160', '-211/2520', '191/20160']
     """
-    shape = Shape(window.previous, window.ahead, window.samples, window.gyro, window.increments)
+    shape = Shape(window.previous, window.ahead, window.total_increments, window.gyro, window.increments)
     filters = []
     for m in range(len(window.filters)):
         unknowns = Unknowns(shape, m)

@@ -173,7 +173,7 @@ def order_in_float(
 
 def _published_error(step: ForeignStep, standard: Design, length: Fraction, calls: int) -> float:
     """Return the largest error in rad of the published steps on the same samples."""
-    between = length / step.samples * standard.samples
+    between = length / step.samples * standard.increments
     errors = []
     for form in FORMS:
         published = attitude_backend(published_step(f"coning-{form}", standard))
@@ -240,7 +240,7 @@ def _across(by_axis: Array, axis: str) -> str:
 
 def _samples(standard: Design) -> str:
     before = f" and {standard.previous} before" if standard.previous else ""
-    return f"{standard.samples} sample{'s' if standard.samples > 1 else ''}{before}"
+    return f"{standard.increments} sample{'s' if standard.increments > 1 else ''}{before}"
 
 
 def cone() -> Motion:
@@ -265,7 +265,7 @@ def closed_form_deg_h(standard: Design) -> float:
 
 def published_step(method: str, standard: Design) -> catalogue.Choice:
     """Return the step of Euler parameters with a published correction."""
-    return catalogue.choose("euler", method, standard.samples, previous=standard.previous)
+    return catalogue.choose("euler", method, standard.increments, previous=standard.previous)
 
 
 def drift_deg_h(drift: Array, duration: Fraction) -> Array:
@@ -281,7 +281,7 @@ def drift_deg_h(drift: Array, duration: Fraction) -> Array:
 
 def generated_drifts(standard: Design) -> dict[str, float]:
     """Return the drift in deg/h that generated steps of published corrections leave, by their methods."""
-    length, duration = SAMPLING * standard.samples, seconds(standard.samples)
+    length, duration = SAMPLING * standard.increments, seconds(standard.increments)
     drifts = {}
     for form in FORMS:
         step = attitude_backend(published_step(f"coning-{form}", standard))

@@ -20,6 +20,7 @@ from strapgen import registration
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.motions.motion_names import MOTIONS, MotionEntry
 from strapgen.lab.motions.motion_names import parameters as settings_of
 from strapgen.lab.motions.rate_profiles import RateProfile, ReferenceAttitude
@@ -91,8 +92,9 @@ class Motion:
 
     __repr__ = short_repr
 
+    @renamed_parameters(samples="increments")
     def increments(
-        self, step: Fraction, steps: int, samples: int, previous: int = 0, ahead: int = 0
+        self, step: Fraction, steps: int, increments: int, previous: int = 0, ahead: int = 0
     ) -> Array:
         """Return the exact angle increments.
 
@@ -102,7 +104,7 @@ class Motion:
             Step length in s.
         steps : int
             Number of steps from t = 0.
-        samples : int
+        increments : int
             Increments per step.
         previous, ahead : int, optional
             Increments from before each step and from after it that it takes in addition; those before the first step
@@ -110,11 +112,11 @@ class Motion:
 
         Returns
         -------
-        array, (steps, previous + samples + ahead, 3)
+        array, (steps, previous + increments + ahead, 3)
             Integrals of the body rate in rad, body axes.
         """
-        row = self.samples(step / samples, -previous, steps * samples + ahead)
-        return windows(row, samples, previous + ahead)
+        row = self.samples(step / increments, -previous, steps * increments + ahead)
+        return windows(row, increments, previous + ahead)
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Array:
         """Return exact angle increments of some sampling intervals.

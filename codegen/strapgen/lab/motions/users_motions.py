@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks, packages
 from strapgen.ir.exceptions import InputError
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.motions.motions import Motion, motion
 from strapgen.lab.motions.rate_expressions import rate_of
@@ -72,11 +73,12 @@ class UsersMotion(Motion):
         row: Array = self._windows(float(interval) * last, 1, last, before, 0)[0]
         return row[first + before : stop + before]
 
+    @renamed_parameters(samples="increments")
     def increments(
-        self, step: Fraction, steps: int, samples: int, previous: int = 0, ahead: int = 0
+        self, step: Fraction, steps: int, increments: int, previous: int = 0, ahead: int = 0
     ) -> Array:
         """Return angle increments, see `Motion.increments`."""
-        return self._windows(float(step), steps, samples, previous, ahead)
+        return self._windows(float(step), steps, increments, previous, ahead)
 
     def attitude(self, time: Any) -> Array:
         """Return the true attitude, see `Motion.attitude`."""
@@ -90,9 +92,9 @@ class UsersMotion(Motion):
         times = np.asarray(time, float)
         return self._call("rate", (*times.shape, 3), times)
 
-    def _windows(self, step: float, steps: int, samples: int, previous: int, ahead: int) -> Array:
-        shape = (steps, previous + samples + ahead, 3)
-        return self._call("increments", shape, step, steps, samples, previous, ahead)
+    def _windows(self, step: float, steps: int, increments: int, previous: int, ahead: int) -> Array:
+        shape = (steps, previous + increments + ahead, 3)
+        return self._call("increments", shape, step, steps, increments, previous, ahead)
 
     def _call(self, function: str, shape: tuple[int, ...], *arguments: Any) -> Array:
         """Return the checked result of a function of the file."""
@@ -135,8 +137,8 @@ def read_motion(path: str | Path, duration: float | str | Fraction = 60) -> User
     >>> file = Path(tempfile.mkdtemp()) / "turn.py"
     >>> _ = file.write_text('''
     ... import numpy as np
-    ... def increments(step, steps, samples, previous=0, ahead=0):
-    ...     return np.full((steps, previous + samples + ahead, 3), [0, 0, step / samples])
+    ... def increments(step, steps, increments, previous=0, ahead=0):
+    ...     return np.full((steps, previous + increments + ahead, 3), [0, 0, step / increments])
     ... def attitude(t):
     ...     c, s, o = np.cos(t), np.sin(t), np.zeros_like(t)
     ...     return np.stack([c, -s, o, s, c, o, o, o, o + 1], axis=-1).reshape(*np.shape(t), 3, 3)

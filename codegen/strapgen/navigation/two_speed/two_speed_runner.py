@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from strapgen.catalogue import Choice
+from strapgen.catalogue import AnyAlgorithm, Choice, state_name
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.renamed import renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem
 from strapgen.navigation.systems.system_runner import EXACT_BITS, SystemMemory, SystemRun, carried
@@ -51,8 +52,8 @@ class TwoSpeed:
 
     Parameters
     ----------
-    algorithm : str
-        "dcm" or "euler".
+    algorithm : str, Choice or AttitudeAlgorithm
+        "dcm" or "euler"; of an object its state counts alone, since the loops have a method of their own.
     sculling : int, optional
         Form of the sculling integral: 1 has the rotation compensation in the fast loop, 2 in the slow loop.
     backend : str, optional
@@ -95,14 +96,15 @@ class TwoSpeed:
 
     def __init__(
         self,
-        algorithm: str,
+        algorithm: AnyAlgorithm,
         sculling: int = 2,
         backend: str = "numpy",
         settings: Settings | None = None,
     ) -> None:
         target = BACKENDS[checks.choice("backend", backend, BACKENDS)].target
         chosen = fit_settings(backend, settings)
-        self._load(backend, loop_sources(algorithm, sculling, target, chosen))
+        state = state_name("TwoSpeed", algorithm, two_speed_sources.ALGORITHMS)
+        self._load(backend, loop_sources(state, sculling, target, chosen))
 
     @classmethod
     def of_sources(cls, name: str, sources: LoopSources) -> TwoSpeed:
@@ -133,9 +135,10 @@ class TwoSpeed:
         """The generated function of each loop by itself."""
         return tuple(map(self._runner.evaluator, self.loops))
 
+    @renamed_parameters(increments="samples")
     def run(
         self,
-        increments: Any,
+        samples: Any,
         velocity_increments: Any,
         *,
         fast_cycles: int,
@@ -148,7 +151,7 @@ class TwoSpeed:
 
         Parameters
         ----------
-        increments : array_like, (N, 3)
+        samples : array_like, (N, 3)
             Angle increments of the fast cycles in rad, body axes.
         velocity_increments : array_like, (N, 3)
             Velocity increments of the fast cycles in m/s, body axes.
@@ -174,7 +177,7 @@ class TwoSpeed:
         """
         fast_cycles = checks.count("fast_cycles", fast_cycles, largest=checks.MOST)
         slow_cycles = checks.count("slow_cycles", slow_cycles, largest=checks.MOST)
-        angles, velocities = _samples(increments, velocity_increments, fast_cycles * slow_cycles)
+        angles, velocities = _checked(samples, velocity_increments, fast_cycles * slow_cycles)
         ends = len(angles) // fast_cycles + 1
         rates = np.zeros((ends, 3)) if turns is None else turns
         rates = checks.real_array("turns", rates, (3,), np.float64)
@@ -211,18 +214,18 @@ class TwoSpeed:
         return run
 
 
-def _samples(increments: Any, velocity_increments: Any, cycle: int) -> tuple[Array, Array]:
-    """Check the increments, which fill whole navigation cycles of `cycle` fast cycles, and return them."""
-    angles = checks.real_array("increments", increments, (3,), np.float64)
+def _checked(samples: Any, velocity_increments: Any, cycle: int) -> tuple[Array, Array]:
+    """Check the samples, which fill whole navigation cycles of `cycle` fast cycles, and return them."""
+    angles = checks.real_array("samples", samples, (3,), np.float64)
     velocities = checks.real_array("velocity_increments", velocity_increments, (3,), np.float64)
     if angles.ndim != 2 or len(angles) % cycle:
         raise InputError(
-            f"increments has shape {angles.shape}; (N, 3) with N a multiple of {cycle}, "
+            f"samples has shape {angles.shape}; (N, 3) with N a multiple of {cycle}, "
             "whole navigation cycles, is needed"
         )
     if velocities.shape != angles.shape:
         raise InputError(
-            f"velocity_increments has shape {velocities.shape}; that of increments, {angles.shape}, is needed"
+            f"velocity_increments has shape {velocities.shape}; that of samples, {angles.shape}, is needed"
         )
     return angles, velocities
 

@@ -171,7 +171,7 @@ def method_latex(tableau: Tableau) -> str:
 
 def coning_latex(design: Design) -> str:
     """Return the rotation vector of a step by coning coefficients, and the mean drift that remains on coning."""
-    names = [_sample(name) for name in sample_names(design.samples, design.previous)]
+    names = [_sample(name) for name in sample_names(design.increments, design.previous)]
     terms = [(Fraction(1), name) for name in names[design.previous :]]
     terms += [(c, rf"{names[older]} \times {names[newer]}") for (older, newer), c in design.pairs.items()]
     symbols = {name: sp.Symbol(name) for name in ("alpha", "omega", "T")}
@@ -187,7 +187,8 @@ def window_latex(window: Window) -> str:
     The increments of the step are \mathbf{d}_{1} and on, those before it \mathbf{d}_{0} and back.
     """
     samples = [
-        rf"\mathbf{{d}}_{{{k}}}" for k in range(1 - window.previous, window.samples - window.previous + 1)
+        rf"\mathbf{{d}}_{{{k}}}"
+        for k in range(1 - window.previous, window.total_increments - window.previous + 1)
     ]
     return _rounded(
         (rf"\mathbf{{c}}_{{{m}}}", _decimal_sum(zip(row, samples, strict=True)))
@@ -197,7 +198,7 @@ def window_latex(window: Window) -> str:
 
 def shaped_coning_latex(shape: ShapedConing) -> str:
     """Return the rotation vector of a step by coefficients for a band or a spectrum; they have four decimals."""
-    names = [rf"\mathbf{{d}}_{{{k}}}" for k in range(1 - shape.previous, shape.samples + 1)]
+    names = [rf"\mathbf{{d}}_{{{k}}}" for k in range(1 - shape.previous, shape.increments + 1)]
     older = _decimal_sum((c, names[-1 - s]) for s, c in reversed([*enumerate(shape.coefficients, 1)]))
     total = " + ".join(names[shape.previous :])
     return _rounded([(r"\boldsymbol{\phi}", rf"{total} + \left({older}\right) \times {names[-1]}")])
