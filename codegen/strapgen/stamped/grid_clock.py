@@ -162,11 +162,9 @@ class GridClock:
         if self.number == BLOCK:
             mean = self.total // BLOCK
             self.total = self.number = 0
-            self.hold, self.period, self.turn = (
-                mean >> HOLD,
-                period + (mean >> PERIOD),
-                self.turn + (mean >> TURN),
-            )
+            self.hold = mean >> HOLD
+            self.period += mean >> PERIOD
+            self.turn += mean >> TURN
         return [_offset(ahead, interval)]
 
     def finish(self) -> list[int]:
