@@ -275,8 +275,8 @@ def test_parts_cover_all_rows(few_on_disk, overlap, count, rng):
     assert largest_magnitude(columns.array()) == np.abs(rows).max()
 
 
-def test_a_full_disk_is_reported(few_on_disk, monkeypatch):
-    monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: open("/dev/full", "wb"))  # noqa: SIM115, PTH123
+def test_a_full_disk_is_reported(few_on_disk, full_device, monkeypatch):
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: full_device.open("wb"))
     columns = Columns(1)
     with pytest.raises(
         InputError, match=r"^the temporary folder .* does not hold so long a recording \(No space left"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.recordings.formats import dataflash, tlog, ulog
+from strapgen.lab.recordings.formats import array_tables, column_tables, dataflash, ros, tlog, ulog
 from strapgen.lab.recordings.formats.csv_table import CsvTable
 from strapgen.lab.recordings.log_topic import LogColumn, LogTopic
 from strapgen.storage import streams
@@ -44,6 +44,8 @@ class LogFile(Protocol):
 def open_log(path: str | Path) -> LogFile:
     """Open a file; its format follows from its first bytes and its suffix."""
     path = checks.path("path", path)
+    if (path / "metadata.yaml").is_file():  # a bag of ROS 2 is a folder
+        return ros.RosLog(path, "ros2")
     head = _head(path)
     if head.startswith(ulog.MAGIC):
         return ulog.ULog(path)
@@ -51,6 +53,14 @@ def open_log(path: str | Path) -> LogFile:
         return dataflash.DataFlash(path)
     if tlog.is_tlog(head):
         return tlog.TLog(path)
+    for magic, kind in ros.MAGICS.items():
+        if head.startswith(magic):
+            return ros.RosLog(path, kind)
+    for magic, kind in column_tables.MAGICS.items():
+        if head.startswith(magic):
+            return column_tables.ColumnLog(path, kind)
+    if head.startswith((array_tables.HDF5, array_tables.MAT)):
+        return array_tables.ArrayLog(path, head)
     return CsvTable(path)
 
 

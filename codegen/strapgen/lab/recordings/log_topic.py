@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+
+from strapgen.ir import units
 
 
 @dataclass(frozen=True)
@@ -28,3 +31,10 @@ class LogTopic:
     def names(self) -> tuple[str, ...]:
         """Names of the columns."""
         return tuple(column.name for column in self.columns)
+
+
+def unit_of(name: str, stated: str = "") -> str | None:
+    """Return the unit that is stated, or that stands in brackets behind a name."""
+    match = re.fullmatch(r".*[\[(]([^\])]*)[\])]\s*", name)
+    text = stated.strip("[]() ") or ("" if match is None or match[1].strip().isdigit() else match[1])
+    return units.spelled(text) if text else None

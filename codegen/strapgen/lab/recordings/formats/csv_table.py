@@ -25,7 +25,7 @@ from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings.formats.decimals import Marks
-from strapgen.lab.recordings.log_topic import LogColumn, LogTopic
+from strapgen.lab.recordings.log_topic import LogColumn, LogTopic, unit_of
 from strapgen.lab.recordings.long_columns import Columns
 from strapgen.storage import streams
 
@@ -122,7 +122,7 @@ class CsvTable:
             count = 2
             while name in columns:
                 name, count = f"{text.strip()}.{count}", count + 1
-            columns[name] = LogColumn(name, _stated_unit(unit, name))
+            columns[name] = LogColumn(name, unit_of(name, unit))
         return tuple(columns.values())
 
     def read(self, topic: str, columns: Sequence[str]) -> dict[str, Array]:
@@ -271,13 +271,6 @@ def _are_units(cells: list[str]) -> bool:
     known = {*units.RATES, *units.TIMES, *units.FORCES}
     stated = [units.spelled(cell.strip("[]() ")) for cell in cells]
     return not known.isdisjoint(stated) and not any(map(_resembles_number, cells))
-
-
-def _stated_unit(unit: str, name: str) -> str | None:
-    """Return the unit in a row of units, or in brackets behind a name."""
-    match = re.fullmatch(r".*[\[(]([^\])]*)[\])]\s*", name)
-    text = unit.strip("[]() ") or ("" if match is None or match[1].strip().isdigit() else match[1])
-    return units.spelled(text) if text else None
 
 
 def line_blocks(path: Path) -> Iterator[bytes]:
