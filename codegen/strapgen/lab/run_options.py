@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from strapgen.lab.motions.motions import Motion
     from strapgen.lab.parallel_cases import Cluster
+    from strapgen.lab.recordings.reading import Reading
     from strapgen.lab.recordings.recording import Recording
     from strapgen.lab.sensor_errors.instruments import InstrumentErrors
 
@@ -263,12 +264,10 @@ class RecordingOptions:
         """The file of recorded data."""
         return self.place[0]
 
-    def load(self, *, force: bool = False) -> Recording:
-        """Read the recorded data."""
-        from strapgen.lab.recordings import recording
+    def reading(self, *, force: bool = False) -> Reading:
+        """Return how the recorded data are read."""
         from strapgen.lab.recordings.reading import Reading
 
-        file, topic = self.place
         of_old = (
             "increments"
             if self.increments_csv is not None
@@ -278,7 +277,7 @@ class RecordingOptions:
         )
         if self.resample_hz is not None and self.every is not None:
             raise InputError("--every and --resample-hz are both given; one is needed")
-        reading = Reading(
+        return Reading(
             self.input or of_old,
             None if self.columns is None else ",".join(self.columns),
             *(
@@ -292,6 +291,13 @@ class RecordingOptions:
             ),
             *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz),
         )
+
+    def load(self, *, force: bool = False) -> Recording:
+        """Read the recorded data."""
+        from strapgen.lab.recordings import recording
+
+        file, topic = self.place
+        reading = self.reading(force=force)
         with waiting(f"reading {file.name}"):
             return recording.recorded(file, topic, reading)
 

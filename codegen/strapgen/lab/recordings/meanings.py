@@ -337,6 +337,9 @@ def _stated_columns(stated: Stated, columns: Sequence[_Column]) -> _Found:
     pairs = [word.partition("=") for word in words]
     has_keys = all(equals and key in KEYS for key, equals, _ in pairs)
     keys = KEYS if stated.has_time else KEYS[1:]
+    if not has_keys and all(equals for _, equals, _ in pairs) and pairs[0][0] in KEYS:
+        for key, _, _ in pairs:
+            checks.choice("--columns key", key, KEYS)
     if not has_keys:
         pairs = [(key, "=", word) for key, word in zip(keys, words, strict=False)]
     named = {key: name.strip() for key, _, name in pairs}
