@@ -31,6 +31,7 @@ COMMANDS = {
     f"simulate euler --rates --method rk1 {RUN}": "run",
     "simulate two-speed-euler --motion constant --set y_deg_s=10 --duration 1": "run",
     "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
+    "log tests/data/increments.csv": "log",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
     "cost euler --cpu cortex-m3": "cost",

@@ -21,7 +21,7 @@ def log(
     source: Annotated[RecordingOptions, Shown(only=_SHOWN)],
     output: Annotated[Output, Shown(only=TEXT_OUTPUT)],
 ) -> None:
-    """Show what a log holds, each of its faults, and the command that runs it.
+    """Show what a log holds, and the command that runs it.
 
     You see the columns with what they mean, the sampling rate and its jitter, gaps, and where the gyro rests. What
     names and units leave open is guessed from the numbers, and said to be a guess.

@@ -20,7 +20,7 @@ REGISTRATION = Registration(
         "log": Command(
             f"{__package__}.log_command:log",
             "Run",
-            summary="Show what a log holds, each of its faults, and the command that runs it",
+            summary="Show what a log holds, and the command that runs it",
         ),
         "converge": Command(
             f"{__package__}.converge_command:converge",
