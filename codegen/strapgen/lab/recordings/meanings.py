@@ -124,12 +124,12 @@ def find(topics: Sequence[LogTopic], topic: str, stated: Stated) -> tuple[Meanin
             found[one.name] = rank, of_topic(one, stated)
         except InputError:
             continue
-    names = checks.alternatives([*found])
     if not found:
         seen = ", ".join(one.name for one in topics[: checks.MOST_NAMES])
         raise InputError(
             f"no topic has a time and rates about three axes; it has {seen}; FILE:TOPIC names one"
         )
+    names = checks.alternatives([*found])
     first = min(found.values(), key=lambda one: one[0])
     if first[0] == len(_MESSAGES) and len(found) > 1:
         raise InputError(
