@@ -88,6 +88,7 @@ COMMANDS = {
     ),
     "window show window-3-3": "window",
     "window generate window-3-3 --target c --out OUT": "late-sources",
+    "stamped --sample-hz 200 --tick-hz 1e6 --out OUT": "stamped",
     "frontier --method rk4:2 --duration 1 --jobs 1": "frontier",
     "design examples/briefs/ahrs.toml --method coning-compressed --simulate 1 --jobs 1": "selection",
     "tables --table 3 --backend numpy": "thesis-tables",

@@ -18,6 +18,8 @@ from strapgen.cli.values import Number, Positive, Vector, line, names, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.recordings.attitude_names import TRAJECTORIES
+from strapgen.lab.recordings.log_topic import split_topic
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -255,9 +257,7 @@ class RecordingOptions:
     @property
     def place(self) -> tuple[Path, str]:
         """The file and the topic."""
-        path = Path(self.source)
-        name, colon, topic = self.source.rpartition(":")
-        return (Path(name), topic) if colon and not path.exists() and Path(name).exists() else (path, "")
+        return split_topic(self.source)
 
     @property
     def file(self) -> Path:
@@ -551,9 +551,13 @@ class RunOutput(Output):
         Needs("--matrices", "--format=json"),
         Excludes("--print", "--format=json|csv|markdown|latex"),
     )
+    formats: ClassVar[tuple[str, ...]] = (*Output.formats, *TRAJECTORIES, "parquet")
 
     plot: Annotated[Path | None, plot_option("the plots")] = None
-    format: Annotated[_Text, format_option(Output.formats, "  [default: text; csv for recorded data]")] = None
+    format: Annotated[
+        _Text,
+        format_option(formats, "  [default: text; for recorded data csv, or parquet by the file's name]"),
+    ] = None
     title: Annotated[
         _Text, option("--title", metavar="TEXT", help="Title of the text, and of the plots.", read=line)
     ] = None
@@ -568,6 +572,12 @@ class RunOutput(Output):
     matrices: Annotated[
         bool, option("--matrices", help="Add the computed and the true matrices to the JSON output.")
     ] = False
+
+    def check(self, *read: str | Path | None) -> None:
+        """Check what `Output` checks, and that a file without text is none for the terminal."""
+        super().check(*read)
+        if self.format == "parquet" and self.file is None:
+            raise InputError("--format parquet is no text; --out FILE is needed")
 
 
 @dataclass(frozen=True)

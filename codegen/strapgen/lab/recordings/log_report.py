@@ -287,13 +287,12 @@ def _with_rate_unit(how: Reading, meaning: Meanings, samples: Samples) -> tuple[
 
 def _columns(topic: LogTopic, meaning: Meanings | None) -> list[LoggedColumn]:
     """Return the columns of a topic with what they mean."""
-    attitude: tuple[str, ...] = ()
+    known: dict[str, str] = {}
     with suppress(InputError):
-        _, attitude = meanings.attitude(topic)
-    known = dict(
-        zip(attitude, ("w", *_AXES) if len(attitude) == 4 else ("roll", "pitch", "heading"), strict=False)
-    )
-    known = {name: f"attitude {element}" for name, element in known.items()}
+        found = meanings.attitude(topic)
+        elements: tuple[str, ...] = ("w", *_AXES) if found.order == "sxyz" else (*_AXES, "w")
+        elements = elements if found.order else ("roll", "pitch", "heading")
+        known = {name: f"attitude {one}" for name, one in zip(found.columns, elements, strict=True)}
     of_units: dict[str, str | None] = {}
     if meaning is not None:
         names = ("increment", "velocity increment") if meaning.input == "increments" else ("rate", "force")

@@ -379,9 +379,9 @@ def read(
     --------
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n30,0,0,90\n")
+    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n20,0,0,90\n40,0,0,90\n")
     >>> read(log, gaps="bridge").samples[:, 2].round(6)
-    array([0.015708, 0.015708, 0.015708, 0.015708])
+    array([0.015708, 0.015708, 0.015708, 0.015708, 0.015708])
     """
     reading = Reading(
         *(input, columns, time_unit, rate_unit, force_unit, sample_hz, axes, start, end),
