@@ -18,6 +18,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.lab.processors import PROCESSORS, executed, run_tool, version
@@ -207,7 +208,7 @@ def _values(signal: Signal, largest: float) -> list[float]:
 
 
 @dataclass(frozen=True)
-class CostResult(Result):
+class CostResult(ReadOnly, Result):
     """Size and execution of kernels on microcontrollers: a row for each kernel and processor."""
 
     rows_in = "costs"

@@ -18,6 +18,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
+from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
@@ -141,7 +142,8 @@ class Backend:
         self._product = kernels.product if self.evaluator.needs_product else None
         self._beside: dict[str, Evaluator] = {}
         self.dtype = self.evaluator.dtype
-        self.identity: Array = np.array([float(x) for x in kernels.identity], self.dtype).reshape(state.shape)
+        identity = np.array([float(x) for x in kernels.identity], self.dtype)
+        self.identity: Array = read_only(identity.reshape(state.shape))
         self.unit = float(np.finfo(self.dtype).eps)
         self.increment_unit: float | None = None
         self.count: float | None = None

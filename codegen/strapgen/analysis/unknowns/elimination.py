@@ -22,6 +22,7 @@ from sympy.polys.orderings import grevlex, lex
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel import power_series, reading
 from strapgen.results.records import entry, properties
 
@@ -56,7 +57,7 @@ def _repr(expressions: Sequence[sp.Expr]) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Family:
+class Family(ReadOnly):
     """Solutions with free parameters.
 
     Parameters
@@ -73,7 +74,7 @@ class Family:
 
     computed = properties(dimension=entry())
 
-    values: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
+    values: Mapping[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
     free: tuple[sp.Symbol, ...] = field(metadata=entry(key="parameters", kind=list[str]))
     nonzero: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_repr, kind=list[str]))
     equations: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_repr, kind=list[str]))

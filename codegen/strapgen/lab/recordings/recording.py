@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
+from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import renamed
 from strapgen.lab.recordings.recorded_header import (
     ColumnLayout,
@@ -56,7 +57,7 @@ GAP = 10
 
 @renamed(increments="samples")
 @dataclass(frozen=True)
-class Recording:
+class Recording(ReadOnly):
     """Angle increments at even intervals.
 
     Parameters
@@ -82,9 +83,6 @@ class Recording:
     remarks: tuple[str, ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"

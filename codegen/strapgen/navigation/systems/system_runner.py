@@ -16,6 +16,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.signals import CYCLE
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems import system_generation
@@ -290,8 +291,8 @@ class SystemMemory:
 
 
 @dataclass(frozen=True)
-class SystemRun:
-    """The result of a run."""
+class SystemRun(ReadOnly):
+    """The result of a run; its memory can be written, and goes into a next run."""
 
     values: Mapping[str, Array]  # by the name of the cell, in SI units, (times, shape)
     memory: SystemMemory = field(repr=False)  # at the end, from which a next run goes on

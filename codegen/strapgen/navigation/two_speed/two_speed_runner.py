@@ -19,6 +19,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem
@@ -120,7 +121,7 @@ class TwoSpeed:
         loops = Loops if sources.whole is None else LoopsInC
         self._runner = loops(sources, evaluator_class(self.loops[0].target))
         self.state = self.loops[1].function.inputs[0]
-        self.identity: Array = np.eye(3) if self.state.size == 9 else np.array([0.0, 0, 0, 1])
+        self.identity: Array = read_only(np.eye(3) if self.state.size == 9 else np.array([0.0, 0, 0, 1]))
 
     def __getstate__(self) -> tuple[str, LoopSources]:
         """Return the name of the back end and the sources, which say all."""
@@ -205,8 +206,8 @@ class TwoSpeed:
         with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
             attitudes, changes = self._runner.run(cycles)
         run = TwoSpeedRun(
-            self._runner.in_si("state", attitudes).reshape(-1, *self.state.shape),
-            self._runner.in_si("velocity_change", changes),
+            read_only(self._runner.in_si("state", attitudes).reshape(-1, *self.state.shape)),
+            read_only(self._runner.in_si("velocity_change", changes)),
         )
         for what, values in zip(("attitude", "velocity"), run, strict=True):
             if not np.isfinite(values).all():
