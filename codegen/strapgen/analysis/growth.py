@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import sympy as sp
 
@@ -237,8 +237,8 @@ class StabilityResult(Result):
     """The growth of states in steps at a constant rate: a row for each step."""
 
     rows_in = "steps"
-    row = Stability
-    drawn_by = "strapgen.analysis.analysis_plots:stability_image"
+    row: ClassVar[type | None] = Stability
+    drawn_by: ClassVar[str] = "strapgen.analysis.analysis_plots:stability_image"
 
     steps: Sequence[Stability]
 

@@ -128,7 +128,7 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 #: The key of `Program.operations` under which an operation is counted.
-COUNTED_AS = {
+COUNTED_AS: Mapping[str, str | None] = {
     **{kind: kind for kind in ("add", "multiply", "divide", "sqrt", "negate", "select")},
     **{"subtract": "add", "maximum": "select"},
     "at_least": None,  # counted with its select

@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import ClassVar
 
 from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.catalogue import Choice
@@ -212,7 +213,7 @@ class CostResult(ReadOnly, Result):
     """Size and execution of kernels on microcontrollers: a row for each kernel and processor."""
 
     rows_in = "costs"
-    row = Cost
+    row: ClassVar[type | None] = Cost
 
     costs: Sequence[Cost]
     #: Whether they are all of the standard catalogue, which is a page in Markdown

@@ -19,9 +19,10 @@ class Printer:
     """
 
     #: The step from 1 to the next number of the target.
-    resolution = DOUBLE_RESOLUTION
+    resolution: Fraction = DOUBLE_RESOLUTION
     #: The operators of a product and of a quotient.
-    times, over = "*", "/"
+    times: str = "*"
+    over: str = "/"
 
     def text(self, node: Node) -> str:
         """Return a node as source text."""

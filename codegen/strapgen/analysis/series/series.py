@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import sympy as sp
 
@@ -27,7 +27,7 @@ from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab import one_step
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.one_step import Step, errors
-from strapgen.results.records import Record, entry, properties
+from strapgen.results.records import Properties, Record, entry, properties
 
 #: Motions for which a series can be derived.
 MOTIONS = ("general", *catalogue.MOTIONS)
@@ -84,7 +84,7 @@ class ErrorSeries(ReadOnly, Record):
         Coefficients of the kernel that are not known: all terms are polynomials in them.
     """
 
-    computed = properties(order=entry())
+    computed: ClassVar[Properties] = properties(order=entry())
 
     kernel: str
     motion: str

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import sympy as sp
 
@@ -304,7 +304,7 @@ _SYMBOLS = {"velocity": r"\delta\mathbf{v}", "position": r"\delta\mathbf{r}/h"}
 class VelocitySeriesResult(Result):
     """The errors of one step of velocity and position, as power series in its length."""
 
-    each = VelocityTerms
+    each: ClassVar[type | None] = VelocityTerms
 
     several: Sequence[VelocitySeries]
 

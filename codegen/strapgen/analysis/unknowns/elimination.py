@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from operator import le
-from typing import Any
+from typing import Any, ClassVar
 
 import sympy as sp
 from sympy.core.random import rng
@@ -24,7 +24,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
 from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel import power_series, reading
-from strapgen.results.records import entry, properties
+from strapgen.results.records import Properties, entry, properties
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Family(ReadOnly):
         Irreducible polynomials in the free unknowns that must be zero; empty for almost all families.
     """
 
-    computed = properties(dimension=entry())
+    computed: ClassVar[Properties] = properties(dimension=entry())
 
     values: Mapping[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
     free: tuple[sp.Symbol, ...] = field(metadata=entry(key="parameters", kind=list[str]))

@@ -95,7 +95,7 @@ class Recording(ReadOnly):
 
 
 @renamed(increments="samples")
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InertialRecording(Recording):
     """Angle and velocity increments at even intervals.
 
@@ -111,8 +111,6 @@ class InertialRecording(Recording):
     """
 
     velocity_increments: Array
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

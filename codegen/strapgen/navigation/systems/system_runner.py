@@ -21,7 +21,7 @@ from strapgen.ir.signals import CYCLE
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems import system_generation
 from strapgen.navigation.systems.fitting import GeneratedStages, fitted
-from strapgen.navigation.systems.system import Push, Rate, SystemStage
+from strapgen.navigation.systems.system import DescribedSystem, Push, Rate, SystemStage
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.wiring import Description
 from strapgen.run import compiler
@@ -64,8 +64,8 @@ class SystemRunner:
     def __init__(self, fit: GeneratedStages, backend: str) -> None:
         self.fit = fit
         self.backend = backend
-        self.system = fit.description.system
-        self.many_digits = BACKENDS[backend].many_digits
+        self.system: DescribedSystem = fit.description.system
+        self.many_digits: bool = BACKENDS[backend].many_digits
 
     @cached_property
     def evaluators(self) -> dict[str, Evaluator]:
@@ -316,9 +316,9 @@ class CompiledSystem(SystemRunner):
 
     def __init__(self, fit: GeneratedStages, backend: str, sources: Sources | None = None) -> None:
         super().__init__(fit, backend)
-        self.sources = sources or system_generation.unit(fit, f"strapgen system {self.system.name}")
-        self.module = compiler.load(self.sources)
-        self.name = self.sources.function.name
+        self.sources: Sources = sources or system_generation.unit(fit, f"strapgen system {self.system.name}")
+        self.module: Any = compiler.load(self.sources)
+        self.name: str = self.sources.function.name
 
     @property
     def number(self) -> np.dtype[Any]:
