@@ -114,6 +114,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "KernelBuilder": builder,
     "Stage": lambda: kernel().stages[0],
     "Target": lambda: strapgen.TARGETS["c"],
+    "Language": lambda: strapgen.Language(str.isidentifier, lambda texts: [{*" ".join(texts).split()}]),
 }
 
 

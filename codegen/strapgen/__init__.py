@@ -13,7 +13,7 @@ Functions take the object, a name or a Choice alike:
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
   motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
-  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
+  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target, Language
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
 
@@ -124,6 +124,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.run.backends import build as build
     from strapgen.run.backends import evaluator as evaluator
     from strapgen.run.compiler import compile_together as compile_together
+    from strapgen.targets.names import Language as Language
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
 
@@ -259,6 +260,7 @@ _NAMES = {
         "EPSILON",
     ),
     "navigation.systems.wiring": ("read_system",),
+    "targets.names": ("Language",),
     "targets.registry": (
         "TARGETS",
         "Target",

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Self
 
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputTypeError
 from strapgen.ir.interfaces import Interface, RoundingBounds
 from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import notebook_html, short_repr
@@ -89,6 +91,11 @@ class Sources(ReadOnly):
         **rest: Any,
     ) -> Self:
         """Return the files of a target as sources, whose function has this name; `rest` are further fields."""
+        checks.text("function of Sources.of", function)
+        if not isinstance(files, Mapping):
+            raise InputTypeError(
+                f"files of Sources.of is {checks.describe(files)}; texts by file name are needed"
+            )
         from strapgen.ir.integer_program import FixedProgram  # sources from the cache are there without it
 
         code = program.program if isinstance(program, FixedProgram) else program
