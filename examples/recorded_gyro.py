@@ -1,6 +1,6 @@
-"""Attitude from a recorded gyro log: uneven rates in deg/s, resampled to 100 Hz, on every back end.
+"""Attitude from a recorded gyro log, some of whose samples are lost, on every back end.
 
-Usage: python recorded_gyro.py [LOG.csv]   (first four columns: time in s, three rates in deg/s)
+Usage: python recorded_gyro.py [LOG]   (any log that states the units of its rates)
 """
 
 import math
@@ -15,8 +15,8 @@ LOG = Path(__file__).parent / "gyro_log.csv"
 
 
 def main(log=LOG):
-    recording = strapgen.read_rates(log, "deg/s", resample_hz=100)
-    print(f"{len(recording.samples)} increments of {recording.interval} s")
+    recording = strapgen.read(log, input="instants", gaps="bridge")
+    print(f"{len(recording.samples)} increments of {recording.interval:.6g} s")
     for name in strapgen.BACKENDS:
         try:
             backend = strapgen.backend("euler", "rk4", 2, name)

@@ -101,6 +101,8 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Sources": lambda: strapgen.generate(program(), "c"),
     "Course": lambda: strapgen.course("euler", inertial(), fast_cycles=2),
     "Motion": lambda: strapgen.motion("coning", a_deg_s=10, b_deg_s=10, g_deg_s=10),
+    "AttitudeError": lambda: strapgen.attitude_error(OBJECTS["History"](), OBJECTS["TrueAttitude"]()),
+    "TrueAttitude": lambda: strapgen.TrueAttitude.of([0, 1e-2, 1], [[0, 0, 0, 1]] * 3),
     "History": lambda: strapgen.propagate(stepper(), recording()),
     "InertialRecording": inertial,
     "Recording": recording,

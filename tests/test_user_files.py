@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -46,13 +45,11 @@ def test_schemas_and_page_are_those_of_the_models():
 
 
 def test_every_file_that_users_copy_names_the_schema_of_its_kind():
-    tracked = subprocess.run(
-        ["git", "ls-files", "*.toml"], cwd=ROOT, capture_output=True, text=True
-    ).stdout.split()
     copied = {
-        ROOT / name
-        for name in tracked
-        if name.startswith(("examples/", "codegen/")) and not name.endswith("pyproject.toml")
+        path
+        for folder in ("examples", "codegen")
+        for path in (ROOT / folder).rglob("*.toml")
+        if path.name != "pyproject.toml"
     }
     assert copied == set(EXAMPLES) and set(EXAMPLES.values()) == set(SCHEMAS)
     for path, kind in EXAMPLES.items():

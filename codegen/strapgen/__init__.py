@@ -11,7 +11,8 @@ What there is, each a table of names: ALGORITHMS, METHODS, KERNELS, MOTIONS, TAR
 Functions take the object, a name or a Choice alike:
 
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
-  motions     motion, read_motion; read_rates, read_increments, read_inertial; simulate, propagate
+  motions     motion, read_motion; read, Recording, InertialRecording; simulate, propagate
+  recordings  propagate; rests; TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
   your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target, Language
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
@@ -97,9 +98,15 @@ if _typing.TYPE_CHECKING:
     from strapgen.lab.recordings.recording import InertialRecording as InertialRecording
     from strapgen.lab.recordings.recording import Recording as Recording
     from strapgen.lab.recordings.recording import propagate as propagate
+    from strapgen.lab.recordings.recording import read as read
     from strapgen.lab.recordings.recording import read_increments as read_increments
     from strapgen.lab.recordings.recording import read_inertial as read_inertial
     from strapgen.lab.recordings.recording import read_rates as read_rates
+    from strapgen.lab.recordings.rest import rests as rests
+    from strapgen.lab.recordings.true_attitude import AttitudeError as AttitudeError
+    from strapgen.lab.recordings.true_attitude import TrueAttitude as TrueAttitude
+    from strapgen.lab.recordings.true_attitude import attitude_error as attitude_error
+    from strapgen.lab.recordings.true_attitude import time_offset as time_offset
     from strapgen.lab.runs import Run as Run
     from strapgen.lab.runs import simulate as simulate
     from strapgen.lab.scipy_rotations import from_rotation as from_rotation
@@ -233,9 +240,17 @@ _NAMES = {
         "InertialRecording",
         "Recording",
         "propagate",
+        "read",
         "read_increments",
         "read_inertial",
         "read_rates",
+    ),
+    "lab.recordings.rest": ("rests",),
+    "lab.recordings.true_attitude": (
+        "AttitudeError",
+        "TrueAttitude",
+        "attitude_error",
+        "time_offset",
     ),
     "lab.runs": (
         "Run",
@@ -296,10 +311,12 @@ if not _typing.TYPE_CHECKING:  # a type checker would take any name for one that
 
     def __getattr__(name: str) -> object:
         # Loaded when first used: the command line answers before SymPy or numpy are imported.
-        if name in _EXPORTS:
-            return getattr(_importlib.import_module(f"{__name__}.{_EXPORTS[name]}"), name)
-        if name in _NAMESPACES:
-            return _importlib.import_module(f"{__name__}.{_NAMESPACES[name]}")
+        if place := _EXPORTS.get(name) or _NAMESPACES.get(name):
+            from strapgen.ir.applications import needing
+
+            with needing(f"strapgen.{name}"):
+                module = _importlib.import_module(f"{__name__}.{place}")
+            return getattr(module, name) if name in _EXPORTS else module
         if name in _RENAMED:
             from strapgen.ir.renamed import warn
 

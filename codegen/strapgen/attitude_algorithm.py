@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from strapgen import pipeline
 from strapgen.catalogue import AnyAlgorithm, Choice, choose_step
 from strapgen.catalogue.choice import AnyMethod
+from strapgen.ir.applications import needing
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings, StatedSettings, with_settings
 from strapgen.ir.integer_program import FixedProgram
@@ -97,6 +98,7 @@ class AttitudeAlgorithm:
         """Return the straight-line code with its counts, see `strapgen.lower`; the cache holds it."""
         return pipeline.program(self.choice)
 
+    @needing("series")
     def series(self, motion: str = "general", terms: int = 2) -> ErrorAnalysis:
         """Return the truncation error of a step, and of a run, as exact power series of the step length in s.
 
@@ -131,6 +133,7 @@ class AttitudeAlgorithm:
 
         return backend(self.choice, backend=name, settings=settings)
 
+    @needing("simulate")
     def simulate(
         self,
         motion: str | Motion = "coning",
@@ -186,6 +189,7 @@ class AttitudeAlgorithm:
         profile = motions.motion(motion, **parameters) if isinstance(motion, str) else motion
         return simulate(self.backend(backend, settings), profile, step, duration, orthonormalize, record)
 
+    @needing("compare")
     def compare(
         self,
         samples: Any = None,
@@ -309,6 +313,7 @@ class AttitudeAlgorithm:
         """
         return pipeline.fixed_program(self.choice, Settings.stated_or(settings, stated) or Settings())
 
+    @needing("check")
     def check(self) -> FindingsResult:
         """Check the behaviour of the step as its user sees it, see `strapgen.check`.
 
@@ -321,6 +326,7 @@ class AttitudeAlgorithm:
 
         return check(self.choice)
 
+    @needing("converge")
     def converge(
         self,
         motion: Motion | None = None,
@@ -341,6 +347,7 @@ class AttitudeAlgorithm:
 
         return converge(self.choice, motion, LADDER if steps is None else steps, duration, backend, settings)
 
+    @needing("cost")
     @with_settings
     def cost(
         self,

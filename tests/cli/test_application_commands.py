@@ -148,7 +148,7 @@ MOTION = "--motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --duration 2"
 VIBRATION = (
     "vibration euler --step 0.01 --frequency-hz 20 --theta-x-rad 0.01 --theta-y-rad 0.01 --phase-rad 0"
 )
-LOG = "--increments-csv log.csv"
+LOG = "--recording log.csv"
 
 
 @pytest.fixture
@@ -195,7 +195,7 @@ def without_errors(text: str) -> object:
     [
         f"simulate euler {MOTION} --step 0.02 --format json",
         f"simulate dcm --method rk2 {MOTION} --step 0.02 --format json --backend c",
-        "simulate euler --increments-csv inc.csv --format json",
+        "simulate euler --recording inc.csv --format json",
         f"simulate {EXAMPLES}/attitude.toml {MOTION} --format json",
         f"strapdown dcm {LOG} --fast-cycles 4 --slow-cycles 25 --format json",
         f"strapdown {EXAMPLES}/strapdown.toml {LOG} --format json",
@@ -277,7 +277,7 @@ def test_fixed_point_takes_formats_that_hold_the_errors(in_folder):
         ),
         (f"{VIBRATION} --gyro-bandwidth-hz 80,60,40 --gyro-damping 1", "one number or two with a comma"),
         (f"{VIBRATION} --gyro-bandwidth-hz 80,0 --gyro-damping 1", "gyro-bandwidth-hz is 0"),
-        ("simulate euler --increments-csv inc.csv --errors force.toml", "no velocity increments"),
+        ("simulate euler --recording inc.csv --errors force.toml", "no velocity increments"),
         (
             f"simulate euler {MOTION} --step 0.02 --errors bias.toml --out bias.toml",
             "is a file that the command reads",

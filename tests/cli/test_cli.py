@@ -644,7 +644,7 @@ def test_output_into_a_file(strapgen_says, tmp_path):
 
 
 def test_recorded_rates(strapgen_says):
-    options = f"--rates-csv {DATA}/rates_uneven.csv --rate-unit deg/s --resample-hz 100"
+    options = f"--input instants --recording {DATA}/rates_uneven.csv --repair clock"
     data = json.loads(strapgen_says(f"simulate dcm {options} --record 0.5 --orthonormalize 1 --format json"))
     assert list(data) == [
         *("schema", "algorithm", "method", "increments", "backend", "source"),
@@ -659,14 +659,16 @@ def test_unit_of_rates_matters(strapgen_says, tmp_path):
     log, last = tmp_path / "log.csv", []
     log.write_text("".join(f"{k / 100},0.1,0.2,0.3\n" for k in range(51)))
     for unit in ("deg/s", "rad/s"):
-        said = strapgen_says(f"simulate euler --rates-csv {log} --rate-unit {unit} --format json")
+        said = strapgen_says(
+            f"simulate euler --input instants --recording {log} --rate-unit {unit} --format json"
+        )
         last.append(json.loads(said)["attitude"][-1])
     assert not np.allclose(*last)
 
 
 @pytest.mark.long
 def test_unused_increments_are_reported(capsys):
-    line = f"simulate euler --increments 3 --increments-csv {DATA}/increments.csv --format"
+    line = f"simulate euler --increments 3 --recording {DATA}/increments.csv --format"
     said = {}
     for form in ("json", "text", "csv"):
         with pytest.raises(SystemExit) as stop:
@@ -681,7 +683,7 @@ def test_unused_increments_are_reported(capsys):
 @pytest.mark.long
 def test_recording_into_files(strapgen_says, tmp_path):
     pytest.importorskip("matplotlib")
-    options = f"--rates-csv {DATA}/rates_even.csv --rate-unit deg/s"
+    options = f"--input instants --recording {DATA}/rates_even.csv --rate-unit deg/s"
     wanted = strapgen_says(f"simulate euler {options}")
     assert strapgen_says(f"simulate euler {options} --out attitude.csv --plot attitude.png") == ""
     assert (tmp_path / "attitude.csv").read_text() == wanted
@@ -709,9 +711,7 @@ def test_compare_json(strapgen_says):
 
 
 def test_compare_recorded_increments(strapgen_says):
-    said = strapgen_says(
-        f"compare euler --backends c-fixed16 --increments-csv {DATA}/increments.csv --carry full"
-    )
+    said = strapgen_says(f"compare euler --backends c-fixed16 --recording {DATA}/increments.csv --carry full")
     assert "drift from numpy" in said and "c-fixed16" in said
 
 
@@ -771,6 +771,7 @@ def at_work(process: int) -> int:
     return count
 
 
+@pytest.mark.posix
 @pytest.mark.long
 def test_an_interrupt_stops_a_study_at_once(tmp_path):
     # Cases that take minutes each, in two processes.
@@ -889,6 +890,7 @@ print("loaded", *sorted({{"sympy", "jinja2"}} & sys.modules.keys()))
     assert done.stdout.splitlines()[-1] == "loaded"
 
 
+@pytest.mark.posix
 @pytest.mark.long
 @pytest.mark.parametrize(
     "command",
@@ -914,10 +916,8 @@ def test_reader_that_is_gone_before_is_no_error():
     "command",
     ["list", f"simulate dcm {CONING}"],
 )
-def test_full_disk(command):
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full on this machine")
-    with Path("/dev/full").open("w") as full:
+def test_full_disk(command, full_device):
+    with full_device.open("w") as full:
         program = [sys.executable, "-m", "strapgen", *shlex.split(command)]
         done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
@@ -1030,9 +1030,7 @@ def test_tables_predicted(strapgen_says):
 @pytest.mark.long
 def test_strapdown_is_the_course_of_python(strapgen_says, tmp_path):
     log = DATA.parents[1] / "examples" / "inertial_log.csv"
-    command = (
-        f"strapdown euler --increments-csv {log} --fast-cycles 4 --slow-cycles 50 --initial-deg 10,20,30"
-    )
+    command = f"strapdown euler --recording {log} --fast-cycles 4 --slow-cycles 50 --initial-deg 10,20,30"
     said = json.loads(strapgen_says(f"{command} --frame-rate-deg-h 0,0,15 --format json"))
     made = course(
         "euler",

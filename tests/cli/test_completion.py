@@ -7,17 +7,19 @@ import sys
 
 import pytest
 
-from strapgen.cli import main
+from strapgen import registration
+from strapgen.cli import completion, main
 
 
 @pytest.fixture
 def completed(monkeypatch, capsys):
     """Return the words that a shell gets for a line."""
 
-    def complete(line: str, shell: str = "bash") -> list[str]:
+    def complete(line: str, shell: str = "bash", position: int | None = None) -> list[str]:
         monkeypatch.setenv("_STRAPGEN_COMPLETE", f"complete_{shell}")
         monkeypatch.setenv("COMP_WORDS" if shell == "bash" else "_TYPER_COMPLETE_ARGS", line)
-        monkeypatch.setenv("COMP_CWORD", str(len(line.split(" ")) - 1))
+        last = len(line.split("\n" if "\n" in line else " ")) - 1
+        monkeypatch.setenv("COMP_CWORD", str(last if position is None else position))
         if shell == "fish":
             monkeypatch.setenv("_TYPER_COMPLETE_FISH_ACTION", "get-args")
         with pytest.raises(SystemExit) as stop:
@@ -56,6 +58,19 @@ def completed(monkeypatch, capsys):
         ("strapgen tableau butch", ["butcher5", "butcher6"]),
         ("strapgen evidence euler --tool ga", ["gappa"]),
         ("strapgen series euler --versus d", ["dcm"]),
+        ("strapgen help ", ["generate", "study"]),
+        ("strapgen help mon", []),
+        ("strapgen help study mon", ["monte-carlo"]),
+        ("strapgen simulate euler --motion coning --set a_", ["a_deg_s=", "a_rad_s="]),
+        ("strapgen simulate --motion=cone --set half_angle_deg=1 --step 0.01 --set fr", ["frequency_hz="]),
+        ("strapgen converge euler --motion coning --set a_deg_s=1 b_deg_s=2 g_d", ["g_deg_s="]),
+        ("strapgen study word-length --set a_d", ["a_deg_s="]),
+        ("strapgen study velocity-position --set ", ["rate_deg_s=", "rate_rad_s="]),
+        ("strapgen study velocity-position --force lever --force-set x_m=1 y", ["y_m="]),
+        ("strapgen study redundancy --set scale", ["scale_ppm="]),
+        ("strapgen study pulse-torque --set gain=1 lag_", ["lag_gain=", "lag_pole=", "lag_s="]),
+        ("strapgen study loops --set tilt_deg=2 --set h", ["heading_deg=", "height_m="]),
+        ("strapgen study loops --set tilt_deg=2 --fo", ["--format"]),
     ],
 )
 def test_names_are_completed(line, some, shell, completed):
@@ -66,6 +81,43 @@ def test_names_are_completed(line, some, shell, completed):
 
 def test_names_that_a_list_has_are_not_offered_again(completed):
     assert "rk4,rk4" not in completed("strapgen compare euler --method rk4,")
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("strapgen study loops --set tilt_deg=2 t", []),  # it is set
+        ("strapgen study loops --set tilt_deg=", []),  # a number is needed
+        ("strapgen simulate euler --set ", []),  # no motion has been named
+        ("strapgen simulate euler --motion own.py --set ", []),
+        ("strapgen help derive ", []),  # `help` takes the name of a command alone
+        ("strapgen help nobody ", []),
+        ("strapgen help derive --meth", []),
+    ],
+)
+def test_nothing_is_offered_where_nothing_fits(line, offered, completed):
+    assert completed(line) == offered
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("strapgen derive euler --method = rk", ["rk1", "rk2", "rk3", "rk4"]),
+        ("strapgen study loops --set tilt_deg = 2 he", ["heading_deg=", "height_m="]),
+        ("strapgen study loops --set tilt_deg =", []),
+    ],
+)
+def test_bash_makes_equals_signs_words_of_their_own(words, offered, completed):
+    assert completed(words.replace(" ", "\n")) == offered
+
+
+def test_bash_has_words_behind_the_cursor(completed):
+    assert completed("strapgen ge euler", position=1) == ["generate"]
+
+
+def test_commands_of_a_package_are_groups_too(monkeypatch):
+    monkeypatch.setattr(registration, "installed_commands", lambda: iter([("own fit", None, None)]))
+    assert completion._is_group(["own"]) and not completion._is_group(["own", "fit"])
 
 
 def test_variants_of_the_folder_are_completed(tmp_path, monkeypatch, completed):
@@ -141,6 +193,9 @@ sys.exit(", ".join(name for name in ("sympy", "mpmath") if name in sys.modules) 
         "strapgen evidence euler --tool ",
         "strapgen study sensor-errors ",
         "strapgen schema ",
+        "strapgen help ",
+        "strapgen simulate euler --motion coning --set ",
+        "strapgen study loops --set ",
     ],
 )
 def test_sympy_is_not_imported(line):

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +106,14 @@ def test_a_run_shows_a_table_and_a_plot(run, monkeypatch):
 
 def test_plots_are_figures_or_files(history, tmp_path):
     pytest.importorskip("matplotlib")
-    assert [axes.get_title(loc="left") for axes in history.plot().axes] == ["e_x", "e_y", "e_z", "e_s"]
+    panels = [
+        "roll, deg",
+        "pitch, deg",
+        "heading, deg",
+        "length of the state less 1",
+        "magnitude of the rate, deg/s",
+    ]
+    assert [axes.get_title(loc="left") for axes in history.plot().axes] == panels
     path = tmp_path / "history.svg"
     assert history.plot(path, "a title") == path
     assert "a title" in path.read_text()
@@ -179,10 +187,14 @@ def test_rotations_that_do_not_fit_are_refused(history):
     with pytest.raises(strapgen.InputError, match=r"^rotation holds 2 attitudes; a single one is needed$"):
         strapgen.from_rotation(transform.Rotation.from_quat(np.eye(4)[2:]), backend)
     with pytest.raises(
-        strapgen.InputTypeError, match=r"^the states of a History come without their back end"
+        strapgen.InputTypeError,
+        match=r"^the states of this History are not known as attitudes of a back end$",
     ):
-        strapgen.to_rotation(history)
+        strapgen.to_rotation(replace(history, backend=None))
     assert len(strapgen.to_rotation(history, backend)) == len(history.time)
+    assert (
+        strapgen.to_rotation(history).inv() * strapgen.to_rotation(history, backend)
+    ).magnitude().max() == 0
 
 
 def test_ipython_uses_the_display_of_objects(run):

@@ -97,7 +97,7 @@ def test_a_dash_is_the_terminal_and_a_file_holds_the_same(answer, tmp_path):
 def test_a_course_is_plotted_and_written_as_a_table(answer, tmp_path):
     pytest.importorskip("matplotlib")
     log = Path(__file__).resolve().parents[2] / "examples" / "inertial_log.csv"
-    run = f"strapdown dcm --increments-csv {log} --fast-cycles 4 --slow-cycles 50"
+    run = f"strapdown dcm --recording {log} --fast-cycles 4 --slow-cycles 50"
     assert answer(f"{run} --format markdown --plot course.svg").startswith("| time_s | C_11 |")
     assert "heading, deg" in (tmp_path / "course.svg").read_text()
 
@@ -219,7 +219,7 @@ def test_a_file_that_a_command_reads_is_not_written_over(tmp_path, monkeypatch, 
     Path("link.csv").symlink_to("log.csv")
     for out in ("--out log.csv", "--out ./log.csv", "--out link.csv", "--plot log.csv"):
         with pytest.raises(SystemExit) as stop:
-            main(shlex.split(f"simulate euler --increments-csv log.csv {out}"))
+            main(shlex.split(f"simulate euler --recording log.csv {out}"))
         said = capsys.readouterr()
         assert (stop.value.code, said.out) == (2, "")
         assert "is a file that the command reads; another one is needed" in said.err

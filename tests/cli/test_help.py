@@ -103,7 +103,7 @@ def test_every_value_has_a_name_in_capitals():
     for name, command in EVERY.items():
         for parameter in command.params:
             if not getattr(parameter, "is_flag", False) and parameter.name != "show_completion":
-                assert re.fullmatch(r"[A-Z][A-Z_0-9=,.|mnQ]*", parameter.metavar or ""), (
+                assert re.fullmatch(r"[A-Z][][A-Z_0-9=,.:|mnQ]*", parameter.metavar or ""), (
                     name,
                     parameter.name,
                 )
@@ -253,7 +253,7 @@ def test_reading_and_running_a_recording_are_shown(impatient, monkeypatch, tmp_p
         return wait
 
     monkeypatch.setattr(sys, "stderr", stream)
-    for name, text in (("read_increments", "reading log.csv"), ("propagate", "running euler-rk4-2")):
+    for name, text in (("recorded", "reading log.csv"), ("propagate", "running euler-rk4-2")):
         monkeypatch.setattr(recording, name, slowly(getattr(recording, name), text))
-    run(["simulate", "euler", "--increments-csv", str(tmp_path / "log.csv")])
+    run(["simulate", "euler", "--input", "increments", "--recording", str(tmp_path / "log.csv")])
     assert stream.getvalue().endswith("\r\x1b[2K")

@@ -42,7 +42,7 @@ def said(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("line", "file"),
     [
-        ("simulate euler --rate-unit deg/s --resample-hz 100 --rates-csv {}", EXAMPLES / "gyro_log.csv"),
+        ("simulate euler --gaps bridge --recording {}", EXAMPLES / "gyro_log.csv"),
         ("tableau {}", EXAMPLES / "heun3.toml"),
         ("derive dcm --tableau {}", METHODS / "butcher_tableaux/butcher5.toml"),
         ("window show {}", METHODS / "window_filters/window-3-3.toml"),
@@ -63,17 +63,17 @@ def test_standard_input_is_read_as_a_file_is(line, file, said):
 
 
 def test_what_is_wrong_in_standard_input_has_one_line(said):
-    status, output, error = said("simulate euler --increments-csv -", "a,b\n1,2\n")
+    status, output, error = said("simulate euler --recording -", "a,b\n1,2\n")
     assert (status, output) == (2, "") and error.startswith("strapgen: -")
     status, output, error = said("derive dcm --tableau -", "a = [")
     assert (status, output) == (2, "") and error.startswith("strapgen: - is not TOML")
 
 
 def test_standard_input_is_read_once(said):
-    assert said("simulate euler --rates-csv - --errors x.toml --tableau -") == (
+    assert said("simulate euler --recording - --errors x.toml --tableau -") == (
         2,
         "",
-        "strapgen: --tableau and --rates-csv are both -; standard input is read once\n",
+        "strapgen: --tableau and --recording are both -; standard input is read once\n",
     )
 
 

@@ -58,10 +58,11 @@ def test_simulate_shows_the_errors_of_a_system(file, tmp_path, capsys):
 
 def test_a_recording_gives_attitude_and_outputs(file, log, tmp_path, capsys):
     status, out, _ = says(
-        f"simulate {file} --rates-csv {log} --columns t,dx,dy,dz --rate-unit rad/s --format json", capsys
+        f"simulate {file} --input instants --recording {log} --columns t,dx,dy,dz --rate-unit rad/s --format json",
+        capsys,
     )
     assert status == 0 and json.loads(out)["sample_hz"] == 100
-    status, out, err = says(f"strapdown two-speed-euler --increments-csv {log} --format json", capsys)
+    status, out, err = says(f"strapdown two-speed-euler --recording {log} --format json", capsys)
     assert (status, err) == (0, "")
     data = json.loads(out)
     assert data["units"] == {"slow_state": "1", "nav_velocity_change": "m/s"} and data["unused_samples"] == 0
@@ -70,13 +71,13 @@ def test_a_recording_gives_attitude_and_outputs(file, log, tmp_path, capsys):
         np.linalg.norm(data["outputs"]["nav_velocity_change"], axis=1), 0.981, rtol=1e-3
     )
     table = tmp_path / "course.csv"
-    assert says(f"strapdown two-speed-euler --increments-csv {log} --out {table}", capsys)[0] == 0
+    assert says(f"strapdown two-speed-euler --recording {log} --out {table}", capsys)[0] == 0
     rows = [*csv.reader(table.read_text().splitlines())]
     assert rows[0][:2] == ["time_s", "slow_state_x"] and rows[0][-1] == "nav_velocity_change_z, m/s"
     assert len(rows) == 21 and float(rows[-1][1]) == pytest.approx(
         data["outputs"]["slow_state"][-1][0], rel=1e-8
     )
-    status, out, _ = says(f"strapdown two-speed-euler --increments-csv {log} --initial-deg 0,0,90", capsys)
+    status, out, _ = says(f"strapdown two-speed-euler --recording {log} --initial-deg 0,0,90", capsys)
     assert "slow_state, unit 1, frame b to n" in out
 
 
@@ -106,17 +107,17 @@ def test_options_not_for_systems_are_refused_in_one_line(file, log, tmp_path, ca
         (f"simulate {file} {CONING} --duration 1 --step 0", "step"),
         (f"simulate {gyro} {CONING} --duration 1", "system gyro has no attitude among its outputs"),
         (f"simulate {tmp_path}/none.toml {CONING} --duration 1", "none.toml cannot be read"),
-        (f"simulate {file} --increments-csv {log} --record 1", "go with --motion"),
-        (f"simulate {file} --increments-csv {log} --specific-force 0,0,1", "--specific-force needs --motion"),
+        (f"simulate {file} --recording {log} --record 1", "goes with --motion"),
+        (f"simulate {file} --recording {log} --specific-force 0,0,1", "--specific-force needs --motion"),
         (f"simulate euler {CONING} --step 0.1 --duration 1 --specific-force 0,0,1", "--specific-force goes"),
         (f"compare {run} --fail-above 1", "--fail-above does not go"),
         (f"compare {run} --source x.c", "x.c"),
         (f"compare {run} --plot {tmp_path}/x.png", "--plot does not go"),
         (f"compare {run} --increments 3", "--increments does not go"),
-        (f"strapdown {file} --increments-csv {log} --fast-cycles 4", "--fast-cycles does not go"),
-        (f"strapdown {file} --increments-csv {log} --frame-rate-deg-h 1,2,3", "--frame-rate-deg-h does not"),
-        (f"strapdown {file} --increments-csv {log} --plot {tmp_path}/x.png", "--plot does not go"),
-        (f"strapdown dcm --increments-csv {log}", "--fast-cycles is missing"),
+        (f"strapdown {file} --recording {log} --fast-cycles 4", "--fast-cycles does not go"),
+        (f"strapdown {file} --recording {log} --frame-rate-deg-h 1,2,3", "--frame-rate-deg-h does not"),
+        (f"strapdown {file} --recording {log} --plot {tmp_path}/x.png", "--plot does not go"),
+        (f"strapdown dcm --recording {log}", "--fast-cycles is missing"),
         (f"evidence {file} --method rk4 --tool z3", "--method does not go"),
         (f"evidence {file} --lsb-rad 1 --tool z3", "--lsb-rad does not go"),
         (f"verify {tmp_path}", "holds none of the headers of a system"),

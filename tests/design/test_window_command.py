@@ -367,7 +367,7 @@ def test_a_window_runs_over_a_recording_from_end_to_end(run, tmp_path):
     row = strapgen.motion("random", rate_deg_s=200).samples(Fraction(1, 100), 0, 20)
     lines = [f"{0.01 * (k + 1):.2f},{','.join(map(repr, sample.tolist()))}" for k, sample in enumerate(row)]
     (tmp_path / "log.csv").write_text("\n".join(["t,dx,dy,dz", *lines]))
-    command = "simulate euler --method window-3-3 --increments-csv log.csv --backend numpy --format json"
+    command = "simulate euler --method window-3-3 --recording log.csv --backend numpy --format json"
     status, said, warned = run(command)
     assert status == 0, warned
     data = json.loads(said)

@@ -14,9 +14,10 @@ import pytest
 
 from strapgen.cli import main
 from strapgen.navigation.loops import loops_study
+from strapgen.navigation.loops.loop_errors import LoopErrors
 from strapgen.navigation.loops.loop_gains import closed_loop
 from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
-from strapgen.navigation.loops.loops_study import LoopErrors, factors, run_loops
+from strapgen.navigation.loops.loops_study import factors, run_loops
 
 SCHEDULE = replace(read(), cycle_s=Fraction(1, 10))
 MODES = SCHEDULE.timed(Fraction(0))

@@ -6,13 +6,17 @@ import json
 import shlex
 from pathlib import Path
 from shutil import which
+from types import GenericAlias, SimpleNamespace
+from typing import TypeVar
 
+import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
+from numpy.typing import NDArray
 
 from strapgen import registration
 from strapgen.cli import main
-from strapgen.results.records import UNITS
+from strapgen.results.records import UNITS, type_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = "--motion constant --set y_deg_s=10 --step 0.5 --duration 1"
@@ -26,7 +30,7 @@ COMMANDS = {
     f"simulate euler {RUN} --matrices --title a --initial-deg 1,2,3": "run",
     f"simulate euler --rates --method rk1 {RUN}": "run",
     "simulate two-speed-euler --motion constant --set y_deg_s=10 --duration 1": "run",
-    "simulate dcm --increments-csv tests/data/increments.csv --title a": "attitude",
+    "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
     "cost euler --cpu cortex-m3": "cost",
@@ -45,12 +49,12 @@ COMMANDS = {
     "generate --all --target numpy --out OUT": "catalogue",
     "two-speed dcm --sculling 1 --target c-fixed --out OUT": "two-speed",
     "system examples/strapdown.toml --target c-fixed --word 16": "system",
-    "strapdown examples/strapdown.toml --increments-csv examples/inertial_log.csv": "system-outputs",
+    "strapdown examples/strapdown.toml --recording examples/inertial_log.csv": "system-outputs",
     "compare two-speed-euler --backend c,c-fixed16 --motion constant --set y_deg_s=10 --duration 0.1": (
         "system-comparison"
     ),
     "study system examples/strapdown.toml --sample-hz 100 --duration 1 --backend c-float": "system-study",
-    "strapdown euler --increments-csv examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
+    "strapdown euler --recording examples/inertial_log.csv --fast-cycles 4 --slow-cycles 50": "course",
     "redundancy examples/hexad.toml --out OUT": "redundant-sensors",
     "study redundancy --trials 10": "redundancy",
     "study calibration examples/positions-20.toml --rate-deg-s 10,0,0": "calibration",
@@ -151,6 +155,31 @@ def test_every_schema_is_valid_and_in_docs(name):
 
 def test_docs_have_no_other_schemas():
     assert {path.stem for path in (ROOT / "docs" / "schemas").iterdir()} == {*RESULTS}
+
+
+Number = TypeVar("Number")
+
+
+@pytest.mark.parametrize(
+    ("meant", "parts", "schema"),
+    [
+        (NDArray[np.float64], (), {"type": "array", "items": {"type": ["number", "array"]}}),
+        (list[Number], (float,), {"type": "array", "items": {"type": "number"}}),
+        (
+            list[Number] | None,
+            (int,),
+            {"anyOf": [{"type": "array", "items": {"type": "integer"}}, {"type": "null"}]},
+        ),
+    ],
+)
+def test_names_of_types_stand_for_what_they_mean(meant, parts, schema):
+    """A statement ``type Array[Number] = ...``, which Python 3.11 has not; NDArray of NumPy 2.5 is one."""
+    name = SimpleNamespace(__value__=meant)
+    assert (
+        type_schema(GenericAlias(name, parts) if parts else name)
+        == schema
+        == type_schema(meant[parts] if parts else meant)
+    )
 
 
 def test_numbers_have_the_units_that_their_names_end_with():

@@ -73,7 +73,7 @@ def _run(words: list[str]) -> Any:
     from strapgen.run.processes import prepare_for_derivations
 
     prepare_for_derivations()
-    return _run_program(_spread_settings(_asked_help(words)))
+    return _run_program(completion.spread_settings(_asked_help(words)))
 
 
 def _run_program(words: list[str]) -> Any:
@@ -102,17 +102,3 @@ def _fail(message: str) -> None:
     line = " ".join(word if len(word) <= _LONGEST_WORD else f"{word[:_CUT]}..." for word in message.split())
     sys.stderr.write(f"strapgen: {line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + '...'}\n")
     sys.exit(2)
-
-
-def _spread_settings(words: list[str]) -> list[str]:
-    """Let one --set take several settings: ``--set a=1 b=2`` becomes ``--set a=1 --set b=2``; --force-set likewise."""
-    spread: list[str] = []
-    inside = ""
-    for word in words:
-        if inside and "=" in word and not word.startswith("-") and spread[-1] != inside:
-            spread.append(inside)
-        elif word.startswith("-"):
-            name = word.partition("=")[0]
-            inside = name if name in ("--set", "--force-set") else ""
-        spread.append(word)
-    return spread

@@ -31,6 +31,7 @@ def option(
     panel: str | None = None,
     read: Reader | None = None,
     words: Words | None = None,
+    hidden: bool = False,
 ) -> Any:
     """Return an option of a command; the names after the first one are aliases, which the help does not show.
 
@@ -44,6 +45,7 @@ def option(
         metavar=metavar,
         help=help,
         rich_help_panel=panel,
+        hidden=hidden,
         parser=read,  # type: ignore[arg-type]
         autocompletion=None if words is None else completion.of(words),
     )

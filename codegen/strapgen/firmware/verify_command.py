@@ -50,7 +50,7 @@ def verify(
 
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """
-    output.check(file, source.increments_csv, source.rates_csv)
+    output.check(file, *source.files)
     from strapgen.firmware import header_command, verification
 
     header = verification.whole_header(file)

@@ -31,8 +31,12 @@ TIMES = {
     "us": Fraction(1, 10**6),
     "ns": Fraction(1, 10**9),
 }
-#: Units of specific force, which tell an accelerometer from a gyro.
-FORCES = ("m/s^2", "g", "mg")
+#: Units of specific force in m/s^2.
+FORCES = {
+    "m/s^2": Fraction(1),
+    "g": Fraction("9.80665"),
+    "mg": Fraction("0.00980665"),
+}
 
 #: Other spellings, once `_plain` has simplified them.
 _SPELLINGS = {

@@ -13,6 +13,7 @@ from strapgen.lab import comparison_report, convergence_report, runs_report
 from strapgen.lab.comparison import Comparisons
 from strapgen.lab.convergence import Convergence
 from strapgen.lab.recordings.recording import History
+from strapgen.lab.recordings.true_attitude import AttitudeError
 from strapgen.lab.runs import Run
 from strapgen.lab.runs_report import AXES, SKEW_PLANES
 from strapgen.results import figures
@@ -56,6 +57,14 @@ def _(history: History) -> TextTable:
 
 
 @table.register
+def _(error: AttitudeError) -> TextTable:
+    return runs_report.table_of(
+        ["time_s", "error_deg", *(f"error_{axis}_deg" for axis in AXES)],
+        np.degrees(np.column_stack([np.radians(error.time), error.angle, error.vector])).tolist(),
+    )
+
+
+@table.register
 def _(rows: Comparisons) -> TextTable:
     return keyed_table(rows)
 
@@ -83,6 +92,16 @@ def _(history: History) -> tuple[Variables, dict[str, Any]]:
     states = history.states.reshape(len(history.time), -1)
     names = runs_report.history_elements(history)
     return {"attitude": (("time_s", "element"), states, "1")}, {"element": list(names)}
+
+
+@variables.register
+def _(error: AttitudeError) -> tuple[Variables, dict[str, Any]]:
+    return {"error_deg": (VECTOR, np.degrees(error.vector), "deg")}, {"axis": list(AXES)}
+
+
+@figure.register
+def _(error: AttitudeError, title: str) -> Any:
+    return runs_report.error_figure(error, title)
 
 
 @figure.register

@@ -1,4 +1,4 @@
-"""Options for the source of increments: a motion, a recording of increments or one of rates."""
+"""Options for the source of increments: a motion or a recording."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from strapgen.cli.option_groups import Excludes, Needs, OneOf, Rule
 from strapgen.cli.options import option
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.progress import say_unused, waiting
-from strapgen.cli.values import Positive, Vector, line, names, whole
+from strapgen.cli.values import Number, Positive, Vector, line, names, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
@@ -33,6 +33,8 @@ _Text = str | None
 MOTION_NAMES = "constant, sinusoidal, coning or polynomial"
 _RUN_MOTION_NAMES = "constant, sinusoidal, coning, polynomial, cone, random, slew, ramps or vibration"
 
+#: The settings of the motion of a line, for a shell to complete
+MOTION_SETTINGS = f"{__name__}:motion_settings"
 MotionSettings = Annotated[
     dict[str, str] | None,
     option(
@@ -40,13 +42,14 @@ MotionSettings = Annotated[
         metavar="KEY=VALUE...",
         help="Parameters of the motion; strapgen list motions shows their names.",
         panel="Input",
+        words=MOTION_SETTINGS,
     ),
 ]
 
 #: Rules of the commands that run an algorithm: where its increments come from, and the angle of a count.
 SOURCE_NEEDED = OneOf(
-    "--motion --increments-csv --rates-csv",
-    needed="one of --motion, --increments-csv, --rates-csv is needed; none given",
+    "--motion --recording --increments-csv --rates-csv",
+    needed="one of --motion, --recording is needed; none given",
 )
 ONE_SCALE = OneOf("--pulse-arcsec --lsb --lsb-rad")
 
@@ -71,6 +74,14 @@ _MOST = 1024
 def a_motion(option: str, text: str) -> str:
     """Read a motion with a closed form, or the file of one."""
     return text if is_file(text) else names("strapgen.catalogue:MOTIONS")(option, text)
+
+
+def motion_settings(values: Mapping[str, Any]) -> list[str]:
+    """Return the settings of the motion that a command line names."""
+    from strapgen.lab.motions.motions import keys
+
+    motion = values.get("motion")
+    return [f"{key}=" for choices in keys(str(motion)).values() for key in choices] if motion else []
 
 
 def _motion_of_a_run(option: str, text: str) -> str:
@@ -98,50 +109,41 @@ class Inputs:
     title: str
 
 
+#: Names of the faults that are repaired, what is done at a gap, and what samples are, for completion.
+_REPAIRS = ("repeats", "order", "clock", "nan", "stuck", "all")
+_GAPS = ("refuse", "split", "bridge")
+_INPUTS = ("increments", "rates", "instants")
+
+
 @dataclass(frozen=True)
-class SampleSource:
-    """Options for the source of the increments of a run."""
+class RecordingOptions:
+    """Options of a recording: its file, what its columns mean, and what is done about its faults."""
 
     panel: ClassVar[str] = "Input"
     rules: ClassVar[tuple[Rule, ...]] = (
-        OneOf("--motion --increments-csv --rates-csv"),
-        Needs("--set --step --duration --specific-force", "--motion"),
-        Needs("--motion", "--duration"),
-        Needs("--pulse-arcsec --errors", "--motion --increments-csv --rates-csv"),
         Needs(
-            "--rate-unit --resample-hz --columns --time-unit --sample-hz --bridge-gaps --drop-repeated",
-            "--rates-csv",
+            "--input --columns --time-unit --rate-unit --force-unit --sample-hz --axes --start --end --every --gaps "
+            "--repair --resample-hz",
+            "--recording --rates-csv --increments-csv",
         ),
     )
 
-    motion: Annotated[_Text, motion_option()] = None
-    settings: MotionSettings = None
-    step: Annotated[Positive | None, option("--step", metavar="S", help="Step length in s.")] = None
-    duration: Annotated[
-        Positive | None, option("--duration", metavar="S", help="Duration of each run in s.")
-    ] = None
-    increments_csv: Annotated[
+    recording: Annotated[
         Path | None,
         option(
-            "--increments-csv",
-            metavar="FILE",
-            help="CSV file of increments, in place of a motion: columns t in s, and dx, dy, dz in rad.",
+            "--recording",
+            metavar="FILE[:TOPIC]",
+            help="Recorded rates or increments of a gyro; strapgen log FILE shows what a file holds.",
         ),
     ] = None
-    rates_csv: Annotated[
-        Path | None,
-        option(
-            "--rates-csv",
-            metavar="FILE",
-            help="CSV file of rates, in place of a motion; its header names the time, three rates and their units.",
-        ),
-    ] = None
-    rate_unit: Annotated[
+    input: Annotated[
         _Text,
         option(
-            "--rate-unit",
-            metavar="UNIT",
-            help="Unit of the rates in --rates-csv where the header has none: rad/s, deg/s, dps or mdps.",
+            "--input",
+            metavar="NAME",
+            help="What the samples are: increments in rad; rates, means over the interval before each time; or "
+            "instants, rates at the times.  [default: increments or rates, by the names of the columns]",
+            read=names(_INPUTS),
         ),
     ] = None
     columns: Annotated[
@@ -149,8 +151,8 @@ class SampleSource:
         option(
             "--columns",
             metavar="NAME,...",
-            help="Names or numbers of the columns in --rates-csv where the header leaves them open: the time and three "
-            "rates, or with --sample-hz the rates.",
+            help="Names or numbers of the columns where the file leaves them open: the time and three samples, or "
+            "t=NAME,x=NAME,y=NAME,z=NAME, with fx, fy, fz for forces; with --sample-hz without the time.",
         ),
     ] = None
     time_unit: Annotated[
@@ -158,7 +160,23 @@ class SampleSource:
         option(
             "--time-unit",
             metavar="UNIT",
-            help="Unit of the times in --rates-csv where the header has none: s, ms, us or ns.",
+            help="Unit of the times where the file has none: s, ms, us or ns.",
+        ),
+    ] = None
+    rate_unit: Annotated[
+        _Text,
+        option(
+            "--rate-unit",
+            metavar="UNIT",
+            help="Unit of the rates where the file has none: rad/s, mrad/s, deg/s, dps, mdps or deg/h.",
+        ),
+    ] = None
+    force_unit: Annotated[
+        _Text,
+        option(
+            "--force-unit",
+            metavar="UNIT",
+            help="Unit of the specific forces where the file has none: m/s^2, g or mg.",
         ),
     ] = None
     sample_hz: Annotated[
@@ -166,30 +184,147 @@ class SampleSource:
         option(
             "--sample-hz",
             metavar="HZ",
-            help="Samples of the gyro in a second, in place of times in --rates-csv.",
+            help="Samples of the gyro in a second, in place of a column of times.",
         ),
     ] = None
-    bridge_gaps: Annotated[
-        bool,
+    axes: Annotated[
+        _Text,
         option(
-            "--bridge-gaps",
-            help="With --resample-hz, take the rate in --rates-csv as linear across gaps too, and say where.",
+            "--axes",
+            metavar="X,Y,Z",
+            help="The sensor's axes that are the body's x, y and z, as x,-y,-z.",
         ),
-    ] = False
-    drop_repeated: Annotated[
-        bool,
+    ] = None
+    start: Annotated[
+        Number | None,
+        option("--start", metavar="S", help="Time in s after the first row from which rows are read."),
+    ] = None
+    end: Annotated[
+        Number | None,
+        option("--end", metavar="S", help="Time in s after the first row up to which rows are read."),
+    ] = None
+    every: Annotated[
+        int | None,
         option(
-            "--drop-repeated",
-            help="Leave out rows of --rates-csv with the time of the row before, and say so.",
+            "--every",
+            metavar="N",
+            help="Number of samples that are summed into one increment.  [default: 1]",
+            read=whole(1),
         ),
-    ] = False
+    ] = None
+    gaps: Annotated[
+        _Text,
+        option(
+            "--gaps",
+            metavar="NAME",
+            help="What is done where samples are lost: refuse; split, each piece starts anew; or bridge, single ones "
+            "are restored by a filter, several put on a line.  [default: refuse]",
+            read=names(_GAPS),
+        ),
+    ] = None
+    repair: Annotated[
+        tuple[str, ...] | None,
+        option(
+            "--repair",
+            metavar="NAME,...",
+            help="Faults that are repaired: repeats, order, clock, nan, stuck, or all.  [default: none]",
+            read=names(_REPAIRS),
+        ),
+    ] = None
+    increments_csv: Annotated[
+        Path | None,
+        option(
+            "--increments-csv", metavar="FILE", help="Old: --recording with --input increments.", hidden=True
+        ),
+    ] = None
+    rates_csv: Annotated[
+        Path | None,
+        option("--rates-csv", metavar="FILE", help="Old: --recording with --input instants.", hidden=True),
+    ] = None
     resample_hz: Annotated[
         Positive | None,
-        option(
-            "--resample-hz",
-            metavar="HZ",
-            help="Integrate unevenly timed rates over an even grid of this frequency in Hz.",
-        ),
+        option("--resample-hz", metavar="HZ", help="Old: --every, a whole number of samples.", hidden=True),
+    ] = None
+
+    @property
+    def source(self) -> str:
+        """The file, with its topic if one is stated."""
+        return str(self.recording or self.increments_csv or self.rates_csv or "")
+
+    @property
+    def place(self) -> tuple[Path, str]:
+        """The file and the topic."""
+        path = Path(self.source)
+        name, colon, topic = self.source.rpartition(":")
+        return (Path(name), topic) if colon and not path.exists() and Path(name).exists() else (path, "")
+
+    @property
+    def file(self) -> Path:
+        """The file of recorded data."""
+        return self.place[0]
+
+    def load(self, *, force: bool = False) -> Recording:
+        """Read the recorded data."""
+        from strapgen.lab.recordings import recording
+        from strapgen.lab.recordings.reading import Reading
+
+        file, topic = self.place
+        of_old = (
+            "increments"
+            if self.increments_csv is not None
+            else "instants"
+            if self.rates_csv is not None
+            else None
+        )
+        if self.resample_hz is not None and self.every is not None:
+            raise InputError("--every and --resample-hz are both given; one is needed")
+        reading = Reading(
+            self.input or of_old,
+            None if self.columns is None else ",".join(self.columns),
+            *(
+                self.time_unit,
+                self.rate_unit,
+                self.force_unit,
+                self.sample_hz,
+                self.axes,
+                self.start,
+                self.end,
+            ),
+            *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz),
+        )
+        with waiting(f"reading {file.name}"):
+            return recording.recorded(file, topic, reading)
+
+    def say_remarks(self, data: Recording) -> None:
+        """Say what was taken for what, once a run along a recording is not refused."""
+        for remark in data.remarks:
+            terminal.remark(f"strapgen: {self.file}: {remark}")
+        old = {
+            "--increments-csv is now --recording, with --input increments": self.increments_csv,
+            "--rates-csv is now --recording, with --input instants": self.rates_csv,
+            "--resample-hz is now --every, a whole number of samples": self.resample_hz,
+        }
+        for text in (text for text, value in old.items() if value is not None):
+            terminal.remark(f"strapgen: {text}")
+
+
+@dataclass(frozen=True)
+class SampleSource(RecordingOptions):
+    """Options for the source of the increments of a run."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        *RecordingOptions.rules,
+        OneOf("--motion --recording --increments-csv --rates-csv"),
+        Needs("--set --step --duration --specific-force", "--motion"),
+        Needs("--motion", "--duration"),
+        Needs("--pulse-arcsec --errors", "--motion --recording --increments-csv --rates-csv"),
+    )
+
+    motion: Annotated[_Text, motion_option()] = None
+    settings: MotionSettings = None
+    step: Annotated[Positive | None, option("--step", metavar="S", help="Step length in s.")] = None
+    duration: Annotated[
+        Positive | None, option("--duration", metavar="S", help="Duration of each run in s.")
     ] = None
     pulse_arcsec: Annotated[
         Positive | None,
@@ -217,11 +352,6 @@ class SampleSource:
             raise InputError("--specific-force goes with a described system or --errors")
         if self.motion is not None and self.step is None:
             raise InputError("--motion needs --step in s")
-
-    @property
-    def file(self) -> Path:
-        """The file of recorded data."""
-        return self.increments_csv or self.rates_csv or Path()
 
     @property
     def pulse(self) -> float | None:
@@ -273,31 +403,12 @@ class SampleSource:
     def files(self) -> tuple[Path | None, ...]:
         """The files that the options name."""
         of_motion = Path(self.motion) if self.motion is not None and is_file(self.motion) else None
-        return self.increments_csv, self.rates_csv, of_motion, Path(self.errors) if self.errors else None
+        return self.file if self.source else None, of_motion, Path(self.errors) if self.errors else None
 
-    def recording(self) -> Recording:
-        """Read the recorded data."""
-        from strapgen.lab.recordings import recording
-
+    def recorded(self) -> Recording:
+        """Read the recorded data, as sensors measure it if they have errors."""
         errors = self.sensor_errors()
-        with waiting(f"reading {self.file.name}"):
-            data = (
-                recording.read_rates(
-                    self.rates_csv or "",
-                    self.rate_unit,
-                    self.resample_hz,
-                    columns=None if self.columns is None else ",".join(self.columns),
-                    time_unit=self.time_unit,
-                    sample_hz=self.sample_hz,
-                    bridge_gaps=self.bridge_gaps,
-                    drop_repeated=self.drop_repeated,
-                )
-                if self.increments_csv is None
-                else recording.read_increments(self.increments_csv)
-            )
-        for remark in data.remarks:
-            terminal.remark(f"strapgen: {self.file}: {remark}")
-        return with_errors(data, errors)
+        return with_errors(self.load(), errors)
 
     def read(self, samples: int, previous: int = 0, ahead: int = 0) -> Inputs:
         """Return the increments that the options describe."""
@@ -326,17 +437,30 @@ class SampleSource:
     def _recorded(self, samples: int, previous: int, ahead: int) -> Inputs:
         from strapgen.run.increments import windows
 
-        data = self.recording()
+        data = whole_recording(self.recorded())
         beside = previous + ahead
         steps = max(0, len(data.samples) - beside) // samples
         if steps < 1:
             raise InputError(
                 f"the recording holds {len(data.samples)} increments; a step needs {samples + beside}"
             )
+        self.say_remarks(data)
         say_unused(self.file, len(data.samples) - beside - steps * samples, samples)
         increments = windows(data.samples[: beside + steps * samples], samples, beside)
         length = data.interval * samples
         return Inputs(increments, None, length, f"{self.file.name}, {steps} steps of {length:.6g} s")
+
+
+def whole_recording(data: Recorded) -> Recorded:
+    """Return a recording of one piece; refuse others."""
+    if data.breaks:
+        raise InputError("--gaps split goes with simulate alone; --gaps bridge goes here too")
+    return data
+
+
+def inertial(source: RecordingOptions, errors: str | None) -> Any:
+    """Return a recording with velocity increments, as sensors with errors measure it."""
+    return with_errors(whole_recording(source.load(force=True)), read_errors(errors))
 
 
 def read_errors(source: str | None) -> InstrumentErrors | None:
@@ -398,7 +522,7 @@ class RunOptions:
         option(
             "--initial-deg",
             metavar="R,P,H",
-            help="Roll, pitch and heading at the start of a motion in deg.  [default: zero rotation]",
+            help="Roll, pitch and heading at the start in deg, of each piece of a recording.  [default: zero rotation]",
         ),
     ] = None
 

@@ -10,10 +10,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from strapgen.lab.recordings.attitude_output import (
+    TRAJECTORIES,
+    AttitudeForm,
+    attitude_of,
+    parquet,
+    roll_pitch_heading,
+)
+from strapgen.lab.recordings.quaternions import inverse, product, rotation_vectors
 from strapgen.lab.recordings.recording import History
+from strapgen.lab.recordings.true_attitude import AttitudeError
 from strapgen.lab.runs import Array, Run
 from strapgen.results import figures
-from strapgen.results.records import INTERNAL, entry
+from strapgen.results.records import INTERNAL, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
@@ -35,6 +44,8 @@ _PARTS = (("scale", ""), ("skew", "_deg"), ("drift", "_deg"))
 _MATRIX_TITLES = [
     Column(title, "<", least=38) for title in ("computed C", "true C", "computed - true", "error matrix E")
 ]
+#: The states as they are.
+_STATE = AttitudeForm()
 TIME_COLUMN = Column("time, s", spec=".4f", least=10)
 
 
@@ -242,10 +253,30 @@ def _matrix_lines(run: Run, record: int) -> list[str]:
     return [f"at {run.time[record]:g} s", *table, ""]
 
 
-def history_table(history: History) -> TextTable:
-    """Return an attitude history as a table."""
-    rows = np.column_stack([history.time, history.states.reshape(len(history.time), -1)]).tolist()
-    return table_of(["time_s", *history_elements(history)], rows)
+def history_columns(
+    history: History, form: AttitudeForm = _STATE, error: AttitudeError | None = None
+) -> dict[str, Array]:
+    """Return the time and the attitude in a form by name, and the error beside the truth; nan where it is not known."""
+    columns = {"time_s": history.time}
+    if history.piece is not None:
+        columns["piece"] = history.piece
+    columns |= form.columns(history)
+    if error is None:
+        return columns
+    vector = np.degrees(error.at(history.time))
+    names = ("error_deg", *(f"error_{axis}_deg" for axis in AXES))
+    return columns | dict(zip(names, [np.linalg.norm(vector, axis=1), *vector.T], strict=True))
+
+
+def history_table(
+    history: History, form: AttitudeForm = _STATE, error: AttitudeError | None = None
+) -> TextTable:
+    """Return an attitude history as a table; an error that is not known is an empty cell."""
+    columns = history_columns(history, form, error)
+    rows = [list(row) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
+    if error is not None:
+        rows = [[None if math.isnan(value) else value for value in row] for row in rows]
+    return table_of(columns, rows)
 
 
 def settings_text(settings: dict[str, Any]) -> str:
@@ -266,13 +297,56 @@ class AttitudeRecords:
     time_s: Array
     #: The elements at each time
     attitude: Array
+    #: Number of the piece between gaps of the recording
+    piece: Array | None = field(default=None, metadata=entry(optional=True))
+
+
+@dataclass(frozen=True)
+class ErrorRecords:
+    """The error of the attitude beside a true one."""
+
+    #: What the clock of the truth shows more
+    time_offset_s: float
+    #: Its standard deviation
+    time_offset_uncertainty_s: float
+    #: Of the magnitudes of the rates; null where the offset is stated
+    correlation: float | None
+    #: Which axes of the computed attitude are turned
+    align: str
+    #: Rotation vector of the turn of the reference axes
+    reference_deg: Array
+    #: Rotation vector of the turn of the body axes
+    body_deg: Array
+    #: Slope of the error angle
+    angle_slope_deg_h: float
+    #: Its standard deviation
+    angle_slope_uncertainty_deg_h: float
+    #: Slopes of the error about the reference axes
+    slope_deg_h: Array
+    #: Their standard deviations
+    slope_uncertainty_deg_h: Array
+    #: Instants of the errors, on the clock of the recording
+    time_s: Array
+    #: The error angle at each
+    angle_deg: Array
+    #: About the reference axes at each
+    error_deg: Array
 
     @staticmethod
-    def of(history: History) -> AttitudeRecords:
-        """Return the records of a history."""
-        time, states = history.time, history.states.reshape(len(history.time), -1)
-        length = float(time[-1] - time[0])
-        return AttitudeRecords(history.step, length, history.unused, history_elements(history), time, states)
+    def of(error: AttitudeError) -> ErrorRecords:
+        """Return the records of an error."""
+        offset, of_angle, by_axis = error.offset, error.angle_slope, error.slope
+        return ErrorRecords(
+            *(offset.seconds, offset.uncertainty_s, offset.correlation),
+            error.align,
+            np.degrees(rotation_vectors(error.reference)),
+            np.degrees(rotation_vectors(error.body)),
+            *(float(of_angle.deg_h), float(of_angle.uncertainty_deg_h)),
+            *(by_axis.deg_h, by_axis.uncertainty_deg_h),
+            error.time,
+            np.degrees(error.angle),
+            np.degrees(error.vector),
+        )
 
 
 @dataclass(frozen=True)
@@ -281,12 +355,27 @@ class HistoryResult(Result):
 
     drawn_by: ClassVar[str] = "strapgen.lab.runs_report:history_image"
     indented = False
+    computed = properties(records=entry(spread=True, kind=AttitudeRecords))
 
     settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))
-    history: History = field(metadata=entry(spread=True, write=AttitudeRecords.of, kind=AttitudeRecords))
+    history: History = field(metadata=INTERNAL)
     title: str | None = field(default=None, metadata=entry(optional=True))
     #: Title of a plot where the user states none
     plot_title: str = field(default="", metadata=INTERNAL)
+    form: AttitudeForm = field(default=_STATE, metadata=INTERNAL)
+    #: Beside a true attitude
+    error: AttitudeError | None = field(
+        default=None, metadata=entry(optional=True, write=ErrorRecords.of, kind=ErrorRecords)
+    )
+
+    @property
+    def records(self) -> AttitudeRecords:
+        """The attitude at each time."""
+        history, columns = self.history, self.form.columns(self.history)
+        values, length = np.column_stack([*columns.values()]), float(history.time[-1] - history.time[0])
+        return AttitudeRecords(
+            history.step, length, history.unused, tuple(columns), history.time, values, history.piece
+        )
 
     def rows(self) -> Any:
         """Return the records of the history, as their times."""
@@ -294,22 +383,31 @@ class HistoryResult(Result):
 
     def table(self) -> TextTable:
         """Return the attitude at each time."""
-        return history_table(self.history)
+        return history_table(self.history, self.form, self.error)
+
+    def written(self, format: str) -> str:
+        """Return the attitude in a format of `Result`, or as a trajectory: "tum" or "kitti"."""
+        return TRAJECTORIES[format](self.history) if format in TRAJECTORIES else super().written(format)
+
+    def parquet(self) -> bytes:
+        """Return the attitude at each time as a Parquet file."""
+        return parquet(history_columns(self.history, self.form, self.error))
 
     def text(self) -> str:
-        """Return the attitude at most of the times that a reader looks at."""
+        """Return the attitude at most of the times that a reader looks at, and the error beside the truth."""
         history, shown = self.history, thinned(len(self.history.time))
-        states = history.states.reshape(len(history.time), -1)
-        names = history_elements(history)
-        columns = [TIME_COLUMN, *(Column(element, spec=".9f", least=12, gap=1) for element in names)]
-        rows = [(history.time[k], *states[k]) for k in shown]
+        columns = {
+            name: values[shown] for name, values in history_columns(history, self.form, self.error).items()
+        }
+        heads = [TIME_COLUMN, *(Column(name, spec=".9f", least=12, gap=1) for name in [*columns][1:])]
         title = {} if self.title is None else {"title": self.title}
-        lines = [settings_text(title | {**self.settings}), "", *TextTable(columns, rows).lines()]
+        rows = np.column_stack([*columns.values()]).tolist()
+        lines = [settings_text(title | {**self.settings}), "", *TextTable(heads, rows).lines()]
         if len(shown) < len(history.time):
             lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
         if history.unused:
             lines.append(f"{history.unused} increments at the end make no whole step and were not used")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(self.error.lines() if self.error else ())])
 
 
 def places(signal: Signal) -> list[str]:
@@ -357,12 +455,72 @@ def run_image(result: RunResult, path: str | Path) -> bytes:
 
 
 def history_image(result: HistoryResult, path: str | Path) -> bytes:
-    """Return the elements of an attitude history against time."""
-    return figures.image(history_figure(result.history, result.title or result.plot_title), path)
+    """Return roll, pitch, heading, length and rate against time, and the error beside a true attitude."""
+    return figures.image(
+        history_figure(result.history, result.title or result.plot_title, result.error), path
+    )
 
 
-def history_figure(history: History, title: str) -> Any:
+def history_figure(history: History, title: str, error: AttitudeError | None = None) -> Any:
     """Return the figure of `history_image`."""
+    if history.backend is None:
+        return _elements_figure(history, title)
+    q = attitude_of(history)
+    length = np.linalg.norm(history.states.reshape(len(q), -1), axis=1) / np.linalg.norm(
+        history.backend.identity
+    )
+    turns = rotation_vectors(product(inverse(q[:-1]), q[1:]))
+    rate = np.linalg.norm(turns, axis=1) / np.diff(history.time)
+    angles = [*zip((f"{name}, deg" for name in ANGLES), np.degrees(roll_pitch_heading(q)).T, strict=True)]
+    panels = [
+        *((name, history.time, _broken(values)) for name, values in angles),
+        ("length of the state less 1", history.time, length - 1),
+        ("magnitude of the rate, deg/s", (history.time[:-1] + history.time[1:]) / 2, np.degrees(rate)),
+    ]
+    figure, grid = figures.grid_of_axes(
+        len(panels) + (error is not None), 1, (10, 9 + 1.8 * (error is not None))
+    )
+    for axes, (name, time, values) in zip(grid.flat, panels, strict=False):
+        axes.plot(time, values, color=figures.COLOURS[0], linewidth=1.2)
+        axes.set_title(name, loc="left", fontsize=10)
+        figures.style_over_time(axes)
+    for axes in grid[:3, 0]:
+        axes.ticklabel_format(axis="y", style="plain")
+    if error is not None:
+        _draw_error(grid[-1, 0], error)
+    grid[-1, 0].set_xlabel("time, s")
+    figure.suptitle(figures.printable(title), fontsize=12)
+    return figure
+
+
+def _broken(angles: Array) -> Array:
+    """Return angles in deg with a gap where they wrap."""
+    values = angles.copy()
+    values[1:][np.abs(np.diff(angles)) > 180] = np.nan
+    return values
+
+
+def error_figure(error: AttitudeError, title: str) -> Any:
+    """Return the figure of the error of an attitude beside a true one."""
+    figure, grid = figures.grid_of_axes(1, 1, (10, 3.6))
+    _draw_error(grid[0, 0], error)
+    grid[0, 0].set_xlabel("time, s")
+    figure.suptitle(figures.printable(title), fontsize=12)
+    return figure
+
+
+def _draw_error(axes: Any, error: AttitudeError) -> None:
+    """Draw the error about each reference axis, and its angle, over time."""
+    for axis, values, colour in zip(AXES, np.degrees(error.vector).T, figures.COLOURS, strict=True):
+        axes.plot(error.time, values, color=colour, linewidth=1, label=f"about {axis}")
+    axes.plot(error.time, np.degrees(error.angle), color="0.4", linewidth=1.2, label="angle")
+    axes.set_title("error beside the true attitude, deg, reference axes", loc="left", fontsize=10)
+    figures.style_over_time(axes)
+    axes.legend(frameon=False, fontsize=9, ncols=4)
+
+
+def _elements_figure(history: History, title: str) -> Any:
+    """Return the elements of states that are no known attitudes, against time."""
     states, elements = history.states.reshape(len(history.time), -1), history_elements(history)
     columns = 3 if len(elements) == 9 else 1
     rows = -(-len(elements) // columns)

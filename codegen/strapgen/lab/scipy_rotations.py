@@ -24,7 +24,7 @@ def to_rotation(attitudes: Run | History | Any, backend: Backend | None = None) 
         direction cosine matrices (N, 3, 3), body to reference, without a back end. SciPy makes matrices orthogonal, and
         quaternions of length 1.
     backend : Backend, optional
-        The back end that has these states.
+        The back end that has these states; a history from `propagate` knows its own.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def to_rotation(attitudes: Run | History | Any, backend: Backend | None = None) 
     MissingExtraError
         If SciPy is not installed.
     InputTypeError
-        If states of a history come without their back end.
+        If the states of a history are not known as attitudes.
     InputError
         If the shape does not fit, or a number is not finite.
 
@@ -51,10 +51,9 @@ def to_rotation(attitudes: Run | History | Any, backend: Backend | None = None) 
     if isinstance(attitudes, Run):
         return rotation.from_matrix(attitudes.computed)
     if isinstance(attitudes, History):
+        backend = backend or attitudes.backend
         if backend is None:
-            raise InputTypeError(
-                "the states of a History come without their back end; to_rotation(history, backend)"
-            )
+            raise InputTypeError("the states of this History are not known as attitudes of a back end")
         attitudes = attitudes.states
     if backend is None:
         return rotation.from_matrix(checks.real_array("attitudes", attitudes, (3, 3), np.dtype(np.float64)))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @grouped
-@rules(SOURCE_NEEDED, Needs("--rates --initial-deg --matrices --print", "--motion"), ONE_SCALE)
+@rules(SOURCE_NEEDED, Needs("--rates --matrices --print", "--motion"), ONE_SCALE)
 def simulate(
     algorithm: RunAlgorithm,
     *,
@@ -43,8 +43,8 @@ def simulate(
     A file of a motion of your own has functions increments and attitude, which are checked against each other. With
     --rates the step takes the rate itself, so that you see the error of extracting it from increments.
 
-    Recorded times must be evenly spaced unless you give --resample-hz. The rate is then taken as linear from one sample
-    to the next, across intervals of up to ten times the median.
+    A recording is a log of any format that strapgen log shows; that command prints the one that runs it. Faults are
+    refused unless --repair or --gaps allows them, and each is named once on stderr.
 
     Fixed-point formats are chosen for the increments of the run, or for --max-rate-deg-s if you give it.
 
@@ -54,7 +54,7 @@ def simulate(
     A described system, a built-in one or a file, runs at the rate that it states, or at that of --step; the navigation
     frame rests.
 
-    Example: strapgen simulate dcm --backend c --rates-csv gyro.csv --rate-unit deg/s --resample-hz 100
+    Example: strapgen simulate dcm --backend c --recording gyro.csv --rate-unit deg/s --gaps bridge
     --out out/attitude.csv
     """
     if (others := described(algorithm)) is not None:
@@ -154,7 +154,8 @@ def _on_recording(
     from strapgen.lab.runs_report import HistoryResult, step_facts
 
     pulse = source.pulse
-    data = source.recording()
+    data = source.recorded()
+    start = intervals.start()
     length = data.interval * choice.increments_per_step
     _refuse_many(len(data.samples) / choice.increments_per_step, length, intervals.record)
     backend = build(length, lambda: data.largest + (pulse or 0.0))
@@ -165,12 +166,18 @@ def _on_recording(
             one for one in registration.extensions("lab.whole-recordings") if one.covers(choice, backend.name)
         )
         if (runner := next(whole, None)) is not None:
-            history = runner.propagate_whole(choice, backend.name, data, *options)
+            history = recording.along_pieces(
+                data, lambda piece: runner.propagate_whole(choice, backend.name, piece, *options, start)
+            )
         else:
-            history = recording.propagate(backend, data, *options)
+            history = recording.propagate(backend, data, *options, start)
+    source.say_remarks(data)
     say_unused(source.file, history.unused, choice.increments_per_step)
     title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
-    facts = step_facts(backend, choice) | {"source": str(source.file)} | source.facts
+    facts = step_facts(backend, choice) | {"source": source.source} | source.facts
+    facts |= {} if intervals.initial is None else {"initial_deg": written(intervals.initial)}
     replace(output, format=output.format or "csv").show(
-        HistoryResult(facts, replace(history, elements=backend.elements), output.title, title)
+        HistoryResult(
+            facts, replace(history, elements=backend.elements, backend=backend), output.title, title
+        )
     )

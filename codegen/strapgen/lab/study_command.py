@@ -15,7 +15,7 @@ from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Positive
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
-from strapgen.lab.run_options import WorkerOptions, motion_option
+from strapgen.lab.run_options import MOTION_SETTINGS, WorkerOptions, motion_option
 
 app = typer.Typer(cls=PlainGroup, rich_markup_mode=None)
 
@@ -98,6 +98,7 @@ def word_length(
             help="Parameters of the motion; strapgen list motions shows their names.  "
             "[default: those of table 5 of the thesis]",
             panel="Input",
+            words=MOTION_SETTINGS,
         ),
     ] = None,
     duration: Duration = Positive("180"),

@@ -324,16 +324,18 @@ def expected_noise(case: Case, pulse: float, samples: Any) -> float:
     return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(samples))))
 
 
-def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
+def noise_of(
+    algorithm: AnyAlgorithm, method: str | None = None, increments: int | None = None
+) -> QuantizationNoise:
     """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
-    return _noise_of(algorithm, method, increments)
+    return _noise_of(choose_step(algorithm, method, increments))
 
 
 @lru_cache(maxsize=64)
-def _noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
+def _noise_of(choice: Choice) -> QuantizationNoise:
     from strapgen.lab.quantization_noise import quantization_noise
 
-    return quantization_noise(choose_step(algorithm, method, increments))
+    return quantization_noise(choice)
 
 
 def run(

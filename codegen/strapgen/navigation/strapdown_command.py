@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from strapgen.cli.fixed_options import FixedOptions
-from strapgen.cli.option_groups import Shown, grouped, stated
+from strapgen.cli.option_groups import OneOf, Shown, grouped, rules, stated
 from strapgen.cli.options import OneBackend, StrapdownAlgorithm, option
 from strapgen.cli.output import Output, format_option, plot_option
 from strapgen.cli.progress import say_unused
 from strapgen.cli.values import Number, Vector
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.run_options import SensorFile, read_errors, with_errors
+from strapgen.lab.run_options import RecordingOptions, SensorFile, inertial
 from strapgen.navigation.systems.built_in import is_system
 
 if TYPE_CHECKING:
@@ -105,21 +105,20 @@ class CycleCounts:
         }
 
 
+#: The options of a recording of gyros and accelerometers.
+_RECORDING = tuple(
+    one.name for one in fields(RecordingOptions) if one.name not in ("rates_csv", "resample_hz")
+)
+
+
 @grouped
+@rules(OneOf("--recording --increments-csv", needed="--recording is needed; none given"))
 def strapdown(
     algorithm: StrapdownAlgorithm,
     *,
     cycles: CycleCounts,
     backend: OneBackend = "numpy",
-    increments: Annotated[
-        Path,
-        option(
-            "--increments-csv",
-            metavar="FILE",
-            help="CSV file of fast cycles' increments: columns t in s, dx, dy, dz in rad, and dvx, dvy, dvz in m/s.",
-            panel="Input",
-        ),
-    ],
+    source: Annotated[RecordingOptions, Shown(only=_RECORDING)],
     errors: SensorFile = None,
     start: Start,
     fixed: Annotated[FixedOptions, Shown(only=("word", "rounding", "carry", "ranges", "formats"))],
@@ -127,34 +126,36 @@ def strapdown(
 ) -> None:
     """Run an algorithm in two speeds along an inertial recording.
 
+    The recording has increments of fast cycles, angles in rad and velocities in m/s, or rates and specific forces.
+
     A fast loop sums coning and sculling; a slow loop updates the attitude once in a number of fast cycles. After every
     navigation cycle you see the attitude as roll, pitch and heading, and the integral of the specific force over the
     cycle in navigation axes. Fixed-point formats are chosen for the recording.
 
-    With --errors the increments of the file are taken as true, and the algorithm gets those of sensors with errors.
+    With --errors the increments of the recording are taken as true, and the algorithm gets those of sensors with
+    errors.
 
     A described system, a built-in one or a file, takes the rate of the recording, and you see its outputs at the rate
     of the slowest of them.
 
-    Example: strapgen strapdown dcm --increments-csv examples/inertial_log.csv --fast-cycles 4 --slow-cycles 25
+    Example: strapgen strapdown dcm --recording examples/inertial_log.csv --fast-cycles 4 --slow-cycles 25
     --backend c
     """
-    output.check(increments, errors)
+    output.check(source.file, errors)
     if is_system(algorithm):
         from strapgen.navigation.systems.system_simulation import system_along
 
-        return system_along(algorithm, stated(cycles), backend, (increments, errors), start, fixed, output)
+        return system_along(algorithm, stated(cycles), backend, source, errors, start, fixed, output)
     counts = cycles.counts()
     fixed.check_backend(backend)
-    from strapgen.lab.recordings import recording
-
-    data = with_errors(recording.read_inertial(increments), read_errors(errors))
+    data = inertial(source, errors)
     covered = _course(algorithm, data, counts, backend, fixed, start)
     of_cycle = counts["fast_cycles"] * counts["slow_cycles"]
-    say_unused(increments, covered.unused, of_cycle, "navigation cycle")
-    facts = {"algorithm": f"{algorithm} in two speeds", "backend": backend, "source": str(increments)}
+    source.say_remarks(data)
+    say_unused(source.file, covered.unused, of_cycle, "navigation cycle")
+    facts = {"algorithm": f"{algorithm} in two speeds", "backend": backend, "source": source.source}
     facts |= {} if errors is None else {"errors": errors}
-    _deliver(covered, facts, f"{facts['algorithm']}, {backend}: {increments.name}", output)
+    _deliver(covered, facts, f"{facts['algorithm']}, {backend}: {source.file.name}", output)
 
 
 def _course(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import typer
 
@@ -17,7 +18,7 @@ from strapgen.cli.output import Output
 from strapgen.cli.progress import track
 from strapgen.cli.values import NotNegative, Number, Positive, Vector, filled, names, whole
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.run_options import in_words, motion_option
+from strapgen.lab.run_options import MOTION_SETTINGS, in_words, motion_option
 
 
 @grouped
@@ -249,6 +250,7 @@ def study_redundancy(
             help="Errors and trip levels: cycle_s, rate_deg_s, load_g, noise_arcsec, pulse_arcsec, bias_deg_h, "
             "scale_ppm, bending_arcmin_g, trip_sigmas, trip_rate.",
             panel="Input",
+            words="strapgen.navigation.redundancy.redundancy_study:SensorErrors",
         ),
     ] = None,
     output: Output,
@@ -339,6 +341,7 @@ def study_pulse_torque(
             help="Constants: gain, lag_gain, lag_pole, integral_gain, leak, quantum_arcsec, lag_s, cycle_hz, "
             "largest_deg_s, largest_pulses, delay_cycles.  [default: those of a fit to the printed responses]",
             panel="Input",
+            words="strapgen.navigation.torquing:TorqueLoop",
         ),
     ] = None,
     output: Output,
@@ -392,6 +395,7 @@ def study_loops(
             help="Errors, each run by itself: rate_deg_h, tilt_deg, velocity_m_s, heading_deg, "
             "acceleration_mg, height_m.",
             panel="Input",
+            words="strapgen.navigation.loops.loop_errors:LoopErrors",
         ),
     ] = None,
     output: Output,
@@ -404,10 +408,10 @@ def study_loops(
     Example: strapgen study loops --set tilt_deg=2 --plot out/loops.png
     """
     output.check(file)
+    from strapgen.navigation.loops.loop_errors import LoopErrors
     from strapgen.navigation.loops.loop_schedule import BUILT_IN, read
     from strapgen.navigation.loops.loops_study import (
         LOOPS,
-        LoopErrors,
         LoopsResult,
         cycles_of_modes,
         run_loops,
@@ -423,6 +427,13 @@ def study_loops(
     output.show(LoopsResult.of(schedule, modes, errors, gains, courses))
 
 
+def force_settings(values: Mapping[str, Any]) -> list[str]:
+    """Return the settings of the specific force that a command line names."""
+    from strapgen.lab.motions.specific_forces import keys
+
+    return [f"{key}=" for choices in keys(str(values["force"])).values() for key in choices]
+
+
 @dataclass(frozen=True)
 class FlightOptions:
     """Options of the motion, the specific force and the sampling."""
@@ -436,6 +447,7 @@ class FlightOptions:
             "--set",
             metavar="KEY=VALUE...",
             help="Parameters of the motion; strapgen list motions shows their names.  [default: rate_deg_s=60]",
+            words=MOTION_SETTINGS,
         ),
     ] = None
     force: Annotated[
@@ -454,6 +466,7 @@ class FlightOptions:
             metavar="KEY=VALUE...",
             help="Parameters of the force, such as rms_m_s2, swing_y_g, frequency_hz, x_m.  "
             "[default: rms_m_s2=10 z_g=1]",
+            words=f"{__name__}:force_settings",
         ),
     ] = None
     sample_hz: Annotated[Positive, option("--sample-hz", metavar="HZ", help="Sampling rate in Hz.")] = (

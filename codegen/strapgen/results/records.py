@@ -252,6 +252,7 @@ def record_schema(kind: type) -> dict[str, Any]:
 
 def type_schema(kind: Any) -> dict[str, Any]:
     """Return the JSON Schema of a type as `plain` writes its values."""
+    kind = _meant(kind)
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
         schemas = [type_schema(part) for part in parts]
@@ -272,6 +273,14 @@ def type_schema(kind: Any) -> dict[str, Any]:
     if isinstance(origin, type) and issubclass(origin, Iterable):
         return {"type": "array", "items": type_schema(parts[0])}
     return _plain_type_schema(kind)
+
+
+def _meant(kind: Any) -> Any:
+    """Return what a name of the statement ``type`` stands for, such as NDArray of NumPy 2.5, or the type as it is."""
+    name, parts = typing.get_origin(kind) or kind, typing.get_args(kind)
+    if not hasattr(name, "__value__"):
+        return kind
+    return name.__value__[parts] if parts else name.__value__
 
 
 def _plain_type_schema(kind: Any) -> dict[str, Any]:

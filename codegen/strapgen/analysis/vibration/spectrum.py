@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial
-from itertools import chain, islice, pairwise
+from itertools import islice, pairwise
 from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ from strapgen.ir.checks import counted, needed
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.read_only import ReadOnly
-from strapgen.lab.recordings.recorded_rows import csv_rows, line_blocks
+from strapgen.lab.recordings.formats.csv_table import csv_rows, line_blocks
 
 Array = NDArray[Any]
 
@@ -321,7 +321,7 @@ def _columns(path: Path) -> dict[str, Array]:
     allowed = ["frequency_hz", "density"]
     for name, unit in TRANSFERS.items():
         allowed += [f"{name}_{unit}", f"{name}_phase_rad"]
-    read = csv_rows(path, chain.from_iterable(line_blocks(path)))
+    read = csv_rows(path, line_blocks(path))
     rows = [*islice(((line, row) for line, row in read if any(map(str.strip, row))), _MOST_ROWS + 1)]
     if len(rows) > _MOST_ROWS:
         raise InputError(f"{path} has over {_MOST_ROWS} rows; that is too many for a spectrum")

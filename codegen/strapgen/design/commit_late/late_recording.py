@@ -189,11 +189,12 @@ def propagate_whole(
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
     pulse: float | str | Fraction | None = None,
+    initial: Any = None,
 ) -> History:
-    """Run a window over all recorded increments, from zero rotation.
+    """Run a window over all recorded increments.
 
     The intervals at both ends have filters with fewer samples on one side. The states are normalized, whatever the
-    interval of orthonormalization.
+    interval of orthonormalization. `initial` (3, 3): direction cosine matrix at the start; by default no rotation.
 
     >>> from strapgen import choose
     >>> history = propagate_whole(choose("euler", "window-3-3"), "numpy", Recording(0.0, 0.01, np.full((9, 3), 1e-3)))
@@ -213,6 +214,10 @@ def propagate_whole(
         raise InputError(f"record {record} s is longer than the recording, {len(row) * step:.6g} s")
     if pulse is not None:
         row = pulses(row[:, None], pulse)[:, 0]
-    states = recording_attitudes(window, row, algorithm=choice.name, backend=backend)[::every]
+    if initial is not None and choice.name != "dcm":
+        initial = evaluator(f"{choice.name}-from-dcm")(np.asarray(initial, float))
+    states = recording_attitudes(window, row, algorithm=choice.name, backend=backend, initial=initial)[
+        ::every
+    ]
     time = recording.start + step * every * np.arange(len(states), dtype=np.float64)
     return History(time, states, step, 0)

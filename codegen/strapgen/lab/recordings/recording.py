@@ -1,58 +1,30 @@
-"""Reads recorded gyro data from files, as increments or rates, and runs an algorithm along it."""
+"""Recorded gyro data from files, arrays and data frames, and an algorithm run along it."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.ir import checks, units
-from strapgen.ir.checks import counted
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import Records, short_repr
 from strapgen.ir.read_only import ReadOnly
-from strapgen.ir.renamed import renamed
-from strapgen.lab.recordings.recorded_header import (
-    ColumnLayout,
-    known_unit,
-    named_layout,
-    rates_layout,
-)
-from strapgen.lab.recordings.recorded_rows import (
-    PART,
-    Columns,
-    LineNumbers,
-    RecordedRows,
-    SampleIntervals,
-    largest_magnitude,
-    parts,
-    read_rows,
-    release,
-)
-from strapgen.lab.runs import require_finite, require_proper
+from strapgen.ir.renamed import renamed, warn
+from strapgen.lab.recordings.array_log import ArrayLog, frame_log
+from strapgen.lab.recordings.log_file import LogFile, open_log
+from strapgen.lab.recordings.long_columns import largest_magnitude, release
+from strapgen.lab.recordings.reading import Reading, increments
+from strapgen.lab.runs import initial_state, require_finite, require_proper
 from strapgen.run.backends import Backend
 from strapgen.run.increments import StepWindows
 
 Array = NDArray[np.float64]
-
-#: Units of recorded rates, and their factor to rad/s.
-RATE_UNITS = {name: float(factor) for name, factor in units.RATES.items()}
-
-#: Names of columns, and their units.
-_INCREMENT_COLUMNS = {"t": "s", "dx": "rad", "dy": "rad", "dz": "rad"}
-_INERTIAL_COLUMNS = {**_INCREMENT_COLUMNS, "dvx": "m/s", "dvy": "m/s", "dvz": "m/s"}
-#: Largest relative departure of an interval from the median in an even recording.
-_EVEN = 1e-3
-
-#: From this multiple of the median on, an interval is a gap in which the motion is not known.
-GAP = 10
 
 
 @renamed(increments="samples")
@@ -69,7 +41,11 @@ class Recording(ReadOnly):
     samples : array, (N, 3)
         Angle increments in rad, body axes.
     remarks : tuple of str, optional
-        What was left out of the file or taken in place of what it lacks, a sentence each.
+        How the increments follow from the file, what was left out of it, and what was taken in place of what it lacks,
+        a sentence each.
+    breaks : tuple, optional
+        Where there are gaps that nothing bridges: the number of the first increment of each piece after the first one,
+        and the time in s at which it begins.
 
     Examples
     --------
@@ -81,8 +57,136 @@ class Recording(ReadOnly):
     interval: float
     samples: Array
     remarks: tuple[str, ...] = field(default=(), kw_only=True)
+    breaks: tuple[tuple[int, float], ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
+
+    @property
+    def pieces(self) -> list[Recording]:
+        """The pieces between gaps, each a recording; one where there are none."""
+        begins = [(0, self.start), *self.breaks]
+        ends = [place for place, _ in self.breaks] + [len(self.samples)]
+        velocity = getattr(self, "velocity_increments", None)
+        return [
+            Recording(start, self.interval, self.samples[first:last])
+            if velocity is None
+            else InertialRecording(start, self.interval, self.samples[first:last], velocity[first:last])
+            for (first, start), last in zip(begins, ends, strict=True)
+        ]
+
+    @classmethod
+    def from_rates(
+        cls,
+        time: Any,
+        rates: Any,
+        unit: str = "rad/s",
+        input: str = "rates",
+        force: Any = None,
+        force_unit: str = "m/s^2",
+        **options: Any,
+    ) -> Recording:
+        """Return the recording of rates in arrays.
+
+        Parameters
+        ----------
+        time : array_like, (N,)
+            Times in s, or stamps of NumPy's type datetime64; ``time_unit`` states another unit.
+        rates : array_like, (N, 3)
+            Body rates about x, y, z.
+        unit : str, optional
+            "rad/s", "deg/s", "mdeg/s", "mrad/s" or "deg/h".
+        input : str, optional
+            "rates", means over the intervals that end at the times: N give N increments; or "instants", rates at the
+            times: N give N - 1 increments by the trapezoid. The remarks say which.
+        force : array_like, (N, 3), optional
+            Specific forces along x, y, z; with them the recording is an `InertialRecording`.
+        force_unit : str, optional
+            "m/s^2", "g" or "mg".
+        **options
+            What `read` takes of the time and of faults: ``time_unit``, ``gaps``, ``repair``, ``axes``, ``start``,
+            ``end`` and ``every``.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        InputError
+            If shapes do not match, or there is a fault that is not repaired; the message names the row.
+
+        Examples
+        --------
+        >>> turn = Recording.from_rates([0.0, 0.1, 0.2], np.full((3, 3), (0, 0, 90)), "deg/s", "instants")
+        >>> turn.samples[:, 2].round(6).tolist()
+        [0.15708, 0.15708]
+        """
+        reading = Reading(
+            input=input, rate_unit=unit, force_unit=force_unit, force=force is not None, **options
+        )
+        return _recording(ArrayLog.of(time, rate=rates, force=force), "", reading)
+
+    @classmethod
+    def from_increments(cls, time: Any, angle: Any, velocity: Any = None, **options: Any) -> Recording:
+        """Return the recording of increments in arrays.
+
+        Parameters
+        ----------
+        time : array_like, (N,)
+            Times in s at the ends of the increments, or stamps of NumPy's type datetime64.
+        angle : array_like, (N, 3)
+            Angle increments in rad, body axes.
+        velocity : array_like, (N, 3), optional
+            Velocity increments in m/s, body axes; with them the recording is an `InertialRecording`.
+        **options
+            As for `from_rates`.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        InputError
+            As `from_rates` does.
+
+        Examples
+        --------
+        >>> Recording.from_increments([0.1, 0.2], np.full((2, 3), 1e-3)).start
+        0.0
+        """
+        reading = Reading(input="increments", force=velocity is not None, **options)
+        return _recording(ArrayLog.of(time, delta_angle=angle, delta_velocity=velocity), "", reading)
+
+    @classmethod
+    def from_frame(cls, frame: Any, columns: str | None = None, **options: Any) -> Recording:
+        """Return the recording in a data frame of pandas, polars, xarray, pyarrow, or a mapping of arrays.
+
+        Parameters
+        ----------
+        frame : data frame
+            Its columns are understood as those of a file; an index with a name, or of times, is a column too.
+        columns : str, optional
+            Names of the columns where they leave the meaning open, as for `read`.
+        **options
+            As for `read`.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        InputError
+            As `read` does.
+
+        Examples
+        --------
+        >>> frame = {"t [s]": [0.1, 0.2], "gx [deg/s]": [0, 0], "gy": [0, 0], "gz": [90, 90]}
+        >>> Recording.from_frame(frame).samples[:, 2]
+        array([0.15707963, 0.15707963])
+        """
+        return _recording(frame_log(frame), "", Reading(columns=columns, **options))
 
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"
@@ -129,6 +233,10 @@ class History(Records):
         Number of increments at the end that do not fill a step.
     elements : tuple of str
         Names of the elements of a state, row-major; empty where they are not known.
+    backend : Backend, optional
+        The back end whose states they are; None where the states are no attitudes.
+    piece : array, (N,), optional
+        Number of the piece of the recording, from 1 on; None where it has no gaps.
 
     Examples
     --------
@@ -143,22 +251,167 @@ class History(Records):
     step: float
     unused: int
     elements: tuple[str, ...] = ()
+    backend: Backend | None = field(default=None, repr=False, compare=False)
+    piece: NDArray[Any] | None = None
 
     __repr__ = short_repr
+
+    def matrices(self) -> Array:
+        """Return the direction cosine matrices of the states, body to reference, (N, 3, 3)."""
+        if self.backend is None:
+            raise InputError("the states are not known as attitudes of a back end")
+        return self.backend.matrices(self.states)
+
+    def to_frame(
+        self, attitude: str = "quaternion", quaternion: str = "xyzs", sense: str = "body-to-reference"
+    ) -> Any:
+        """Return the attitude as a data frame of pandas, polars or pyarrow, the first that is installed.
+
+        Parameters
+        ----------
+        attitude : str, optional
+            "state", "rpy" for roll, pitch and heading in deg, "quaternion", "matrix", or "rotation-vector" in rad.
+        quaternion : str, optional
+            "xyzs" or "sxyz": the order of a quaternion.
+        sense : str, optional
+            "body-to-reference" or "reference-to-body": what a quaternion, matrix or rotation vector turns.
+
+        Returns
+        -------
+        data frame
+            A column of the time in s, and the attitude's elements.
+
+        Raises
+        ------
+        InputError
+            If a name is not known, or the states are no attitudes.
+        MissingExtraError
+            If no library of data frames is installed.
+
+        Examples
+        --------
+        >>> from strapgen import backend
+        >>> history = propagate(backend("dcm"), Recording(0.0, 0.5, np.full((4, 3), (0, 0, 0.1))))
+        >>> [*history.to_frame("rpy")]
+        ['time_s', 'roll_deg', 'pitch_deg', 'heading_deg']
+        """
+        from strapgen.lab.recordings.attitude_output import AttitudeForm, frame
+
+        return frame({"time_s": self.time, **AttitudeForm(attitude, quaternion, sense).columns(self)})
 
     def _in_words(self) -> str:
         times = f"{self.time[0]:g} s to {self.time[-1]:g} s, steps of {self.step:g} s"
         return f"of {len(self.time)} states, {times}; {self.unused} increments unused"
 
 
-def read_increments(path: str | Path) -> Recording:
-    r"""Read a file of angle increments.
+def read(
+    path: str | Path,
+    topic: str = "",
+    *,
+    input: str | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    rate_unit: str | None = None,
+    force_unit: str | None = None,
+    sample_hz: float | str | Fraction | None = None,
+    axes: str | None = None,
+    start: float | str | Fraction | None = None,
+    end: float | str | Fraction | None = None,
+    every: int = 1,
+    gaps: str = "refuse",
+    repair: str | Sequence[str] = (),
+    force: bool = False,
+) -> Recording:
+    r"""Read a recording from a log of any format that `strapgen log` shows.
 
     Parameters
     ----------
     path : path
-        Comma-separated values: time in s at the end of each increment, and the increments about x, y, z in
-        rad. A header, if there is one, names the columns t, dx, dy, dz, in any order.
+        A table of text, or a log of an autopilot, of ROS or of a program; see the documentation for the formats.
+    topic : str, optional
+        Name of the table, by default the one that has rates.
+    input : str, optional
+        "increments" in rad; "rates", means over the intervals that end at the times; or "instants", rates at the times,
+        which are integrated by the trapezoid. By default what the columns are named: increments or rates.
+    columns : str, optional
+        Names or numbers of the columns where the log leaves them open, with commas between: the time and three rates or
+        increments, perhaps three specific forces or velocity increments too; or "t=NAME,x=NAME,y=NAME,z=NAME" with
+        ``fx``, ``fy`` and ``fz``. With `sample_hz` the time is left out.
+    time_unit, rate_unit, force_unit : str, optional
+        Units where the log has none: "s", "ms", "us", "ns"; "rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"; "m/s^2",
+        "g", "mg".
+    sample_hz : number, optional
+        Sampling rate in Hz, in place of a column of times.
+    axes : str, optional
+        The sensor's axes that are the body's x, y and z, as "x,-y,-z".
+    start, end : number, optional
+        Times in s after the first row, between which rows are read.
+    every : int, optional
+        Number of samples that are summed into one increment.
+    gaps : str, optional
+        What is done where samples are lost: "refuse"; "split", so that the recording has pieces, in each of which the
+        attitude starts anew; or "bridge": a single sample is restored by a filter of eight on each side, several are
+        put on the line between the samples on both sides.
+    repair : str or sequence of str, optional
+        Faults that are repaired, "all" or some of: "repeats", rows with the time of the row before, which are left out;
+        "order", rows out of order, which are sorted; "clock", times that jump back or are uneven by over a tenth of an
+        interval, which are taken as even; "nan" and "stuck", rows without a number and 16 or more equal rows, which are
+        restored as lost samples are.
+    force : bool, optional
+        Whether specific forces, or velocity increments, are read too.
+
+    Returns
+    -------
+    Recording
+        An `InertialRecording` with `force`. Its remarks say what was taken for what, and each fault once.
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, what it holds is open or contradicts what is stated, or there is a fault that is not
+        repaired; the message names the place.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
+    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n30,0,0,90\n")
+    >>> read(log, gaps="bridge").samples[:, 2].round(6)
+    array([0.015708, 0.015708, 0.015708, 0.015708])
+    """
+    reading = Reading(
+        *(input, columns, time_unit, rate_unit, force_unit, sample_hz, axes, start, end),
+        *(checks.count("every", every), gaps, repair, force),
+    )
+    return recorded(path, topic, reading)
+
+
+def recorded(path: str | Path, topic: str, reading: Reading) -> Recording:
+    """Return what a file holds, read in a way."""
+    return _recording(open_log(path), topic, reading)
+
+
+def read_rates(
+    path: str | Path,
+    unit: str | None = None,
+    resample_hz: float | str | Fraction | None = None,
+    *,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    sample_hz: float | str | Fraction | None = None,
+) -> Recording:
+    r"""Read rates at instants from a log: `read` with ``input="instants"``.
+
+    Parameters
+    ----------
+    path : path
+        As for `read`.
+    unit : str, optional
+        Unit of the rates where the log has none, as `rate_unit` of `read`.
+    resample_hz : number, optional
+        Old: the recording has the nearest whole number of samples in an increment, which ``every`` of `read` states.
+    columns, time_unit, sample_hz : optional
+        As for `read`.
 
     Returns
     -------
@@ -167,8 +420,38 @@ def read_increments(path: str | Path) -> Recording:
     Raises
     ------
     InputError
-        If the file cannot be read, a value is no finite number, or the times are not even; the message names
-        the line.
+        As `read` does.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
+    >>> _ = log.write_text("t [s],x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n")
+    >>> read_rates(log, "rad/s").samples[:, 2]
+    array([2., 3.])
+    """
+    if resample_hz is not None:
+        warn("resample_hz of read_rates", "every of read, a whole number of samples")
+    reading = Reading(*("instants", columns, time_unit, unit), sample_hz=sample_hz, near_hz=resample_hz)
+    return recorded(path, "", reading)
+
+
+def read_increments(path: str | Path) -> Recording:
+    r"""Read angle increments from a log: `read` with ``input="increments"``.
+
+    Parameters
+    ----------
+    path : path
+        As for `read`.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        As `read` does.
 
     Examples
     --------
@@ -178,19 +461,16 @@ def read_increments(path: str | Path) -> Recording:
     >>> read_increments(log).samples[:, 2]
     array([0.001, 0.002])
     """
-    start, interval, values = _even_increments(checks.path("path", path), _INCREMENT_COLUMNS)
-    return Recording(start, interval, values)
+    return recorded(path, "", Reading("increments"))
 
 
 def read_inertial(path: str | Path) -> InertialRecording:
-    r"""Read a file of angle and velocity increments.
+    r"""Read angle and velocity increments from a log: `read` with ``input="increments"`` and ``force=True``.
 
     Parameters
     ----------
     path : path
-        Comma-separated values: time in s at the end of each increment, the angle increments about x, y, z in rad, the
-        velocity increments along x, y, z in m/s. A header, if there is one, names the columns t, dx, dy, dz, dvx, dvy,
-        dvz, in any order.
+        As for `read`.
 
     Returns
     -------
@@ -199,8 +479,7 @@ def read_inertial(path: str | Path) -> InertialRecording:
     Raises
     ------
     InputError
-        If the file cannot be read, a value is no finite number, or the times are not even; the message names
-        the line.
+        As `read` does.
 
     Examples
     --------
@@ -210,100 +489,17 @@ def read_inertial(path: str | Path) -> InertialRecording:
     >>> read_inertial(log).velocity_increments[:, 2]
     array([0.98, 0.98])
     """
-    start, interval, values = _even_increments(checks.path("path", path), _INERTIAL_COLUMNS)
-    return InertialRecording(start, interval, *map(np.ascontiguousarray, np.hsplit(values, 2)))
-
-
-@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
-def read_rates(
-    path: str | Path,
-    unit: str | None = None,
-    resample_hz: float | str | Fraction | None = None,
-    *,
-    columns: str | None = None,
-    time_unit: str | None = None,
-    sample_hz: float | str | Fraction | None = None,
-    bridge_gaps: bool = False,
-    drop_repeated: bool = False,
-) -> Recording:
-    r"""Read a file of body rates and integrate them, with linear interpolation between samples.
-
-    Parameters
-    ----------
-    path : path
-        A table with commas, semicolons, tabs or blanks between cells. A header names the columns of the time and of
-        three rates, with their units if it states any: ``time [ms],gx [deg/s],gy [deg/s],gz [deg/s]``. Without one
-        there are four columns: time in s, and the rates.
-    unit : str, optional
-        Unit of the rates, a key of `RATE_UNITS`, where the header has none.
-    resample_hz : number, optional
-        Frequency of an even grid to integrate over, needed if the times are not even.
-    columns : str, optional
-        Names or numbers of the columns, with commas between, where the header leaves them open: the time and three
-        rates, or with `sample_hz` the rates alone.
-    time_unit : str, optional
-        "s", "ms", "us" or "ns", where the header has none.
-    sample_hz : number, optional
-        Sampling rate in Hz, in place of a column of times.
-    bridge_gaps : bool, optional
-        Whether the rate is linear across gaps too; it needs `resample_hz`.
-    drop_repeated : bool, optional
-        Whether rows are left out whose time is that of the row before.
-
-    Returns
-    -------
-    Recording
-        Its `remarks` say what was bridged and left out.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, its columns or units are open or contradict what is stated, a value is no finite
-        number, there is a gap, or the times are not even and there is no `resample_hz`; the message names the line.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t [s],x,y,z\n0,0,0,1\n1,0,0,3\n2,0,0,3\n")
-    >>> read_rates(log, "rad/s").samples[:, 2]
-    array([2., 3.])
-    >>> read_rates(log, "rad/s", resample_hz=2).samples[:, 2]
-    array([0.75, 1.25, 1.5 , 1.5 ])
-    """
-    path = checks.path("path", path)
-    if unit is not None:
-        unit = known_unit("rate unit", unit, units.RATES)
-    if time_unit is not None:
-        time_unit = known_unit("time unit", time_unit, units.TIMES)
-    if bridge_gaps and resample_hz is None:
-        raise InputError("bridge_gaps needs resample_hz, an even grid for the rate across a gap")
-    has_time = sample_hz is None
-    find = partial(rates_layout, unit=unit, columns=columns, time_unit=time_unit, has_time=has_time)
-    rows, layout = read_rows(path, find, sample_hz)
-    if layout.unit is None:
-        raise InputError(
-            f"{path} states no unit of the rates; --rate-unit is needed, {', '.join(RATE_UNITS)}"
-        )
-    factor = RATE_UNITS[layout.unit]
-    remarks: list[str] = []
-    if drop_repeated:
-        rows = without_repeated(path, rows, remarks)
-    time, lines = rows.time, rows.lines
-    intervals, median = _checked_intervals(path, rows, bridge_gaps)
-    if bridge_gaps:
-        remarks += gap_remarks(rows, median)
-    if resample_hz is None:
-        _require_even(path, intervals, median, lines, "resample_hz integrates them over an even grid")
-        interval = float((time[-1] - time[0]) / intervals.count)
-        increments = integrals(rows, factor)
-    else:
-        interval = 1 / float(checks.number("resample_hz", resample_hz, positive=True))
-        increments = resampled(rows, factor, interval, grid_points(path, time, resample_hz, interval))
-    recording = Recording(float(time[0]), interval, increments, remarks=tuple(remarks))
-    if not math.isfinite(recording.largest):
-        raise InputError(f"{path}: the integral of a rate is beyond the range of double")
+    recording = recorded(path, "", Reading("increments", force=True))
+    assert isinstance(recording, InertialRecording), "forces are read"
     return recording
+
+
+def _recording(log: LogFile, topic: str, reading: Reading) -> Recording:
+    """Return what a log holds."""
+    start, interval, angle, velocity, remarks, breaks = increments(log, topic, reading)
+    if velocity is None:
+        return Recording(start, interval, angle, remarks=remarks, breaks=breaks)
+    return InertialRecording(start, interval, angle, velocity, remarks=remarks, breaks=breaks)
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
@@ -313,10 +509,12 @@ def propagate(
     orthonormalize: float | str | Fraction | None = None,
     record: float | str | Fraction | None = None,
     pulse: float | str | Fraction | None = None,
+    initial: Any = None,
 ) -> History:
-    """Run an algorithm over recorded increments, from zero rotation.
+    """Run an algorithm over recorded increments.
 
-    An algorithm that takes increments from before its step starts after as many of them.
+    An algorithm that takes increments from before its step starts after as many of them. Each piece of a recording with
+    gaps starts anew; pieces that are shorter than a step are left out.
 
     Parameters
     ----------
@@ -325,9 +523,12 @@ def propagate(
     recording : Recording
     orthonormalize, record : number, optional
         Intervals in s of orthonormalization (by default there is none) and of records (by default every step), each a
-        multiple of the step to a hundredth of a step.
+        multiple of the step to a hundredth.
     pulse : number, optional
         Angle of a gyro pulse in rad, see `gyro.pulses`; by default increments are not quantized.
+    initial : array_like, (3, 3), or Rotation, optional
+        Direction cosine matrix at the start of each piece, body to reference, or SciPy's rotation; by default there is
+        no rotation.
 
     Returns
     -------
@@ -354,6 +555,45 @@ def propagate(
             "(an array goes to Backend.propagate)"
         )
     backend.need_increments()
+    if hasattr(initial, "as_matrix"):  # a Rotation of SciPy
+        initial = initial.as_matrix()
+    begin = None if initial is None else initial_state(backend, initial)
+    return along_pieces(
+        recording,
+        lambda piece: _along(backend, piece, orthonormalize, record, pulse, begin),
+        backend.samples_per_step,
+    )
+
+
+def along_pieces(recording: Recording, run: Callable[[Any], History], least: int = 1) -> History:
+    """Return the history of all pieces of a recording, which run one by one.
+
+    `least`: increments of a step; shorter pieces are left out.
+    """
+    if not recording.breaks:
+        return run(recording)
+    pieces = recording.pieces
+    long = [piece for piece in pieces if len(piece.samples) >= least] or pieces[:1]
+    histories = [run(piece) for piece in long]
+    short = sum(len(piece.samples) for piece in pieces) - sum(len(piece.samples) for piece in long)
+    return replace(
+        histories[0],
+        time=np.concatenate([one.time for one in histories]),
+        states=np.concatenate([one.states for one in histories]),
+        unused=short + sum(one.unused for one in histories),
+        piece=np.repeat(np.arange(1, 1 + len(histories)), [len(one.time) for one in histories]),
+    )
+
+
+def _along(
+    backend: Backend,
+    recording: Recording,
+    orthonormalize: float | str | Fraction | None,
+    record: float | str | Fraction | None,
+    pulse: float | str | Fraction | None,
+    begin: Any,
+) -> History:
+    """Run an algorithm over one piece of a recording from a state."""
     step = recording.interval * backend.increments
     steps, unused = divmod(
         max(0, len(recording.samples) - backend.samples_per_step + backend.increments), backend.increments
@@ -372,143 +612,17 @@ def propagate(
         return recording.samples[first:stop]
 
     parts_of_run = StepWindows(read, backend.increments, backend.previous + backend.ahead, pulse)
-    states = backend.propagate_parts(parts_of_run, steps, record_every, every)
+    states = backend.propagate_parts(parts_of_run, steps, record_every, every, begin)
     start = recording.start + recording.interval * backend.previous
     time: Array = start + step * record_every * np.arange(len(states), dtype=np.float64)
     require_finite(backend, states, time)
     require_proper(backend, states, time)
-    return History(time, states, step, unused, backend.elements)
-
-
-def _checked_intervals(
-    path: Path, rows: RecordedRows, bridged: bool = False
-) -> tuple[SampleIntervals, float]:
-    """Return the intervals and their median in s; refuse times that do not rise, and gaps."""
-    time, lines = rows.time, rows.lines
-    if not math.isfinite(float(time[-1]) - float(time[0])):
-        raise InputError(f"{path}: times from {time[0]:g} s to {time[-1]:g} s are too far apart")
-    intervals = SampleIntervals(time)
-    shortest, worst = intervals.shortest
-    if shortest <= 0:
-        raise InputError(
-            f"{path}, line {lines[worst + 1]}: "
-            f"time {float(time[worst + 1])!r} s does not come after {float(time[worst])!r} s"
-            + ("; --drop-repeated leaves out rows with the same time" if shortest == 0 else "")
-        )
-    median = intervals.median()
-    longest, widest = intervals.longest
-    if longest > GAP * median and not bridged:
-        raise InputError(
-            f"{path}, line {lines[widest + 1]}: a gap of {longest:.6g} s; "
-            f"the median interval is {median:.6g} s, and up to {GAP} times that is allowed; --bridge-gaps with "
-            "--resample-hz takes the rate as linear across it"
-        )
-    return intervals, median
-
-
-def _require_even(
-    path: Path, intervals: SampleIntervals, median: float, lines: LineNumbers, remedy: str
-) -> None:
-    departure, worst = intervals.farthest(median)
-    interval = intervals.at(worst)
-    if departure > _EVEN * median:
-        raise InputError(
-            f"{path}, line {lines[worst + 1]}: sample times are not even: the interval of {interval:.6g} s "
-            f"before it is the worst, the median is {median:.6g} s; {remedy}"
-        )
-
-
-def _even_increments(path: Path, columns: Mapping[str, str]) -> tuple[float, float, Array]:
-    """Return the time at which the first increment begins, the interval, and the increments."""
-
-    def find(header: Sequence[str] | None, width: int) -> ColumnLayout:
-        return named_layout(header, width, [*columns], [*columns.values()])
-
-    rows, _ = read_rows(path, find)
-    intervals, median = _checked_intervals(path, rows)
-    _require_even(path, intervals, median, rows.lines, "increments are needed at even times")
-    interval = float((rows.time[-1] - rows.time[0]) / intervals.count)
-    return float(rows.time[0]) - interval, interval, rows.values
+    return History(time, states, step, unused, backend.elements, backend)
 
 
 def record_interval(what: str, value: float | str | Fraction, step: float) -> int:
-    """Return the number of steps in an interval in s, to a hundredth of a step."""
+    """Return the number of steps in an interval in s, which is a multiple of the step to a hundredth."""
     ratio = float(checks.number(what, value, positive=True)) / step
-    if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01:
+    if not 0.5 < ratio <= checks.MOST or abs(ratio - round(ratio)) > 0.01 * max(1, ratio):
         raise InputError(f"{what} {value} s is not a whole multiple of the step {step:.6g} s")
     return round(ratio)
-
-
-def without_repeated(path: Path, rows: RecordedRows, remarks: list[str]) -> RecordedRows:
-    """Return rows without those whose time is that of the row before."""
-    is_new = np.concatenate([[True], np.diff(rows.time) != 0])
-    dropped = int(len(is_new) - is_new.sum())
-    if not dropped:
-        return rows
-    first = rows.lines[int(np.argmin(is_new))]
-    remarks.append(
-        f"{counted(dropped, 'row')} with the time of the row before left out, the first in line {first}"
-    )
-    lines = LineNumbers()
-    for place, row in enumerate(np.flatnonzero(is_new)):
-        lines.add(place, [rows.lines[int(row)]])
-    return RecordedRows(rows.time[is_new], rows.values[is_new], lines)
-
-
-def gap_remarks(rows: RecordedRows, median: float) -> list[str]:
-    """Return a remark for each gap that is bridged."""
-    steps = np.diff(rows.time)
-    return [
-        f"a gap of {steps[place]:.6g} s before line {rows.lines[int(place) + 1]}, from {rows.time[place]:.6g} s on, is "
-        "bridged: the rate is taken as linear across it"
-        for place in np.flatnonzero(steps > GAP * median)
-    ]
-
-
-def grid_points(path: Path, time: Array, resample_hz: float | str | Fraction, interval: float) -> int:
-    """Return the number of intervals of an even grid over a recording."""
-    ratio = (float(time[-1]) - float(time[0])) / interval * (1 + 1e-12)
-    if ratio > checks.MOST:
-        raise InputError(f"resample_hz {resample_hz}: {path} would make over {checks.MOST:.0e} increments")
-    count = math.floor(ratio)
-    if count < 1:
-        raise InputError(
-            f"resample_hz {resample_hz}: {path} is {time[-1] - time[0]:.6g} s long, less than one interval"
-        )
-    return count
-
-
-def integrals(rows: RecordedRows, factor: float) -> Array:
-    """Return the integrals of rates from each row to the next."""
-    increments = Columns(3)
-    for first, part in parts(rows.values, 1):
-        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
-        increments.append((rates[1:] + rates[:-1]) / 2 * np.diff(time)[:, None])
-    release(rows.time)
-    return increments.array()
-
-
-def resampled(rows: RecordedRows, factor: float, interval: float, count: int) -> Array:
-    """Return the integrals of rates over an even grid of so many intervals."""
-    begin, end, last = float(rows.time[0]), float(rows.time[-1]), len(rows.time) - 1
-    increments, angle, before, done = Columns(3), np.zeros((1, 3)), np.zeros((0, 3)), 0
-    for first, part in parts(rows.values, 1):
-        rates, time = part * factor, np.asarray(rows.time[first : first + len(part)])
-        gaps = np.diff(time)
-        pieces = (rates[1:] + rates[:-1]) / 2 * gaps[:, None]
-        slopes = np.diff(rates, axis=0) / gaps[:, None]
-        angles = np.cumsum(np.vstack([angle, pieces]), axis=0)
-        angle = angles[-1:]
-        while done <= count:
-            grid = np.minimum(begin + interval * np.arange(done, min(done + PART, count + 1)), end)
-            if first + len(gaps) < last:  # the rest lies in the parts to come
-                grid = grid[grid < time[-1]]
-            if not len(grid):
-                break
-            row = np.minimum(np.searchsorted(time, grid, side="right") - 1, len(gaps) - 1)
-            inside = (grid - time[row])[:, None]
-            there = angles[row] + inside * (rates[row] + inside / 2 * slopes[row])
-            increments.append(np.diff(np.vstack([before, there]), axis=0))
-            before, done = there[-1:], done + len(grid)
-    release(rows.time)
-    return increments.array()

@@ -63,6 +63,11 @@ def _parameters(signal: Signal) -> str:
     return "cayley-klein" if signal.elements[0].endswith("_s") else "euler"
 
 
+def _state(signal: Signal, matrix: Array) -> Array:
+    """Return an attitude as a signal has it."""
+    return matrix if signal.size == 9 else np.asarray(evaluator(f"{_parameters(signal)}-from-dcm")(matrix))
+
+
 def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Array]:
     """Return the memory at the start of a run, and the attitude in it as a matrix, (3, 3).
 
@@ -71,8 +76,7 @@ def begun(runner: SystemRunner, start: Array | None) -> tuple[SystemMemory, Arra
     memory = runner.begin()
     cell = attitude_output(runner.system)
     if start is not None:
-        value = start if cell.signal.size == 9 else evaluator(f"{_parameters(cell.signal)}-from-dcm")(start)
-        runner.set(memory, cell.name, value)
+        runner.set(memory, cell.name, _state(cell.signal, start))
     begin = matrices(cell.signal, [float(value) for value in cell.initial])[0] if start is None else start
     require_rotations(cell.name, np.asarray(begin)[None], np.zeros(1))
     return memory, begin
@@ -136,13 +140,20 @@ def simulate_system(
     return Run(time, computed, true, *evaluator("error-matrix")(computed, true))
 
 
-def system_history(runner: SystemRunner, recording: Recording) -> History:
-    """Run a system along recorded increments of gyros, without specific force unless the recording has it."""
-    course = system_course(runner, recording)
+def system_history(runner: SystemRunner, recording: Recording, start: Array | None = None) -> History:
+    """Run a system along recorded increments of gyros, without specific force unless the recording has it.
+
+    `start` (3, 3): attitude at the start; by default that of the description.
+    """
     cell = attitude_output(runner.system)
+    memory = None if start is None else begun(runner, start)[0]
+    begin = np.array(
+        [float(value) for value in cell.initial] if start is None else _state(cell.signal, start)
+    )
+    begin = begin.reshape(1, *cell.signal.shape)
+    course = system_course(runner, recording, memory)
     step = runner.system.every(cell.name) * recording.interval
     values = course.values[cell.name]
-    begin = np.array([[float(value) for value in cell.initial]]).reshape(1, *cell.signal.shape)
     time: Array = recording.start + step * np.arange(1 + len(values), dtype=np.float64)
     states = np.concatenate([begin, values])
     return History(time, states, step, course.unused, cell.signal.elements)

@@ -11,7 +11,7 @@ import typer
 
 from strapgen.cli.option_groups import stated
 from strapgen.ir.exceptions import InputError
-from strapgen.lab.run_options import DescribedAlgorithms, read_errors, with_errors
+from strapgen.lab.run_options import DescribedAlgorithms, inertial, whole_recording
 from strapgen.navigation.systems.built_in import is_system
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from strapgen.cli.options import MethodOptions, SeveralMethods
     from strapgen.cli.output import Output
     from strapgen.lab.recordings.recording import Recording
-    from strapgen.lab.run_options import RunOptions, RunOutput, SampleSource
+    from strapgen.lab.run_options import RecordingOptions, RunOptions, RunOutput, SampleSource
     from strapgen.navigation.strapdown_command import CourseOutput, Start
     from strapgen.navigation.systems.system_runner import SystemRunner
     from strapgen.navigation.systems.wiring import Description
@@ -46,9 +46,9 @@ def simulated_system(
     fixed.check_backend(backend)
     output.check(name, *source.files)
     if source.motion is None:
-        if intervals.initial is not None or intervals.record is not None:
-            raise InputError("--initial-deg and --record of a described system go with --motion")
-        return _on_recording(name, backend, source, fixed, output)
+        if intervals.record is not None:
+            raise InputError("--record of a described system goes with --motion")
+        return _on_recording(name, backend, source, intervals, fixed, output)
     if output.print_every is not None:
         raise InputError("--print does not go with a described system; --record and --format csv do")
     from strapgen.cli.progress import waiting
@@ -73,17 +73,26 @@ def simulated_system(
 
 
 def _on_recording(
-    name: str, backend: str, source: SampleSource, fixed: FixedOptions, output: RunOutput
+    name: str,
+    backend: str,
+    source: SampleSource,
+    intervals: RunOptions,
+    fixed: FixedOptions,
+    output: RunOutput,
 ) -> None:
     """Run along recorded gyro data, and deliver the attitude."""
+    from strapgen.lab.recordings.recording import along_pieces
     from strapgen.lab.runs_report import HistoryResult
     from strapgen.navigation.systems.system_runs import attitude_output, system_history
 
     data = recorded(source)
     runner = runner_of(described_along(name, data), backend, fixed)
     elements = attitude_output(runner.system).signal.elements
-    history = system_history(runner, data)
-    facts = facts_of(runner, name) | {"source": str(source.file)} | source.facts
+    history = along_pieces(
+        data, lambda piece: system_history(runner, piece, intervals.start()), runner.system.cycle
+    )
+    source.say_remarks(data)
+    facts = facts_of(runner, name) | {"source": source.source} | source.facts
     title = f"{name}, {backend}: attitude along {source.file.name}"
     replace(output, format=output.format or "csv").show(
         HistoryResult(facts, replace(history, elements=elements), plot_title=title)
@@ -92,7 +101,7 @@ def _on_recording(
 
 def recorded(source: SampleSource) -> Recording:
     """Read the recorded data of a run, in whole pulses of the gyro if they are stated."""
-    data = source.recording()
+    data = source.recorded()
     if source.pulse is None:
         return data
     from strapgen.run.increments import pulses
@@ -178,7 +187,7 @@ def _inputs(name: str, source: SampleSource) -> tuple[Description, dict[str, NDA
     from strapgen.navigation.systems.system_runs import cycles_of, samples
 
     if source.motion is None:
-        data = recorded(source)
+        data = whole_recording(recorded(source))
         description = described_along(name, data)
         angle = np.asarray(data.samples)
         return description, samples(description, angle, np.zeros_like(angle)), Path(source.file).name
@@ -195,32 +204,32 @@ def system_along(
     name: str,
     others: Iterable[str],
     backend: str,
-    sensors: tuple[Path, str | None],
+    source: RecordingOptions,
+    errors: str | None,
     start: Start,
     fixed: FixedOptions,
     output: CourseOutput,
 ) -> None:
     """Run a described system along a recording, as sensors with errors measure it, and deliver its outputs."""
-    increments, errors = sensors
     refuse_options(None, fixed, [*others, *([] if output.plot is None else ["--plot"])])
     if any(start.frame_rate):
         raise InputError(
             "--frame-rate-deg-h does not go with a described system, whose navigation frame rests"
         )
     fixed.check_backend(backend)
-    output.check(name, increments)
+    output.check(name, source.file)
     from strapgen.cli.progress import waiting
-    from strapgen.lab.recordings import recording
     from strapgen.navigation.systems.system_runs import SystemCourseResult, begun, system_course
 
-    data = with_errors(recording.read_inertial(increments), read_errors(errors))
+    data = inertial(source, errors)
     runner = runner_of(described_along(name, data), backend, fixed)
     memory = None
     if any(start.initial):
         memory, _ = begun(runner, start.matrix())
     with waiting(f"running {name}"):
         course = system_course(runner, data, memory)
-    facts = facts_of(runner, name) | {"source": str(increments)}
+    source.say_remarks(data)
+    facts = facts_of(runner, name) | {"source": source.source}
     facts |= {} if errors is None else {"errors": errors}
     format = output.format or ("text" if output.file is None else "csv")
     replace(output, format=format).show(SystemCourseResult(facts, course))

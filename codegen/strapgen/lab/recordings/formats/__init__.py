@@ -1,0 +1,1 @@
+"""Readers of log files, a module for each format."""

@@ -1,0 +1,154 @@
+"""Long columns of numbers, which are kept on the disk and worked on in parts."""
+
+from __future__ import annotations
+
+import mmap
+import tempfile
+from collections.abc import Iterator
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapgen.ir.exceptions import InputError
+
+Array = NDArray[Any]
+
+#: Numbers that a column store holds in memory, and rows that are worked on together.
+_IN_MEMORY = 1 << 22
+PART = 1 << 18
+
+
+class Columns:
+    """A table of numbers that grows by rows: doubles, or integers as long as all rows are of integers."""
+
+    def __init__(self, width: int, kind: type = np.float64) -> None:
+        self.width = width
+        self.rows = 0
+        self._kind: Any = np.dtype(kind)
+        self._parts: list[Array] = []
+        self._file: IO[bytes] | None = None
+
+    @property
+    def is_integer(self) -> bool:
+        """Whether all rows so far are of integers."""
+        return bool(self._kind != np.float64)
+
+    def append(self, part: Any) -> None:
+        """Add rows, (N, width) or (N,)."""
+        part = np.asarray(part).reshape(-1, self.width)
+        if self._kind != np.float64 and part.dtype != self._kind:
+            self._to_doubles()
+        self.rows += len(part)
+        self._parts.append(np.ascontiguousarray(part, self._kind))
+        if self._file is None and self.rows * self.width <= _IN_MEMORY:
+            return
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(prefix="strapgen-")  # noqa: SIM115
+            for waiting in self._parts:
+                self._file.write(waiting.tobytes())
+        except OSError as error:
+            raise _disk_full(error) from None
+        self._parts.clear()
+
+    def array(self) -> Array:
+        """Return all rows, (rows, width)."""
+        if self._file is None:
+            return np.concatenate([np.empty((0, self.width), self._kind), *self._parts])
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise _disk_full(error) from None
+        return np.memmap(self._file, self._kind, "r", shape=(self.rows, self.width))
+
+    def _to_doubles(self) -> None:
+        doubles = Columns(self.width)
+        for _, part in parts(self.array()):
+            doubles.append(part)
+        self._kind, self._parts, self._file = doubles._kind, doubles._parts, doubles._file
+
+
+def _disk_full(error: OSError) -> InputError:
+    return InputError(
+        f"the temporary folder {tempfile.gettempdir()} does not hold so long a recording ({error.strerror})"
+    )
+
+
+def release(array: Any) -> None:
+    """Let the system forget what it has read of an array on the disk; others stay as they are."""
+    while array is not None and not isinstance(array, mmap.mmap):
+        array = getattr(array, "base", None)
+    if array is not None and hasattr(array, "madvise"):
+        array.madvise(mmap.MADV_DONTNEED)
+
+
+def parts(array: Array, overlap: int = 0) -> Iterator[tuple[int, Array]]:
+    """Yield the rows of an array in parts, each with the number of its first row.
+
+    `array` has shape (N, ...).
+    """
+    for first in range(0, max(1, len(array) - overlap), PART):
+        yield first, np.asarray(array[first : first + PART + overlap])
+        release(array)
+
+
+def largest_magnitude(array: Array) -> float:
+    """Return the largest magnitude of an element; 0 if there is none, and no number if one is none."""
+    return float(np.max([np.abs(part).max(initial=0.0) for _, part in parts(array)]))
+
+
+class SampleIntervals:
+    """The differences of rising times.
+
+    `time` (N,): at least two finite times in s. `shortest, longest`: the interval in s, and the number of the
+    time before it.
+    """
+
+    def __init__(self, time: Array) -> None:
+        self._time = time
+        self.count = len(time) - 1
+        self.shortest, self.longest = (np.inf, 0), (-np.inf, 0)
+        for first, part in self.parts():
+            low, high = int(part.argmin()), int(part.argmax())
+            self.shortest = min(self.shortest, (float(part[low]), first + low))
+            if part[high] > self.longest[0]:
+                self.longest = (float(part[high]), first + high)
+
+    def parts(self) -> Iterator[tuple[int, Array]]:
+        """Yield the intervals in parts, each with the number of its first one."""
+        for first, part in parts(self._time, 1):
+            yield first, np.diff(part)
+
+    def at(self, place: int) -> float:
+        """Return one interval."""
+        return float(self._time[place + 1] - self._time[place])
+
+    def median(self) -> float:
+        """Return the median of intervals above 0."""
+        if self.count <= PART:
+            return float(np.median(np.diff(self._time)))
+        middle = (self.count - 1) // 2
+        low = self._of_rank(middle)
+        return low if self.count % 2 else float(np.mean([low, self._of_rank(middle + 1)]))
+
+    def _of_rank(self, rank: int) -> float:
+        """Return the interval above which as many are shorter: bits of numbers above 0 are in their order."""
+        low, high = (int(np.float64(value).view(np.int64)) for value in (self.shortest[0], self.longest[0]))
+        while low < high:
+            middle = (low + high) // 2
+            if sum(int(np.count_nonzero(part.view(np.int64) <= middle)) for _, part in self.parts()) > rank:
+                high = middle
+            else:
+                low = middle + 1
+        return float(np.int64(low).view(np.float64))
+
+    def farthest(self, value: float) -> tuple[float, int]:
+        """Return the largest departure from a value, and the number of the first interval that has it."""
+        worst = (-np.inf, 0)
+        for first, part in self.parts():
+            departures = np.abs(part - value)
+            place = int(departures.argmax())
+            if departures[place] > worst[0]:
+                worst = (float(departures[place]), first + place)
+        return worst
