@@ -115,6 +115,10 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Kernel": kernel,
     "KernelBuilder": builder,
     "Stage": lambda: kernel().stages[0],
+    "StampedGrid": lambda: strapgen.StampedGrid(sample_hz=200, tick_hz=1_000_000),
+    "GridSamples": lambda: strapgen.GridSamples(np.zeros((4, 3)), 0.005, (200.0, 200.0)),
+    "StampError": lambda: strapgen.StampError(strapgen.StampStatus.GAP, "a sample is lost"),
+    "StampStatus": lambda: next(iter(strapgen.StampStatus)),
     "Target": lambda: strapgen.TARGETS["c"],
     "Language": lambda: strapgen.Language(str.isidentifier, lambda texts: [{*" ".join(texts).split()}]),
 }
