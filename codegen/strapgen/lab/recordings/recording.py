@@ -104,7 +104,7 @@ class Recording(ReadOnly):
             "m/s^2", "g" or "mg".
         **options
             What `read` takes of the time and of faults: ``time_unit``, ``gaps``, ``repair``, ``axes``, ``start``,
-            ``end`` and ``every``.
+            ``end``, ``every`` and ``grid``.
 
         Returns
         -------
@@ -321,6 +321,7 @@ def read(
     gaps: str = "refuse",
     repair: str | Sequence[str] = (),
     force: bool = False,
+    grid: bool = False,
 ) -> Recording:
     r"""Read a recording from a log of any format that `strapgen log` shows.
 
@@ -359,6 +360,9 @@ def read(
         restored as lost samples are.
     force : bool, optional
         Whether specific forces, or velocity increments, are read too.
+    grid : bool, optional
+        Whether the times are the instants of the samples, which are taken from there to an even grid by `StampedGrid`;
+        by default they count as even.
 
     Returns
     -------
@@ -382,6 +386,7 @@ def read(
     reading = Reading(
         *(input, columns, time_unit, rate_unit, force_unit, sample_hz, axes, start, end),
         *(checks.count("every", every), gaps, repair, force),
+        grid=grid,
     )
     return recorded(path, topic, reading)
 
