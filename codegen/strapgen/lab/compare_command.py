@@ -77,8 +77,9 @@ def compare(
         NotNegative | None,
         option(
             "--noise-deg-sqrt-h",
-            metavar="NOISE",
-            help="Angle random walk of the gyro, beside which several algorithms are judged.  [default: from the rest]",
+            metavar="N",
+            help="Random walk of the gyro in deg per root of an hour, beside which several algorithms are judged.  "
+            "[default: that of the longest rest]",
             panel="Input",
         ),
     ] = None,
