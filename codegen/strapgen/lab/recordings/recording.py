@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
+from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import renamed, warn
 from strapgen.lab.recordings.array_log import ArrayLog, frame_log
 from strapgen.lab.recordings.log_file import LogFile, open_log
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 
 @renamed(increments="samples")
 @dataclass(frozen=True)
-class Recording:
+class Recording(ReadOnly):
     """Angle increments at even intervals.
 
     Parameters
@@ -59,9 +60,6 @@ class Recording:
     breaks: tuple[tuple[int, float], ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     @property
     def pieces(self) -> list[Recording]:
@@ -201,7 +199,7 @@ class Recording:
 
 
 @renamed(increments="samples")
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InertialRecording(Recording):
     """Angle and velocity increments at even intervals.
 
@@ -217,8 +215,6 @@ class InertialRecording(Recording):
     """
 
     velocity_increments: Array
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
