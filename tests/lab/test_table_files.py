@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import strapgen
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.lab.recordings import long_columns
 from strapgen.lab.recordings.formats import column_tables, ros
@@ -274,6 +275,13 @@ def test_messages_of_one_length_with_texts_of_several(tmp_path):
             message = store.types[kind](before=before, number=k + 0.5, after=after)
             bag.write(connection, k, store.serialize_ros1(message, kind))
     assert columns(path, "/between")["number"] == [k + 0.5 for k in range(9)]
+
+
+def test_a_bag_is_a_recording_without_more_words(bag):
+    """Its covariances are no rates."""
+    recording = strapgen.read(bag)
+    assert recording.interval == pytest.approx(0.005, rel=1e-9)
+    np.testing.assert_allclose(recording.samples[:, 1], RATES[:, 1] * 0.005, rtol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["mcap", "mcap, lz4", "mcap, zstd"])

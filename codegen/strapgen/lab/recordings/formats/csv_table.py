@@ -170,7 +170,7 @@ class CsvTable:
 
     def _marks(self, block: bytes) -> Marks | None:
         """Return where the cells of a block stand in which every line is a row of plain cells; None for any other."""
-        if b'"' in block or any(block.startswith(mark) or b"\n" + mark in block for mark in _COMMENT_BYTES):
+        if b'"' in block or any(_has_comment(block, mark) for mark in _COMMENT_BYTES):
             return None
         width = block[: block.find(b"\n")].count(self._mark) + 1
         marks = Marks(block, self._mark, width)
@@ -236,6 +236,11 @@ def _number(cell: str) -> int | float | None:
     return int(text) if _INTEGER.fullmatch(text) and abs(int(text)) < 2**63 else number
 
 
+def _has_comment(block: bytes, mark: bytes) -> bool:
+    """Return whether a line begins with a mark, which is looked for by itself first: that is fast."""
+    return mark in block and (block.startswith(mark) or b"\n" + mark in block)
+
+
 def _separator(sample: list[str]) -> str | None:
     """Return what splits lines into rows of equally many cells, most of them numbers."""
     lines = [line for line in sample if line.strip() and not line.lstrip().startswith(_COMMENTS)]
@@ -294,14 +299,8 @@ def line_blocks(path: Path) -> Iterator[bytes]:
                     lines += b"\n"
                     end = len(lines)
                 block, rest = lines[:end], lines[end:] + held
-                ends = np.flatnonzero(np.frombuffer(lines, np.uint8) == 10)
-                sizes = np.diff(ends, prepend=-1, append=len(lines)) - 1
-                if sizes.max() > MOST_CHARACTERS:
-                    raise InputError(
-                        f"{path}, line {count + 1 + int(sizes.argmax())}: over {MOST_CHARACTERS} characters, which no "
-                        "line may have"
-                    )
-                count += len(ends)
+                _require_short(path, lines, count)
+                count += block.count(b"\n")
                 if count > MOST_ROWS:
                     raise InputError(f"{path} has over {MOST_ROWS} lines; that is too many")
                 if block:
@@ -310,6 +309,17 @@ def line_blocks(path: Path) -> Iterator[bytes]:
                     return
     except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
         raise InputError(f"{path} cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
+def _require_short(path: Path, lines: bytes, before: int) -> None:
+    """Refuse a line that is too long: between two line feeds far apart a stretch of half the distance has none."""
+    half = MOST_CHARACTERS // 2
+    if all(lines.find(b"\n", first, first + half) >= 0 for first in range(0, len(lines) - half, half)):
+        return
+    sizes = [*map(len, lines.split(b"\n"))]
+    if max(sizes) > MOST_CHARACTERS:
+        number = before + 1 + next(k for k, size in enumerate(sizes) if size > MOST_CHARACTERS)
+        raise InputError(f"{path}, line {number}: over {MOST_CHARACTERS} characters, which no line may have")
 
 
 def _opened(path: Path) -> IO[bytes]:
