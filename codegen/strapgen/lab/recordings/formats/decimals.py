@@ -141,7 +141,7 @@ class Marks:
 
     def _eight(self, end: Array, size: Array, good: Array) -> Array:
         """Return numbers of up to eight digits, which are worked on as the bytes of one word."""
-        word = self._words[end - 8]
+        word: Array = self._words[end - 8]
         word ^= _u(0x3030303030303030)
         word &= _LAST[size]
         other = word + _u(0x7676767676767676)
@@ -162,7 +162,7 @@ class Marks:
 
     def _four(self, end: Array, size: Array, good: Array) -> Array:
         """Return numbers of up to four digits."""
-        word = self._halves[end - 4]
+        word: Array = self._halves[end - 4]
         word ^= np.uint32(0x30303030)
         word &= _LAST_OF_FOUR[size]
         other = word + np.uint32(0x76767676)
