@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -51,6 +52,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         programs = [program for mark in item.iter_markers("needs") for program in mark.args]
         if absent := [program for program in programs if shutil.which(program) is None]:
             item.add_marker(pytest.mark.skip(reason=f"no {', '.join(absent)} on this machine"))
+        if reason := next(filter(None, map(not_on_this_system, item.iter_markers("posix"))), ""):
+            item.add_marker(pytest.mark.skip(reason=reason))
         if "cayley-klein" in item.name:
             item.add_marker(pytest.mark.long)
     for item, number in combinations(item for item in items if not item.get_closest_marker("long")):
@@ -60,6 +63,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         left = {item for item, number in combinations(items) if number > 1}
         config.hook.pytest_deselected(items=[*left])
         items[:] = [item for item in items if item not in left]
+
+
+def not_on_this_system(mark: pytest.Mark) -> str:
+    """Return why a test with the mark `posix` cannot run here; "" if it can."""
+    root = mark.kwargs.get("root")
+    if not hasattr(os, "geteuid"):
+        return "users, permissions, signals and scripts are not those of POSIX here"
+    if root is None or root == (os.geteuid() == 0):
+        return ""
+    return "only the administrator can do this" if root else "the administrator may do what others may not"
 
 
 def combinations(items: Iterable[pytest.Item]) -> Iterator[tuple[pytest.Item, int]]:
@@ -130,6 +143,13 @@ def make(backend_name: str):
 def rng() -> np.random.Generator:
     """A generator of random numbers that gives the same ones each time."""
     return np.random.default_rng(1969)
+
+
+@pytest.fixture
+def full_device() -> Path:
+    """A file to which nothing can be written, as on a disk that is full."""
+    path = Path("/dev/full")
+    return path if path.exists() else pytest.skip(f"there is no {path} on this system")
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ import contextlib
 import json
 import os
 import random
-import resource
 import shutil
 import signal
 import subprocess
@@ -96,6 +95,8 @@ class Place:
 
     def start(self, command: list[str], limit: int = 0) -> subprocess.Popen[str]:
         """Start a command in a session of its own."""
+        import resource  # of POSIX systems alone
+
         environment = os.environ | {
             "PYTHONPATH": str(ROOT / "codegen"),
             "STRAPGEN_CACHE_DIR": str(self.root / "cache"),

@@ -17,7 +17,6 @@ import hashlib
 import json
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -186,6 +185,8 @@ class Runner:
 
     def session(self, place: Path, *words: str) -> tuple[str, str]:
         """Return "passed", "failed" or "stopped", and the test that failed, with a cache of its own but for modules."""
+        import resource  # of POSIX systems alone
+
         limit = min(self.end - time.monotonic(), HANGS_S)
         with tempfile.TemporaryDirectory(prefix="cache-", dir=self.folder) as folder:
             for kind in _COMPILED:

@@ -12,6 +12,8 @@ from pathlib import Path
 import faults
 import pytest
 
+pytestmark = pytest.mark.posix
+
 
 @pytest.fixture
 def place(tmp_path: Path) -> faults.Place:

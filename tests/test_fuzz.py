@@ -14,6 +14,8 @@ from strapgen.evidence import clang_checks
 from strapgen.evidence.collection import standard
 from strapgen.ir.exceptions import InputError
 
+pytestmark = pytest.mark.posix
+
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_the_corpus_of_a_target_is_used_or_refused_in_one_line(name):

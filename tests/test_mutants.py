@@ -15,6 +15,8 @@ import pytest
 from coverage import CoverageData
 from mutation_operators import Site
 
+pytestmark = pytest.mark.posix
+
 SOURCE = '''\
 """A sum - of 2 terms."""
 def f(x: int, y=2):

@@ -771,6 +771,7 @@ def at_work(process: int) -> int:
     return count
 
 
+@pytest.mark.posix
 @pytest.mark.long
 def test_an_interrupt_stops_a_study_at_once(tmp_path):
     # Cases that take minutes each, in two processes.
@@ -889,6 +890,7 @@ print("loaded", *sorted({{"sympy", "jinja2"}} & sys.modules.keys()))
     assert done.stdout.splitlines()[-1] == "loaded"
 
 
+@pytest.mark.posix
 @pytest.mark.long
 @pytest.mark.parametrize(
     "command",
@@ -914,10 +916,8 @@ def test_reader_that_is_gone_before_is_no_error():
     "command",
     ["list", f"simulate dcm {CONING}"],
 )
-def test_full_disk(command):
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full on this machine")
-    with Path("/dev/full").open("w") as full:
+def test_full_disk(command, full_device):
+    with full_device.open("w") as full:
         program = [sys.executable, "-m", "strapgen", *shlex.split(command)]
         done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2

@@ -241,6 +241,7 @@ def test_coq_examines_no_other_kernel(subject, tmp_path):
     assert gappa.check_by_coq(subject, tmp_path) == []
 
 
+@pytest.mark.posix
 def test_where_processor_time_has_no_limit_a_proof_is_given_up_too(tmp_path, monkeypatch):
     program = tmp_path / "gappa"
     program.write_text("#!/bin/sh\nexec sleep 60\n", encoding="utf-8")

@@ -271,6 +271,7 @@ MALICIOUS = {
 }
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("command", MALICIOUS)
 def test_malicious_header_is_refused_without_effect(command, folder, capsys):
     place = folder.parent
@@ -306,7 +307,11 @@ def test_differing_file_is_neither_compiled_nor_loaded(folder, capsys):
 
 @pytest.mark.parametrize(
     ("make", "ending"),
-    [(os.mkfifo, "h"), (os.mkdir, "c"), (lambda path: path.symlink_to("nowhere"), "h")],
+    [
+        pytest.param(lambda path: os.mkfifo(path), "h", marks=pytest.mark.posix),
+        (os.mkdir, "c"),
+        (lambda path: path.symlink_to("nowhere"), "h"),
+    ],
     ids=["pipe", "folder", "link"],
 )
 def test_loops_that_are_no_files_are_named(make, ending, folder, capsys):
@@ -315,6 +320,7 @@ def test_loops_that_are_no_files_are_named(make, ending, folder, capsys):
     assert status == 1 and f"{path}: is empty or not there" in json.loads(out)["differences"]
 
 
+@pytest.mark.posix
 def test_file_of_the_kernel_is_not_waited_for(tmp_path):
     """A read of /proc/kmsg waits for what the kernel says next; like every file there it has no size."""
     (tmp_path / "whole.h").symlink_to("/proc/self/environ")

@@ -150,6 +150,7 @@ def test_the_cache_keeps_the_size_of_each_code(monkeypatch):
     assert [cost.code_size(sources) for sources in (small, large)] == sizes
 
 
+@pytest.mark.posix
 def test_a_compiler_that_fails_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
     sources = pipeline.generate(pipeline.lower(pipeline.derive("euler-normalize")), "c")
     failing = tmp_path / "failing-cc"

@@ -167,10 +167,15 @@ def test_unwritable_paths_are_refused(tmp_path):
     for path in (tmp_path, tmp_path / "file" / "results.jsonl"):
         with pytest.raises(InputError, match="cannot be written"):
             list(resume(square, CASES, path, IDENTITY, 1))
+
+
+@pytest.mark.posix
+def test_devices_are_refused():
     with pytest.raises(InputError, match="/dev/null is no ordinary file"):
         list(resume(square, CASES, "/dev/null", IDENTITY, 1))
 
 
+@pytest.mark.posix
 def test_a_killed_study_resumes_and_leaves_no_process(tmp_path):
     script, path, go = tmp_path / "study.py", tmp_path / "results.jsonl", tmp_path / "go"
     script.write_text(STUDY)

@@ -279,6 +279,7 @@ def test_times_rounded_to_microseconds_are_even(write, read):
     assert read(write(rows)).interval == pytest.approx(1 / 128, rel=1e-6)
 
 
+@pytest.mark.posix
 def test_file_that_cannot_be_read(tmp_path, read):
     refused(read, tmp_path / "none.csv", "cannot be read (No such file or directory)")
     refused(read, tmp_path, "cannot be read (Is a directory)")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import shutil
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -61,6 +62,7 @@ def without_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
 
 
+@pytest.mark.posix
 def test_a_compiled_function_is_called_and_a_second_time_nothing_is_compiled(
     sources, counting, root, monkeypatch
 ):
@@ -80,6 +82,7 @@ def test_a_compiled_function_is_called_and_a_second_time_nothing_is_compiled(
     assert kept == {Path(first.__file__).name}, "only what is loaded is kept"
 
 
+@pytest.mark.posix
 def test_other_text_and_another_compiler_compile_again(sources, counting, root, monkeypatch):
     compiler.load(sources)
     calls = counting()
@@ -128,6 +131,35 @@ def test_chosen_compiler_is_not_there(chosen, sources, monkeypatch):
         compiler.load(sources)
 
 
+@pytest.mark.posix
+@pytest.mark.parametrize("chosen", [None, "cl", "CL.exe -W3", "clang-cl"])
+def test_msvc_is_told_from_the_compilers_that_can_be_used(
+    chosen, sources, without_compiler, root, monkeypatch
+):
+    """It is found where there is no other one, or chosen."""
+    folder = Path(os.environ["PATH"])
+    for name in ("clang-cl" if chosen is None else chosen.split()[0], "CL.exe"):
+        (folder / name).write_text("#!/bin/sh\nexit 3\n")
+        (folder / name).chmod(0o755)
+    if chosen is not None:
+        monkeypatch.setenv("CC", chosen)
+    with pytest.raises(
+        CompilerError, match=r"(cl|CL\.exe) takes the options of MSVC; .*GCC or Clang is needed: .*CC"
+    ):
+        compiler.load(sources)
+    assert not (root / "builds").exists()
+
+
+def test_on_windows_the_library_of_python_is_named(monkeypatch):
+    options = compiler._linking()
+    assert "-shared" in options or "-bundle" in options
+    assert not any(word.startswith("-lpython3") for word in options)
+    monkeypatch.setattr(compiler, "_ON_WINDOWS", True)
+    monkeypatch.setattr(sys, "base_prefix", "/python")
+    folder, library = f"-L{Path('/python', 'libs')}", "-lpython{}{}".format(*sys.version_info)
+    assert compiler._linking() == ["-shared", folder, library]
+
+
 def test_numpy_works_without_a_compiler(without_compiler):
     history = strapgen.backend("euler", "rk4", 2, "numpy").propagate(np.full((3, 2, 3), 0.01))
     assert np.isfinite(history).all()
@@ -162,6 +194,7 @@ def test_version_without_a_compiler(without_compiler, capsys):
     assert "C compiler is not installed" in capsys.readouterr().out
 
 
+@pytest.mark.posix
 def test_compiler_that_fails(sources, root, monkeypatch, capfd):
     monkeypatch.setenv("CC", "false")
     with pytest.raises(CompilerError, match=r"false failed on strapgen_euler_normalize") as failure:
@@ -186,6 +219,7 @@ def test_flags_of_the_environment_do_not_reach_the_compiler(sources, root, monke
     assert compiler.load(sources).lib.euler_normalize
 
 
+@pytest.mark.posix
 def test_failing_compiler_is_reported_in_one_line(sources, root, monkeypatch, capfd):
     monkeypatch.setenv("CC", "cc -no-such-flag-at-all")
     with pytest.raises(CompilerError, match=r"cc failed on strapgen_\w+: .*error.*no-such-flag-at-all"):
@@ -194,6 +228,7 @@ def test_failing_compiler_is_reported_in_one_line(sources, root, monkeypatch, ca
     assert not list((root / "builds").iterdir())
 
 
+@pytest.mark.posix
 def test_a_compiler_that_makes_nothing(sources, root, monkeypatch):
     monkeypatch.setenv("CC", "true")
     with pytest.raises(CompilerError, match="failed on"):
@@ -211,6 +246,7 @@ def many() -> list[Sources]:
     return [pipeline.generate(program, target) for target in ("c", "c-float", "numpy") for program in lowered]
 
 
+@pytest.mark.posix
 @pytest.mark.long
 def test_many_sources_become_one_module_in_one_command(many, counting, root, monkeypatch, tmp_path):
     """Each function is the one that it is alone."""
@@ -235,6 +271,7 @@ def test_many_sources_become_one_module_in_one_command(many, counting, root, mon
             assert function.module.__file__ != alone.module.__file__
 
 
+@pytest.mark.posix
 def test_existing_modules_are_not_compiled_again(many, counting):
     first = many[0]
     compiler.load(first)
@@ -248,6 +285,7 @@ def test_existing_modules_are_not_compiled_again(many, counting):
     assert counting() == calls
 
 
+@pytest.mark.posix
 def test_functions_of_one_name_go_into_two_modules(sources, counting, root):
     """Each module has one kernel: it is what `load` compiles of that alone, and found without a pointer."""
     pair = [sources, other(sources, 1)]
@@ -306,7 +344,7 @@ def _compile_in_a_fork(sources: Sources, made) -> None:
     made.put(compiler.load(sources) is not None)
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.posix
 def test_a_fork_compiles_beside_the_process_that_it_comes_from(sources):
     compiler.load(sources)
     context = multiprocessing.get_context("fork")
@@ -324,6 +362,7 @@ def test_threads_compile_at_once(sources):
     assert all(module.lib.euler_normalize for module in modules) and len({*map(id, modules)}) == 2
 
 
+@pytest.mark.posix
 def test_stages_of_a_system_are_compiled_together_and_only_where_they_are_called(sources, counting, tmp_path):
     compiler.load(sources)
     of_one_module = counting()
@@ -334,6 +373,7 @@ def test_stages_of_a_system_are_compiled_together_and_only_where_they_are_called
     assert counting() == 3 * of_one_module
 
 
+@pytest.mark.posix
 def test_back_ends_that_are_compared_are_compiled_together(sources, counting):
     compiler.load(sources)
     of_one_module = counting()
@@ -352,6 +392,7 @@ exit 0
 """
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -366,6 +407,7 @@ def test_compiler_that_fails_is_named_in_one_line(text, said, tmp_path, monkeypa
     check("CC", "c", text, said, tmp_path, monkeypatch)
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(("variable", "target"), [("CXX", "cpp"), ("RUSTC", "rust")])
 @pytest.mark.parametrize(
     ("text", "said"),

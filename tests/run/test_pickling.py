@@ -146,6 +146,7 @@ def is_there(process: int) -> bool:
         return True
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("start", ["fork", "spawn"])
 @pytest.mark.parametrize("how", ["killed", "ended"])
 def test_workers_end_with_their_parent(start, how, tmp_path):

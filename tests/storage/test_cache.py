@@ -7,7 +7,6 @@ import dataclasses
 import json
 import os
 import pickle
-import pwd
 import shutil
 import subprocess
 import sys
@@ -44,6 +43,7 @@ def never(_: Path) -> None:
     raise AssertionError("filled again")
 
 
+@pytest.mark.posix
 def test_folder_is_chosen_by_the_environment(root, tmp_path, monkeypatch):
     assert cache.root() == root
     monkeypatch.chdir(tmp_path)
@@ -115,6 +115,7 @@ def test_first_of_two_wins(root):
     assert names(root / "kind") == ["key"]
 
 
+@pytest.mark.posix
 def test_draft_of_a_killed_process_is_never_read(root):
     (root / "kind").mkdir(parents=True)
     killed = root / "kind" / ".filling-01234567"
@@ -127,6 +128,7 @@ def test_draft_of_a_killed_process_is_never_read(root):
     assert names(root / "kind") == ["key"]
 
 
+@pytest.mark.posix
 def test_draft_of_a_killed_process_is_removed_though_another_one_made_the_entry(root):
     place = cache.entry("kind", "key", write("file"))
     killed = root / "kind" / ".filling-01234567"
@@ -164,7 +166,7 @@ def test_entry_that_appears_meanwhile_is_kept(root, monkeypatch):
     assert (place / "file").read_text() == "theirs"
 
 
-@pytest.mark.parametrize("place", ["file/cache", "/proc/strapgen"])
+@pytest.mark.parametrize("place", ["file/cache", pytest.param("/proc/strapgen", marks=pytest.mark.posix)])
 def test_folder_that_cannot_be_written(place, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("x")
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(tmp_path / place))
@@ -276,17 +278,19 @@ def test_an_entry_in_use_is_not_pruned(root):
     assert "old" not in names(root / "kind")
 
 
+@pytest.mark.posix
 def test_missing_home_folder_names_the_variable(monkeypatch):
     def unknown(_user):
         raise KeyError
 
     for name in ("STRAPGEN_CACHE_DIR", "XDG_CACHE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    monkeypatch.setattr("pwd.getpwuid", unknown)
     with pytest.raises(InputError, match=r"^no home folder .* set STRAPGEN_CACHE_DIR"):
         cache.root()
 
 
+@pytest.mark.posix
 def test_the_home_folder_may_be_written_as_a_tilde(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", "~/kept")
@@ -435,6 +439,7 @@ WRONG = {
 }
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("which", WRONG.values(), ids=WRONG)
 def test_an_entry_that_others_could_have_changed_is_made_again(root, which, warnings):
     root.mkdir()
@@ -449,6 +454,7 @@ def test_an_entry_that_others_could_have_changed_is_made_again(root, which, warn
     cache.entry("kind", "key", never)
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("above", [False, True])
 def test_a_cache_folder_that_others_write_is_not_used(root, above, warnings):
     place = root / "kind" / "key"
@@ -467,6 +473,7 @@ def test_a_cache_folder_that_others_write_is_not_used(root, above, warnings):
     ]
 
 
+@pytest.mark.posix
 def test_neither_folder_of_the_user_is_refused_in_one_line(root, tmp_path, monkeypatch, warnings):
     root.mkdir()
     (tmp_path / "tmp").mkdir()
@@ -494,6 +501,7 @@ if sys.argv[1] == "killed":
 """
 
 
+@pytest.mark.posix
 def test_a_temporary_folder_is_gone_when_the_program_ends_or_the_next_one_runs(root, tmp_path, monkeypatch):
     root.mkdir()
     root.chmod(0o777)
@@ -512,6 +520,7 @@ def test_a_temporary_folder_is_gone_when_the_program_ends_or_the_next_one_runs(r
     assert names(tmp_path / "tmp") == []
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("umask", [0o000, 0o002, 0o077])
 def test_created_folders_are_private_under_any_umask(root, umask, monkeypatch, warnings):
     monkeypatch.setenv("STRAPGEN_CACHE_DIR", str(root / "deep" / "er"))
@@ -526,6 +535,7 @@ def test_created_folders_are_private_under_any_umask(root, umask, monkeypatch, w
     assert cache.lookup("kind", "key") == place and not warnings.messages
 
 
+@pytest.mark.posix
 def test_planted_python_does_not_run(root, tmp_path, warnings, monkeypatch):
     """Generated text is executed as it is: a manifest that is right proves nothing."""
     sources = pipeline.compile(choose("euler-product"), "numpy")
@@ -548,6 +558,7 @@ PLANTED = (
 )
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("when", ["before", "after the check"])
 def test_a_planted_library_is_not_loaded(root, tmp_path, when, monkeypatch, warnings):
     sources = pipeline.compile(choose("euler-product"), "c")

@@ -107,6 +107,7 @@ def test_interruption_leaves_no_draft(tmp_path, monkeypatch):
     assert tree(tmp_path) == {}
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
 def test_permissions_are_those_of_an_ordinary_file(umask, tmp_path):
     before = os.umask(umask)
@@ -117,6 +118,7 @@ def test_permissions_are_those_of_an_ordinary_file(umask, tmp_path):
     assert stat.S_IMODE(path.stat().st_mode) == 0o666 & ~umask
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o666, 0o755])
 def test_a_file_that_exists_keeps_its_permissions(mode, tmp_path):
     path = write_file(tmp_path / "a", "x")
@@ -125,6 +127,7 @@ def test_a_file_that_exists_keeps_its_permissions(mode, tmp_path):
     assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("y", mode)
 
 
+@pytest.mark.posix
 def test_replacement_of_a_private_file_is_private_from_the_start(tmp_path, monkeypatch):
     path = write_file(tmp_path / "a", "x")
     path.chmod(0o600)
@@ -155,6 +158,7 @@ def test_folder_under_a_file(tmp_path):
     assert tree(tmp_path) == {"file": b"x"}
 
 
+@pytest.mark.posix
 def test_folder_that_nothing_can_be_made_in():
     with pytest.raises(InputError, match=r"/proc/strapgen cannot be written"):
         write_files("/proc/strapgen", FILES)
@@ -172,6 +176,7 @@ def test_name_that_is_too_long(tmp_path):
         write_file(tmp_path / ("x" * 300), "x")
 
 
+@pytest.mark.posix
 def test_link_is_written_through(tmp_path):
     (tmp_path / "elsewhere").mkdir()
     target = tmp_path / "elsewhere" / "target.txt"
@@ -184,6 +189,7 @@ def test_link_is_written_through(tmp_path):
     assert (target.read_text(), stat.S_IMODE(target.stat().st_mode)) == ("new", 0o600)
 
 
+@pytest.mark.posix
 def test_pipe_is_not_replaced_by_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match=r"pipe is no ordinary file"):
@@ -237,6 +243,7 @@ def forgotten(folder: Path, *names: str) -> Path:
     return place
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("where", [".", "deep/er"])
 def test_leftovers_of_killed_processes_are_removed(tmp_path, where):
     place = forgotten(tmp_path / where, "0", "1", "17")
@@ -268,7 +275,7 @@ def test_hidden_files_of_the_user_are_not_touched(tmp_path):
     assert tree(tmp_path).keys() == {*FILES, *names, ".strapgen-draft-89abcdef"}
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root writes where nobody may")
+@pytest.mark.posix(root=False)
 def test_a_folder_that_cannot_be_written_is_no_hindrance_for_one_below(tmp_path):
     (tmp_path / "deep" / "er").mkdir(parents=True)
     tmp_path.chmod(0o555)
@@ -306,6 +313,7 @@ def holding(folder: Path) -> tuple[subprocess.Popen[str], Path]:
     return process, Path(process.stdout.readline().strip())
 
 
+@pytest.mark.posix
 def test_a_draft_is_private_and_gone_after_the_block(tmp_path):
     with drafts.draft_folder(tmp_path, ".draft-") as place:
         assert place.parent == tmp_path
@@ -320,6 +328,7 @@ def test_renamed_folders_stay(tmp_path):
     assert (tmp_path / "whole" / "file").read_text() == "x"
 
 
+@pytest.mark.posix
 def test_the_draft_of_a_process_at_work_is_not_forgotten_until_it_is_killed(tmp_path):
     process, place = holding(tmp_path)
     os.utime(place, (0, 0))  # the clock says nothing
@@ -329,6 +338,7 @@ def test_the_draft_of_a_process_at_work_is_not_forgotten_until_it_is_killed(tmp_
     assert list(drafts.forgotten(tmp_path, ".draft-")) == [place]
 
 
+@pytest.mark.posix
 def test_one_process_at_a_time_has_a_forgotten_draft(tmp_path):
     (tmp_path / ".draft-01234567").mkdir()
     for _ in drafts.forgotten(tmp_path, ".draft-"):
@@ -351,7 +361,7 @@ def test_other_names_files_and_links_are_no_drafts(tmp_path):
     assert list(drafts.forgotten(tmp_path, ".draft-")) == []
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only the administrator gives files to other users")
+@pytest.mark.posix(root=True)
 def test_drafts_of_other_users_are_left_alone(tmp_path):
     (tmp_path / ".draft-01234567").mkdir()
     os.chown(tmp_path / ".draft-01234567", 65534, -1)
@@ -378,6 +388,7 @@ def test_a_draft_that_another_process_takes_at_once_is_made_again(tmp_path, monk
         assert list(tmp_path.iterdir()) == [place]
 
 
+@pytest.mark.posix
 def test_a_temporary_folder_of_a_killed_process_is_removed_by_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "strapgen-work-01234567" / "deep").mkdir(parents=True)
@@ -409,6 +420,7 @@ assert not place.exists()
 """
 
 
+@pytest.mark.posix
 def test_a_forked_process_leaves_the_folder_to_its_owner(tmp_path):
     done = subprocess.run([sys.executable, "-c", FORKING, str(tmp_path)], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

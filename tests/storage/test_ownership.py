@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import grp
 import os
-import pwd
 import stat
 import tempfile
 from collections.abc import Iterator
@@ -18,7 +16,8 @@ from strapgen.storage.ownership import ForeignFileError, private_folder
 
 #: A user who owns nothing here.
 STRANGER = 65534
-as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only the administrator gives files to other users")
+as_root = pytest.mark.posix(root=True)
+pytestmark = pytest.mark.posix
 
 
 @pytest.fixture
@@ -179,8 +178,8 @@ def test_a_group_is_the_user_s_alone_if_it_has_his_name_and_no_other_member(
     monkeypatch, name, primary, members, alone
 ):
     person = SimpleNamespace(pw_name="me", pw_gid=primary)
-    monkeypatch.setattr(pwd, "getpwuid", lambda _: person)
-    monkeypatch.setattr(grp, "getgrgid", lambda _: SimpleNamespace(gr_name=name, gr_gid=7, gr_mem=members))
+    monkeypatch.setattr("pwd.getpwuid", lambda _: person)
+    monkeypatch.setattr("grp.getgrgid", lambda _: SimpleNamespace(gr_name=name, gr_gid=7, gr_mem=members))
     assert ownership._is_alone.__wrapped__(7, 1) is alone
 
 

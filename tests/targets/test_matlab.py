@@ -225,6 +225,7 @@ def test_octave_errors_are_reported_in_one_line(has_octave, old, new, reason):
     assert of_sources(sources)([0.6, 0, 0, 0.8])[0] == 0.6
 
 
+@pytest.mark.posix
 def test_octave_that_has_ended_is_told_and_started_again(has_octave):
     kernel = of_sources(sources_of(catalogue.choose("euler-normalize")))
     exits = replace(

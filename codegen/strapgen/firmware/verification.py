@@ -38,7 +38,7 @@ Array = NDArray[Any]
 #: Calls on corners and random input, and steps of the run.
 CALLS, STEPS = 300, 300
 #: What the commands begin with that generate several functions and a whole that calls them.
-_COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ")
+_COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ", "strapgen stamped ")
 _VERSION = re.compile(r'_VERSION "(.*)"')
 
 
@@ -95,7 +95,7 @@ class Verification(Result):
 
 @dataclass(frozen=True)
 class WholeVerification(Result):
-    """The outcome of verifying the files of a described system, of two speeds or of a commit-late unit."""
+    """The outcome of verifying the files of several functions and a whole that calls them."""
 
     computed = properties(holds=entry())
 
@@ -147,8 +147,8 @@ def whole_header(place: Path) -> Path | None:
     if len(headers) != 1:
         names = ", ".join(path.name for path in headers) or "none"
         raise InputError(
-            f"{place} holds {names} of the headers of a system, of two speeds or of a commit-late unit; a folder with "
-            "one is needed"
+            f"{place} holds {names} of the headers of a system, of two speeds, of a commit-late unit or of stamped "
+            "samples; a folder with one is needed"
         )
     return headers[0]
 

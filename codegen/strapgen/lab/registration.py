@@ -17,6 +17,11 @@ REGISTRATION = Registration(
             "Run",
             summary="Compare back ends on the same increments with a reference",
         ),
+        "log": Command(
+            f"{__package__}.log_command:log",
+            "Run",
+            summary="Show what a log holds, and the command that runs it",
+        ),
         "converge": Command(
             f"{__package__}.converge_command:converge",
             "Analyse",
@@ -40,6 +45,7 @@ REGISTRATION = Registration(
     results={
         "run": f"{__package__}.runs_report:RunResult",
         "attitude": f"{__package__}.runs_report:HistoryResult",
+        "log": f"{__package__}.recordings.log_report:LogResult",
         "comparison": f"{__package__}.comparison_report:ComparisonResult",
         "convergence": f"{__package__}.convergence_report:ConvergenceResult",
         "word-length": f"{__package__}.word_length_report:WordLengthResult",

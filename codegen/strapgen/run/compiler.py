@@ -55,6 +55,12 @@ _SHARED, _POINTER, _DECLARATIONS = "shared", "build", "declarations.h"
 #: What compiled modules begin with: ELF, Mach-O of one and of several processors, and PE.
 _LIBRARIES = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
 
+#: MSVC, and Clang in its place: what they are called.
+_MSVC = ("cl", "clang-cl")
+_ON_WINDOWS = sys.platform == "win32"
+#: Windows loads every code anywhere; Clang refuses the option there.
+_ANYWHERE = () if _ON_WINDOWS else ("-fPIC",)
+
 _loaded: dict[str, Any] = {}
 _modules: dict[Path, Any] = {}
 
@@ -63,7 +69,8 @@ def program_command(what: str, variable: str, default: str, package: str) -> lis
     """Return the path and the options of a program, which a variable of the environment may name."""
     text = os.environ.get(variable, "").strip() or default
     try:
-        program, *options = shlex.split(text)
+        # A path of Windows has backslashes, which are no quotation marks.
+        program, *options = [text] if shutil.which(text) else shlex.split(text)
     except ValueError:  # a quotation mark that is not closed
         program, options = text, []
     path = shutil.which(program)
@@ -88,7 +95,16 @@ class Compiler:
 
     def command(self) -> list[str]:
         """Return the path of the compiler and its own options."""
-        return program_command(f"{self.language} compiler", self.variable, self.default, self.package)
+        # MSVC is looked for where there is no other compiler, and told by its name.
+        names = (self.default, *_MSVC) if self.language in ("C", "C++") else (self.default,)
+        default = next(filter(shutil.which, names), self.default)
+        words = program_command(f"{self.language} compiler", self.variable, default, self.package)
+        if Path(words[0]).stem.lower() in _MSVC:
+            raise CompilerError(
+                f"{words[0]} takes the options of MSVC; to run generated {self.language}, GCC or Clang is needed: "
+                f"install {self.package} (or set {self.variable}), or use the numpy back end"
+            )
+        return words
 
     def path(self) -> str:
         """Return the path of the compiler."""
@@ -124,13 +140,18 @@ class Compiler:
 
 #: A module calls its own functions, whatever others of the same names the process has.
 C = Compiler(
-    "C", "CC", "cc", "gcc", ("-std=c99", "-ffp-contract=off", "-g0", "-fPIC", "-fvisibility=hidden"), ".c"
+    "C",
+    "CC",
+    "gcc" if _ON_WINDOWS else "cc",  # Windows has no name for whichever there is
+    "gcc",
+    ("-std=c99", "-ffp-contract=off", "-g0", *_ANYWHERE, "-fvisibility=hidden"),
+    ".c",
 )
-_CPP = ("-std=c++17", "-ffp-contract=off", "-g0", "-fPIC", "-shared", "-fvisibility-inlines-hidden")
+_CPP = ("-std=c++17", "-ffp-contract=off", "-g0", *_ANYWHERE, "-shared", "-fvisibility-inlines-hidden")
 _RUST = ("--edition=2021", "--crate-type=cdylib", "--crate-name=strapgen", "-Cpanic=abort")
 #: The compilers of shared libraries by language.
 COMPILERS = {
-    "C++": Compiler("C++", "CXX", "c++", "g++", _CPP, ".cpp"),
+    "C++": Compiler("C++", "CXX", "g++" if _ON_WINDOWS else "c++", "g++", _CPP, ".cpp"),
     "Rust": Compiler("Rust", "RUSTC", "rustc", "rustc", _RUST, ".rs"),
 }
 
@@ -321,9 +342,17 @@ def compile_module(
     ffi = FFI()
     ffi.cdef(cdef)
     ffi.set_source(name, header + _UNOPTIMIZED, compiler_verbose=0)
-    linking = shlex.split(sysconfig.get_config_var("LDSHARED") or "cc -shared")[1:]
-    command = [*of.command(), *flags, f"-I{sysconfig.get_path('include')}", *linking]
+    command = [*of.command(), *flags, f"-I{sysconfig.get_path('include')}"]
     return _compile(command, files, of.ending, draft / _library(name), ffi)
+
+
+def _linking() -> list[str]:
+    """Return the options, after all files, that make a module for Python of what a compiler is given."""
+    if not _ON_WINDOWS:
+        return [*shlex.split(sysconfig.get_config_var("LDSHARED") or "cc -shared")[1:], "-lm"]
+    # There a library has to name the one that has the symbols of Python.
+    libraries = Path(sys.base_prefix, "libs")
+    return ["-shared", f"-L{libraries}", f"-lpython{sys.version_info.major}{sys.version_info.minor}"]
 
 
 def _compile(
@@ -340,7 +369,7 @@ def _compile(
         words = [*command, "-o", library.name, f"{name}_root{ending}"]
         if wrapper is not None:
             wrapper.emit_c_code(str(Path(folder, f"{name}_wrapper.c")))
-            words += ["-x", "c", f"{name}_wrapper.c", "-x", "none", "-lm"]
+            words += ["-x", "c", f"{name}_wrapper.c", "-x", "none", *_linking()]
         how: dict[str, Any] = {"capture_output": True, "text": True, "errors": "replace", "check": False}
         try:
             done = subprocess.run(words, cwd=folder, env=os.environ | {"LC_ALL": "C"}, **how)

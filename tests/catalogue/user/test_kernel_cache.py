@@ -147,15 +147,18 @@ WORKER = (
     [
         "import os\nWORD = len(os.listdir(os.path.dirname(__file__)))\n",
         "import glob\nWORD = len(glob.glob(__file__ + '*'))\n",
-        "import os\nWORD = os.system('true')\n",
+        pytest.param("import os\nWORD = os.system('true')\n", marks=pytest.mark.posix),
         "WORD = 'one'\nopen(__file__ + '.log', 'a').close()\n",
-        "import os\n" + CHILD.format("pid = os.fork()"),
-        "import os\n" + CHILD.format("pid, terminal = os.forkpty()"),
-        "import os\nos.waitpid(os.posix_spawn('/bin/true', ['true'], {}), 0)\nWORD = 'one'\n",
+        pytest.param("import os\n" + CHILD.format("pid = os.fork()"), marks=pytest.mark.posix),
+        pytest.param("import os\n" + CHILD.format("pid, terminal = os.forkpty()"), marks=pytest.mark.posix),
+        pytest.param(
+            "import os\nos.waitpid(os.posix_spawn('/bin/true', ['true'], {}), 0)\nWORD = 'one'\n",
+            marks=pytest.mark.posix,
+        ),
         "import os\ntry:\n    os.execv(__file__ + '.none', ['none'])\nexcept OSError:\n    WORD = 'one'\n",
         WORKER,
         "import sqlite3\nsqlite3.connect(':memory:').close()\nWORD = 'one'\n",
-        "import ctypes\nWORD = ctypes.CDLL(None).abs(-1)\n",
+        pytest.param("import ctypes\nWORD = ctypes.CDLL(None).abs(-1)\n", marks=pytest.mark.posix),
     ],
     ids=[
         *("listing", "pattern", "program", "writing", "fork", "terminal", "spawn", "exec"),

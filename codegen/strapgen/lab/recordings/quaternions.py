@@ -100,14 +100,14 @@ def continuous(q: Array) -> Array:
 def interpolated(time: Array, q: Array, at: Array) -> Array:
     """Return the attitudes at some times, at a constant rate from one record to the next.
 
-    `time` (N,): in s, rising, N at least 2. `q` (N, 4). `at` (M,): in s, held at both ends.
+    `time` (N,): in s, rising, N at least 2. `q` (N, 4). `at` (M,): in s; the rate goes on beyond the ends.
 
     >>> half = interpolated(np.array([0.0, 1]), np.array([[0, 0, 0, 1.0], [0, 0, 1, 0]]), np.array([0.5]))
     >>> np.degrees(rotation_vectors(half))[0].round(9) + 0.0
     array([ 0.,  0., 90.])
     """
     place = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    part = np.clip((at - time[place]) / (time[place + 1] - time[place]), 0, 1)
+    part = (at - time[place]) / (time[place + 1] - time[place])
     turn = rotation_vectors(product(inverse(q[place]), q[place + 1]))
     return product(q[place], from_rotation_vectors(part[:, None] * turn))
 

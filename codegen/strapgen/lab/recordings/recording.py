@@ -126,7 +126,7 @@ class Recording:
         reading = Reading(
             input=input, rate_unit=unit, force_unit=force_unit, force=force is not None, **options
         )
-        return _recording(ArrayLog.of(time, rate=rates, force=force), "", reading)
+        return recording_of(ArrayLog.of(time, rate=rates, force=force), "", reading)
 
     @classmethod
     def from_increments(cls, time: Any, angle: Any, velocity: Any = None, **options: Any) -> Recording:
@@ -158,7 +158,7 @@ class Recording:
         0.0
         """
         reading = Reading(input="increments", force=velocity is not None, **options)
-        return _recording(ArrayLog.of(time, delta_angle=angle, delta_velocity=velocity), "", reading)
+        return recording_of(ArrayLog.of(time, delta_angle=angle, delta_velocity=velocity), "", reading)
 
     @classmethod
     def from_frame(cls, frame: Any, columns: str | None = None, **options: Any) -> Recording:
@@ -188,7 +188,7 @@ class Recording:
         >>> Recording.from_frame(frame).samples[:, 2]
         array([0.15707963, 0.15707963])
         """
-        return _recording(frame_log(frame), "", Reading(columns=columns, **options))
+        return recording_of(frame_log(frame), "", Reading(columns=columns, **options))
 
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"
@@ -379,9 +379,9 @@ def read(
     --------
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n30,0,0,90\n")
+    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n20,0,0,90\n40,0,0,90\n")
     >>> read(log, gaps="bridge").samples[:, 2].round(6)
-    array([0.015708, 0.015708, 0.015708, 0.015708])
+    array([0.015708, 0.015708, 0.015708, 0.015708, 0.015708])
     """
     reading = Reading(
         *(input, columns, time_unit, rate_unit, force_unit, sample_hz, axes, start, end),
@@ -392,7 +392,7 @@ def read(
 
 def recorded(path: str | Path, topic: str, reading: Reading) -> Recording:
     """Return what a file holds, read in a way."""
-    return _recording(open_log(path), topic, reading)
+    return recording_of(open_log(path), topic, reading)
 
 
 def read_rates(
@@ -498,7 +498,7 @@ def read_inertial(path: str | Path) -> InertialRecording:
     return recording
 
 
-def _recording(log: LogFile, topic: str, reading: Reading) -> Recording:
+def recording_of(log: LogFile, topic: str, reading: Reading) -> Recording:
     """Return what a log holds."""
     start, interval, angle, velocity, remarks, breaks = increments(log, topic, reading)
     if velocity is None:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 #: The Earth's rate in rad/s (WGS 84).
 EARTH_RATE_RAD_S = 7.292115e-5
 #: The Earth's rate in level axes from sine and cosine of the latitude, as parts of its magnitude.
-LEVEL_AXES: dict[str, Callable[[float, float], tuple[float, float, float]]] = {
+_LEVEL: dict[str, Callable[[float, float], tuple[float, float, float]]] = {
     "ned": lambda sine, cosine: (cosine, 0.0, -sine),
     "enu": lambda sine, cosine: (0.0, cosine, sine),
 }
@@ -68,17 +68,16 @@ class Rest:
     uncertainty: Array
     noise: Array
 
-    def in_words(self, taken: Array | None = None) -> str:
-        """Return the rest for a reader, with what is taken off of it in rad/s."""
-        values = np.degrees(self.rate if taken is None else taken)
+    def in_words(self, start: float, values: Array) -> str:
+        """Return the rest for a reader, with a rate in deg/s; `start` is that of the recording in s."""
         numbers = ", ".join(
             f"{axis} {value:.6g} +- {spread:.2g}"
             for axis, value, spread in zip("xyz", values, np.degrees(self.uncertainty), strict=True)
         )
         walk = np.degrees(self.noise) * 60
         return (
-            f"at rest from {self.start_s:.6g} s to {self.end_s:.6g} s: {numbers} deg/s; "
-            f"noise {', '.join(f'{x:.3g}' for x in walk)} deg/sqrt(h)"
+            f"at rest from {self.start_s - start:.6g} s to {self.end_s - start:.6g} s after the start: {numbers} "
+            f"deg/s; noise {', '.join(f'{x:.3g}' for x in walk)} deg/sqrt(h)"
         )
 
 
@@ -144,8 +143,8 @@ def rest_between(recording: Recording, begin: float, end: float) -> Rest:
     last = recording.start + recording.interval * len(recording.samples)
     if not (first >= 0 and stop <= len(recording.samples) and stop - first >= _LEAST_SAMPLES):
         raise InputError(
-            f"bias from {begin:g} s to {end:g} s: at least {_LEAST_SAMPLES} samples between {recording.start:.6g} s "
-            f"and {last:.6g} s are needed"
+            f"bias from {begin:.12g} s to {end:.12g} s: at least {_LEAST_SAMPLES} samples between "
+            f"{recording.start:.12g} s and {last:.12g} s are needed"
         )
     return _rest(recording, first, stop)
 
@@ -183,7 +182,7 @@ def earth_rate(latitude_deg: float, axes: str = "ned") -> Array:
     if not abs(latitude_deg) <= 90:
         raise InputError(f"latitude is {latitude_deg:g} deg; -90 to 90 deg are allowed")
     angle = math.radians(latitude_deg)
-    parts = LEVEL_AXES[checks.choice("level axes", axes, LEVEL_AXES)](math.sin(angle), math.cos(angle))
+    parts = _LEVEL[checks.choice("level axes", axes, _LEVEL)](math.sin(angle), math.cos(angle))
     return EARTH_RATE_RAD_S * np.array(parts)
 
 
