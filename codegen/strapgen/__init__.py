@@ -14,7 +14,7 @@ Functions take the object, a name or a Choice alike:
   motions     motion, read_motion; read, Recording, InertialRecording; simulate, propagate
   recordings  propagate; StampedGrid; rests; TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
-  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
+  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target, Language
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
 
@@ -135,6 +135,7 @@ if _typing.TYPE_CHECKING:
     from strapgen.stamped.grid_clock import StampStatus as StampStatus
     from strapgen.stamped.stamped_grid import GridSamples as GridSamples
     from strapgen.stamped.stamped_grid import StampedGrid as StampedGrid
+    from strapgen.targets.names import Language as Language
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
 
@@ -286,6 +287,7 @@ _NAMES = {
         "EPSILON",
     ),
     "navigation.systems.wiring": ("read_system",),
+    "targets.names": ("Language",),
     "targets.registry": (
         "TARGETS",
         "Target",

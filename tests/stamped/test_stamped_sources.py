@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -16,6 +15,8 @@ from strapgen.cli import main
 from strapgen.evidence import clang_checks
 from strapgen.ir.exceptions import InputError
 from strapgen.run.standard_tree import command_of
+from strapgen.stamped.boundary_kernels import filters
+from strapgen.stamped.kernel_names import ROUNDS
 from strapgen.stamped.stamped_sources import TARGETS, error_bound, parts, sources
 
 CLOCK = (200, 1_000_000)
@@ -99,9 +100,14 @@ def test_the_bound_is_that_of_the_functions():
         one.fixed.outputs[0].format for one in functions.values()
     }
     unit = functions[3].fixed.inputs[0].unit
-    # Each sample has two corrections, each of them rounded by half a unit and a little more.
-    assert 1 < error_bound((3, 5), functions) / unit < Fraction(3, 2)
-    assert 1 < error_bound((7, 7), parts((7, 7), "c-fixed", Settings())) / unit < Fraction(8, 5)
+    # Each sample has two corrections, each of them rounded by half a unit and a little more; in the second round the
+    # samples around a boundary have the errors of the first one.
+    for pairs in ROUNDS:
+        functions = parts(pairs, "c-fixed", Settings())
+        first, second = (float(max(functions[number].fixed.outputs[0].errors) / unit) for number in pairs)
+        assert 0.5 < first < 0.65 and 0.5 < second < 0.65
+        stated = float(error_bound(pairs, functions) / unit)
+        assert stated == pytest.approx(2 * (second + 2 * first * float(filters(pairs[1]).largest)), rel=1e-3)
 
 
 #: Takes rates of 1 rad/s about z at stamps that jitter and wrap, and prints what comes.

@@ -55,4 +55,5 @@ REGISTRATION = Registration(
     },
     extensions={"cli.processors": f"{__package__}.processors:PROCESSORS"},
     lists={"motions": f"{__package__}.motions.motions:titles"},
+    requires=("stamped",),
 )

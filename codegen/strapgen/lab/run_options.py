@@ -126,7 +126,7 @@ class RecordingOptions:
     rules: ClassVar[tuple[Rule, ...]] = (
         Needs(
             "--input --columns --time-unit --rate-unit --force-unit --sample-hz --axes --start --end --every --gaps "
-            "--repair --resample-hz",
+            "--repair --grid --resample-hz",
             "--recording --rates-csv --increments-csv",
         ),
     )
@@ -215,6 +215,14 @@ class RecordingOptions:
             read=whole(1),
         ),
     ] = None
+    grid: Annotated[
+        bool,
+        option(
+            "--grid",
+            help="The times are the instants of the samples: take these to an even grid by filters.  [default: samples "
+            "are even]",
+        ),
+    ] = False
     gaps: Annotated[
         _Text,
         option(
@@ -289,7 +297,7 @@ class RecordingOptions:
                 self.start,
                 self.end,
             ),
-            *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz),
+            *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz, self.grid),
         )
 
     def load(self, *, force: bool = False) -> Recording:

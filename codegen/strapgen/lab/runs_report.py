@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -158,7 +158,7 @@ class RunMatrices:
 class RunResult(Result):
     """The nine errors of a run on a motion at its records."""
 
-    drawn_by = "strapgen.lab.runs_report:run_image"
+    drawn_by: ClassVar[str] = "strapgen.lab.runs_report:run_image"
     indented = False
 
     settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))
@@ -367,7 +367,7 @@ class ErrorRecords:
 class HistoryResult(Result):
     """The attitude along a recording."""
 
-    drawn_by = "strapgen.lab.runs_report:history_image"
+    drawn_by: ClassVar[str] = "strapgen.lab.runs_report:history_image"
     indented = False
     computed = properties(records=entry(spread=True, kind=AttitudeRecords))
 

@@ -60,6 +60,10 @@ class StampError(InputError):
     ----------
     status : StampStatus
         What is wrong with it.
+    reason : str
+        That in words.
+    place : int or None
+        Which stamp or sample of a whole recording it is, from 0 on.
 
     Examples
     --------
@@ -69,9 +73,9 @@ class StampError(InputError):
     strapgen.stamped.grid_clock.StampError: a sample is lost
     """
 
-    def __init__(self, status: StampStatus, text: str) -> None:
-        super().__init__(text)
-        self.status = status
+    def __init__(self, status: StampStatus, reason: str, place: int | None = None) -> None:
+        super().__init__(reason if place is None else f"stamp {place + 1}: {reason}")
+        self.status, self.reason, self.place = status, reason, place
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from strapgen.stamped.boundary_kernels import filters
 from strapgen.stamped.grid_clock import OFFSET_BITS, Number, StampScale, StampStatus
 from strapgen.stamped.kernel_names import ROUNDS, kernel_name
 from strapgen.stamped.rounds import EDGES
+from strapgen.targets import BUILT_IN
 from strapgen.targets.c import real_of
 from strapgen.targets.rendering import render
 
@@ -149,7 +150,7 @@ def sources(
     checks.choice("target", target, TARGETS)
     scale = StampScale.of(sample_hz, tick_hz, stamp_bits)
     chosen = checked_pairs(pairs)
-    is_fixed = target == "c-fixed"
+    is_fixed = BUILT_IN[target].fixed
     if settings is not None and not is_fixed:
         raise InputError(f"target {target} takes no settings of fixed point; c-fixed does")
     if is_fixed:
@@ -226,7 +227,7 @@ _FILES = {"h": "header.h", "c": "source.c"}
 def _identifier(pairs: tuple[int, int], target: str, name: str | None) -> str:
     """Return the prefix of the names of functions and files."""
     if name is None:
-        infix = f"_w{WORD}" if target == "c-fixed" else real_of(target).infix
+        infix = f"_w{WORD}" if BUILT_IN[target].fixed else real_of(target).infix
         return f"stamped_grid_{pairs[0]}_{pairs[1]}{infix}"
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         raise InputError(f"--name is {name!r}; letters, digits and underscores are needed, a letter first")

@@ -86,7 +86,7 @@ def at_stamp(place: int) -> Iterator[None]:
     try:
         yield
     except StampError as error:
-        raise StampError(error.status, f"stamp {place + 1}: {error}") from None
+        raise StampError(error.status, error.reason, place) from None
 
 
 class StampedUnitInC:

@@ -26,10 +26,10 @@ _SUFFIXES = ("ns", "us", "ms", "s", "sec", "rad_s", "rads", "deg_s", "dps", "mdp
 _ANGLES = re.compile(r"(?:.*_)?(?:d|d_?theta|d_?ang(?:le)?|delta_?(?:theta|ang(?:le)?))")
 _VELOCITIES = re.compile(r"(?:.*_)?(?:d_?v|d_?vel(?:ocity)?|delta_?v(?:el(?:ocity)?)?)")
 _RATES = re.compile(
-    r"(?!.*covariance)(?:.*_)?(?:gyr\w*|angular_?(?:velocity|rate|vel|speed)|ang_?vel|omega|rotation_?rate|w_rs_s)(?:_.*)?|g|w|rate"
+    r"(?:.*_)?(?:gyr\w*|angular_?(?:velocity|rate|vel|speed)|ang_?vel|omega|rotation_?rate|w_rs_s)(?:_.*)?|g|w|rate"
 )
 _FORCES = re.compile(
-    r"(?!.*covariance)(?:.*_)?(?:acc\w*|linear_?acc\w*|specific_?force|force|a_rs_s)(?:_.*)?|a|f|user_?acc\w*"
+    r"(?:.*_)?(?:acc\w*|linear_?acc\w*|specific_?force|force|a_rs_s)(?:_.*)?|a|f|user_?acc\w*"
 )
 #: Those of a magnetometer and an attitude, beside which, as beside forces, a bare axis is open.
 _OTHER = re.compile(r"(?:.*_)?(?:mag\w*|quat\w*|euler\w*)(?:_.*)?|m|b|e|q")
@@ -129,13 +129,13 @@ def find(topics: Sequence[LogTopic], topic: str, stated: Stated) -> tuple[Meanin
         raise InputError(
             f"no topic has a time and rates about three axes; it has {seen}; FILE:TOPIC names one"
         )
-    names = checks.alternatives([*found])
-    first = min(found.values(), key=lambda one: one[0])
+    names, first = checks.alternatives([*found]), min(found.values(), key=lambda one: one[0])
     if first[0] == len(_MESSAGES) and len(found) > 1:
         raise InputError(
             f"{len(found)} topics have rates about three axes, {names}; FILE:TOPIC says which is meant"
         )
-    remark = f"the rates are those of topic {first[1].topic}; {names} have rates" if len(found) > 1 else ""
+    others = ", ".join(name for name in found if name != first[1].topic)
+    remark = f"the rates are those of topic {first[1].topic}; there are others in {others}" if others else ""
     return first[1], remark
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
+from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import renamed, warn
 from strapgen.lab.recordings.array_log import ArrayLog, frame_log
 from strapgen.lab.recordings.log_file import LogFile, open_log
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 
 @renamed(increments="samples")
 @dataclass(frozen=True)
-class Recording:
+class Recording(ReadOnly):
     """Angle increments at even intervals.
 
     Parameters
@@ -59,9 +60,6 @@ class Recording:
     breaks: tuple[tuple[int, float], ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     @property
     def pieces(self) -> list[Recording]:
@@ -106,7 +104,7 @@ class Recording:
             "m/s^2", "g" or "mg".
         **options
             What `read` takes of the time and of faults: ``time_unit``, ``gaps``, ``repair``, ``axes``, ``start``,
-            ``end`` and ``every``.
+            ``end``, ``every`` and ``grid``.
 
         Returns
         -------
@@ -201,7 +199,7 @@ class Recording:
 
 
 @renamed(increments="samples")
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InertialRecording(Recording):
     """Angle and velocity increments at even intervals.
 
@@ -217,8 +215,6 @@ class InertialRecording(Recording):
     """
 
     velocity_increments: Array
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -325,6 +321,7 @@ def read(
     gaps: str = "refuse",
     repair: str | Sequence[str] = (),
     force: bool = False,
+    grid: bool = False,
 ) -> Recording:
     r"""Read a recording from a log of any format that `strapgen log` shows.
 
@@ -363,6 +360,9 @@ def read(
         restored as lost samples are.
     force : bool, optional
         Whether specific forces, or velocity increments, are read too.
+    grid : bool, optional
+        Whether the times are the instants of the samples, which are taken from there to an even grid by `StampedGrid`;
+        by default they count as even.
 
     Returns
     -------
@@ -386,6 +386,7 @@ def read(
     reading = Reading(
         *(input, columns, time_unit, rate_unit, force_unit, sample_hz, axes, start, end),
         *(checks.count("every", every), gaps, repair, force),
+        grid=grid,
     )
     return recorded(path, topic, reading)
 

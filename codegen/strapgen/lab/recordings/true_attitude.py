@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
+from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.read_only import ReadOnly, read_only
 from strapgen.lab.recordings import meanings, quaternions
 from strapgen.lab.recordings.attitude_names import ALIGNMENTS, QUATERNIONS, SENSES
 from strapgen.lab.recordings.attitude_output import attitude_of
@@ -50,7 +51,7 @@ _HOUR = 3600
 
 
 @dataclass(frozen=True)
-class TrueAttitude:
+class TrueAttitude(ReadOnly):
     """An attitude that a run along a recording is judged by.
 
     Parameters
@@ -74,9 +75,6 @@ class TrueAttitude:
     remarks: tuple[str, ...] = ()
 
     __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     def _in_words(self) -> str:
         return f"of {len(self.time)} attitudes, {self.time[0]:g} s to {self.time[-1]:g} s"
@@ -449,7 +447,7 @@ def _shift(difference: Array, slope: Array, rows: NDArray[np.bool_]) -> float:
 
 
 @dataclass(frozen=True)
-class Slope:
+class Slope(ReadOnly):
     """A straight line through values over time."""
 
     #: (K,) or a number: in deg/h
@@ -510,7 +508,7 @@ class AttitudeError(Records):
     @cached_property
     def angle(self) -> Array:
         """The error angle in rad, (N,)."""
-        angle: Array = np.linalg.norm(self.vector, axis=1)
+        angle: Array = read_only(np.linalg.norm(self.vector, axis=1))
         return angle
 
     @cached_property
