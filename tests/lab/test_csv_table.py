@@ -21,7 +21,7 @@ from strapgen.lab.recordings.formats import csv_table
 from strapgen.lab.recordings.formats.csv_table import CsvTable, LineNumbers
 from strapgen.lab.recordings.formats.decimals import Marks
 from strapgen.lab.recordings.log_file import LogColumn, open_log
-from strapgen.lab.recordings.long_columns import Columns, largest_magnitude, parts
+from strapgen.lab.recordings.long_columns import Columns, SideBySide, largest_magnitude, parts
 
 PLAIN = st.sampled_from(
     ["0", "1.5", "-2e-3", " 3 ", "+4", ".5", "1e400", "1_0", "nan", "", "x", "0x1p3", "٣", '"7"', '"8\n"']
@@ -276,6 +276,21 @@ def test_parts_cover_all_rows(few_on_disk, overlap, count, rng):
     )
     assert all(np.array_equal(part, rows[first : first + len(part)]) for first, part in seen)
     assert largest_magnitude(columns.array()) == np.abs(rows).max()
+
+
+def test_columns_side_by_side_are_as_their_table(rng):
+    table = rng.normal(size=(9, 4))
+    lazy = SideBySide([*table.T])
+    assert (len(lazy), lazy.shape, lazy.ndim) == (9, (9, 4), 2)
+    keys = (slice(2, 7), slice(None), 3, -1, np.array([4, 0]), table[:, 0] > 0, (3, 1), (slice(1, 5), 2))
+    for key in (
+        *keys,
+        (slice(None), slice(None, 3)),
+        (slice(3, 1), slice(1, 3)),
+        (np.array([1, 2]), slice(None, 2)),
+    ):
+        np.testing.assert_array_equal(np.asarray(lazy[key]), table[key])
+    assert [(first, part.tolist()) for first, part in parts(lazy)] == [(0, table.tolist())]
 
 
 def test_a_full_disk_is_reported(few_on_disk, full_device, monkeypatch):

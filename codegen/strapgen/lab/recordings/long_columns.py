@@ -79,6 +79,7 @@ class SideBySide:
     """Columns of doubles as the columns of one table, of which as much is put together as is asked for."""
 
     ndim = 2
+    dtype = np.dtype(np.float64)
 
     def __init__(self, columns: Sequence[Array]) -> None:
         self.columns = columns
@@ -87,10 +88,15 @@ class SideBySide:
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, rows: Any) -> Any:
-        """Return a part by a slice, which is not put together yet; rows by numbers; or one row."""
-        part = SideBySide([column[rows] for column in self.columns]) if isinstance(rows, slice) else None
-        return np.stack([column[rows] for column in self.columns], axis=-1) if part is None else part
+    def __getitem__(self, key: Any) -> Any:
+        """Return rows by a slice, which are not put together yet; rows by numbers; one row; or columns of those."""
+        rows, *columns = key if isinstance(key, tuple) else (key,)
+        if not isinstance(rows, slice):
+            return np.stack([column[rows] for column in self.columns], axis=-1)[..., *columns]
+        chosen: Any = np.arange(len(self.columns))[*columns]
+        if np.ndim(chosen) == 0:
+            return np.asarray(self.columns[int(chosen)][rows], np.float64)
+        return SideBySide([self.columns[int(place)][rows] for place in chosen])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.stack(self.columns, axis=1, dtype=np.float64)
