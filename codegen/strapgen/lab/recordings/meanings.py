@@ -124,18 +124,18 @@ def find(topics: Sequence[LogTopic], topic: str, stated: Stated) -> tuple[Meanin
             found[one.name] = rank, of_topic(one, stated)
         except InputError:
             continue
-    names = checks.alternatives([*found])
     if not found:
         seen = ", ".join(one.name for one in topics[: checks.MOST_NAMES])
         raise InputError(
             f"no topic has a time and rates about three axes; it has {seen}; FILE:TOPIC names one"
         )
-    first = min(found.values(), key=lambda one: one[0])
+    names, first = checks.alternatives([*found]), min(found.values(), key=lambda one: one[0])
     if first[0] == len(_MESSAGES) and len(found) > 1:
         raise InputError(
             f"{len(found)} topics have rates about three axes, {names}; FILE:TOPIC says which is meant"
         )
-    remark = f"the rates are those of topic {first[1].topic}; {names} have rates" if len(found) > 1 else ""
+    others = ", ".join(name for name in found if name != first[1].topic)
+    remark = f"the rates are those of topic {first[1].topic}; there are others in {others}" if others else ""
     return first[1], remark
 
 
