@@ -17,7 +17,7 @@ from typing import NamedTuple
 #: The folders of the package whose code has a numerical meaning.
 FOLDERS = (
     *("ir", "kernel", "fixedpoint", "catalogue", "lowering", "targets", "run"),
-    *("lab", "analysis", "design", "navigation", "firmware"),
+    *("lab", "analysis", "design", "navigation", "firmware", "stamped"),
 )
 #: Modules in them that compute nothing: names, texts, and how other people's code is run.
 WITHOUT_NUMBERS = (

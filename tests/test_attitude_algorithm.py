@@ -187,6 +187,7 @@ TAKERS = {
         "window-7-7", np.full((20, 3), 1e-3), algorithm=one
     ),
     "study.cases": lambda one: np.array([str(case) for case in strapgen.study.cases(algorithm=one)]),
+    "study.noise_of": lambda one: strapgen.study.noise_of(one).across(),
     "compare": lambda one: np.array([row.kernel for row in strapgen.compare(one, backends=["numpy"])]),
     "converge": lambda one: np.array(strapgen.converge(one, backend="numpy").kernel),
     "check": lambda one: np.array([finding.name for finding in strapgen.check(one)]),

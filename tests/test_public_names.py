@@ -13,6 +13,7 @@ import venv
 from pathlib import Path
 
 import pytest
+from public_names import public
 
 import strapgen
 
@@ -183,41 +184,70 @@ WRONG = """
 """
 
 
-@pytest.mark.long
-def test_a_user_s_script_is_typed(tmp_path):
-    """In an environment that finds the package as an installed one, where `py.typed` counts; strict rules."""
-    venv.create(tmp_path / "venv", with_pip=False)
-    (packages,) = (tmp_path / "venv").glob("lib/python*/site-packages")
+def checked(folder: Path, **scripts: str) -> str:
+    """Return what mypy says of scripts by strict rules, in an environment where `py.typed` of the package counts."""
+    venv.create(folder / "venv", with_pip=False)
+    (packages,) = (folder / "venv").glob("lib/python*/site-packages")
     import numpy as np
 
     (packages / "places.pth").write_text(f"{PACKAGE.parent}\n{Path(np.__file__).parents[1]}\n")
-    for name, script in (("right.py", SCRIPT), ("wrong.py", WRONG)):
-        (tmp_path / name).write_text(textwrap.dedent(script))
-    python = tmp_path / "venv" / "bin" / "python"
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        "--strict",
-        "--no-incremental",
-        "--python-executable",
-        str(python),
-        "right.py",
-        "wrong.py",
-    ]
-    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stdout
+    for name, script in scripts.items():
+        (folder / f"{name}.py").write_text(script)
+    python = str(folder / "venv" / "bin" / "python")
+    command = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--python-executable", python]
+    command += [f"{name}.py" for name in scripts]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True).stdout
+
+
+@pytest.mark.long
+def test_a_user_s_script_is_typed(tmp_path):
+    scripts = {"right": textwrap.dedent(SCRIPT), "wrong": textwrap.dedent(WRONG)}
+    said = checked(tmp_path, **scripts)
     expected = {
         (name, number): line.split("  # ")[1]
-        for name, script in (("right.py", SCRIPT), ("wrong.py", WRONG))
-        for number, line in enumerate(textwrap.dedent(script).splitlines(), 1)
+        for name, script in scripts.items()
+        for number, line in enumerate(script.splitlines(), 1)
         if "  # " in line
     }
     found = {}
-    for name, line, text in re.findall(r"^(\w+\.py):(\d+): (?:note|error): (.*)$", said, flags=re.MULTILINE):
+    for name, line, text in re.findall(r"^(\w+)\.py:(\d+): (?:note|error): (.*)$", said, flags=re.MULTILINE):
         found.setdefault((name, int(line)), text)
     assert found.keys() == expected.keys(), said
     for place, words in expected.items():
         assert words in found[place], said
+
+
+#: Names that are SymPy's own, which has no types.
+OF_SYMPY = {"EPSILON", "algebra.CROSS", "algebra.PAULI"}
+
+
+def untyped(lines: list[str], said: str) -> dict[str, str]:
+    """Return the expressions of a script's lines whose revealed type is not known, each with that type."""
+    types_ = dict(re.findall(r'^all\.py:(\d+): note: Revealed type is "(.*)"$', said, flags=re.MULTILINE))
+    asked = {line[12:-1]: types_.get(str(number), "") for number, line in enumerate(lines, 1) if "(" in line}
+    return {name: kind for name, kind in asked.items() if re.fullmatch(r"|Any|.*cache_wrapper.*", kind)}
+
+
+@pytest.mark.long
+def test_every_public_name_has_a_known_type(tmp_path):
+    names = [f"strapgen.{name}" for name in public()]
+    methods = [name for name in vars(strapgen.AttitudeAlgorithm) if not name.startswith("_")]
+    names += [f'strapgen.algorithm("euler").{name}' for name in methods]
+    lines = ["import strapgen", *(f"reveal_type({name})" for name in names)]
+    said = checked(tmp_path, all="\n".join(lines))
+    assert len(names) > 200 and "error" not in re.sub(r"note: .*", "", said)
+    assert {name.removeprefix("strapgen.") for name in untyped(lines, said)} <= OF_SYMPY
+
+
+def test_an_unknown_type_is_seen():
+    lines = [
+        "import strapgen",
+        "reveal_type(strapgen.a)",
+        "reveal_type(strapgen.b)",
+        "reveal_type(strapgen.c)",
+    ]
+    said = 'all.py:2: note: Revealed type is "Any"\nall.py:3: note: Revealed type is "def (x: int) -> int"\n'
+    assert untyped(lines, said) == {"strapgen.a": "Any", "strapgen.c": ""}
 
 
 def test_the_package_says_that_it_is_typed():

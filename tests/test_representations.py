@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import inspect
+import json
+import pickle
 import types
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from sympy import MutableDenseMatrix
 
 import strapgen
 from strapgen.analysis import growth
@@ -21,6 +25,9 @@ from strapgen.analysis.unknowns.unknown_tableau import UnknownTableau
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.catalogue.methods.shaped_coning import SHAPES
 from strapgen.ir.notebook_display import LINES, WIDTH, full_text, short_repr
+from strapgen.ir.program import once
+from strapgen.ir.read_only import ReadOnlyDict
+from strapgen.navigation.systems.system_runner import SystemMemory
 
 ROOT = Path(__file__).resolve().parents[1]
 TURN = np.full((8, 2, 3), 0.01)
@@ -108,7 +115,12 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Kernel": kernel,
     "KernelBuilder": builder,
     "Stage": lambda: kernel().stages[0],
+    "StampedGrid": lambda: strapgen.StampedGrid(sample_hz=200, tick_hz=1_000_000),
+    "GridSamples": lambda: strapgen.GridSamples(np.zeros((4, 3)), 0.005, (200.0, 200.0)),
+    "StampError": lambda: strapgen.StampError(strapgen.StampStatus.GAP, "a sample is lost"),
+    "StampStatus": lambda: next(iter(strapgen.StampStatus)),
     "Target": lambda: strapgen.TARGETS["c"],
+    "Language": lambda: strapgen.Language(str.isidentifier, lambda texts: [{*" ".join(texts).split()}]),
 }
 
 
@@ -299,15 +311,101 @@ def test_value_refuses_conflicting_fields():
         strapgen.algorithm("dcm-product")
 
 
-@pytest.mark.parametrize(
-    "name", ["AttitudeError", "Course", "History", "InertialRecording", "Recording", "Run"]
-)
-def test_arrays_of_results_cannot_be_written(name):
-    result = OBJECTS[name]()
-    arrays = [value for value in vars(result).values() if isinstance(value, np.ndarray)]
-    assert arrays and not any(array.flags.writeable for array in arrays)
+#: What else public functions return, by the name of its class or of the function.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "TwoSpeedRun": lambda: strapgen.TwoSpeed("euler").run(*2 * [np.zeros((4, 3))], fast_cycles=2),
+    "SystemRun": lambda: system_run(),
+    "Description": lambda: strapgen.read_system("two-speed-euler"),
+    "ErrorAnalysis": lambda: strapgen.algorithm("euler").series(terms=1),
+    "FindingsResult": lambda: strapgen.check("euler"),
+    "Sources in fixed point": lambda: strapgen.algorithm("euler").generate("c-fixed", word=16),
+    "study.run_case": lambda: strapgen.study.run_case(study_case()),
+    "read_motion": lambda: strapgen.read_motion(ROOT / "examples" / "own_motion.py"),
+    "sensors.measured": lambda: strapgen.sensors.measured(
+        strapgen.motion("constant", z_deg_s=1), strapgen.sensors.read("ahrs")
+    ),
+    "windows.named_window": lambda: strapgen.windows.named_window("window-7-7"),
+}
+
+
+def system_run() -> Any:
+    runner = strapgen.system_runner(strapgen.read_system("two-speed-euler"))
+    return runner.run({signal.name: np.zeros((320, *signal.shape)) for signal in runner.system.inputs})
+
+
+def study_case() -> strapgen.study.Case:
+    (case,) = strapgen.study.cases(words=12, carries="full", duration="2")
+    return case
+
+
+def writeable(value: Any, place: str, seen: dict[int, Any]) -> Iterator[str]:
+    """Yield the places of lists, sets, dicts, matrices and arrays that can be written, in a value and its parts."""
+    if id(value) in seen or isinstance(value, type | types.FunctionType | types.ModuleType | SystemMemory):
+        return
+    seen[id(value)] = value  # held, so that no other object gets its number
+    if isinstance(value, np.ndarray):
+        yield from [place] if value.flags.writeable else []
+    elif isinstance(value, list | set | bytearray | MutableDenseMatrix):
+        yield place
+    elif isinstance(value, Mapping):
+        yield from [place] if hasattr(value, "clear") and not isinstance(value, ReadOnlyDict) else []
+        for key in value if isinstance(value, dict) else ():
+            yield from writeable(value[key], f"{place}[{key!r}]", seen)
+    elif isinstance(value, tuple):
+        for name, part in zip(getattr(value, "_fields", range(len(value))), value, strict=True):
+            yield from writeable(part, f"{place}.{name}", seen)
+    elif is_dataclass(value):
+        for one in fields(value):
+            if not one.name.startswith("_"):
+                yield from writeable(getattr(value, one.name), f"{place}.{one.name}", seen)
+        for name, kept in vars(type(value)).items():
+            if isinstance(kept, cached_property | once) and not name.startswith("_"):
+                yield from writeable(getattr(value, name), f"{place}.{name}", seen)
+
+
+EVERYTHING = OBJECTS | MODULE_OBJECTS | RESULTS
+
+
+@pytest.mark.parametrize("name", EVERYTHING)
+def test_results_cannot_be_written(name):
+    value = EVERYTHING[name]()
+    assert [*writeable(value, name, {})] == []
+
+
+@pytest.mark.parametrize("name", ["Run", "Course", "Recording", "Sources", "Settings", "sensors.TriadErrors"])
+def test_results_from_a_pickle_cannot_be_written(name):
+    value = EVERYTHING[name]()
+    copy = pickle.loads(pickle.dumps(value))
+    assert type(copy) is type(value) and repr(copy) == repr(value)
+    assert [*writeable(copy, name, {})] == []
+
+
+def test_what_can_be_written_is_found():
+    run = OBJECTS["Run"]()
+    for part in (np.zeros(3), [1], {"a": 1}, ({1},), ReadOnlyDict(a=[1])):
+        object.__setattr__(run, "drift", part)
+        assert len([*writeable(run, "run", {})]) == 1
+
+
+def test_a_write_is_refused_in_one_line():
+    sources = strapgen.algorithm("euler").generate()
+    for write in (
+        lambda: sources.files.update(a="b"),
+        lambda: sources.files.pop("euler_rk4_2.c"),
+        lambda: sources.operations.__setitem__("add", 0),
+        lambda: sources.operations.__ior__({"add": 0}),
+    ):
+        with pytest.raises(
+            TypeError, match=r"^a result cannot be written; dict\(result\) is a copy that can$"
+        ):
+            write()
     with pytest.raises(ValueError, match="read-only"):
-        arrays[0][...] = 0
+        OBJECTS["Run"]().drift[...] = 0
+    for runner in (stepper(), strapgen.TwoSpeed("dcm")):
+        with pytest.raises(ValueError, match="read-only"):
+            runner.identity[...] = 0
+    assert sources.files == strapgen.algorithm("euler").generate().files
+    assert json.loads(json.dumps(sources.operations)) == sources.operations
 
 
 def test_the_array_of_a_user_stays_writeable():

@@ -12,9 +12,9 @@ Functions take the object, a name or a Choice alike:
 
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
   motions     motion, read_motion; read, Recording, InertialRecording; simulate, propagate
-  recordings  propagate; rests; TrueAttitude, time_offset, attitude_error
+  recordings  propagate; StampedGrid; rests; TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
-  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target
+  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target, Language
   navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
 
@@ -131,6 +131,11 @@ if _typing.TYPE_CHECKING:
     from strapgen.run.backends import build as build
     from strapgen.run.backends import evaluator as evaluator
     from strapgen.run.compiler import compile_together as compile_together
+    from strapgen.stamped.grid_clock import StampError as StampError
+    from strapgen.stamped.grid_clock import StampStatus as StampStatus
+    from strapgen.stamped.stamped_grid import GridSamples as GridSamples
+    from strapgen.stamped.stamped_grid import StampedGrid as StampedGrid
+    from strapgen.targets.names import Language as Language
     from strapgen.targets.registry import TARGETS as TARGETS
     from strapgen.targets.registry import Target as Target
 
@@ -155,6 +160,14 @@ _NAMES = {
         "SampleKind",
     ),
     "run.backend_names": ("BACKENDS",),
+    "stamped.grid_clock": (
+        "StampError",
+        "StampStatus",
+    ),
+    "stamped.stamped_grid": (
+        "GridSamples",
+        "StampedGrid",
+    ),
     "navigation.systems.system_runner": (
         "SystemRunner",
         "system_runner",
@@ -274,6 +287,7 @@ _NAMES = {
         "EPSILON",
     ),
     "navigation.systems.wiring": ("read_system",),
+    "targets.names": ("Language",),
     "targets.registry": (
         "TARGETS",
         "Target",

@@ -45,7 +45,7 @@ def _target_code(target: str, settings: Settings | None, naming: Naming) -> str:
     return targets.TARGETS.code(target)
 
 
-@cached("sources", "sources of {0.kernel} for {1}", depends=_target_code, copies=True)
+@cached("sources", "sources of {0.kernel} for {1}", depends=_target_code)
 def compile(
     choice: Choice, target: str, settings: Settings | None = None, naming: Naming = UNNAMED
 ) -> Sources:

@@ -222,7 +222,8 @@ class Merged(Names[T]):
     """Several mappings as one; the first that has a name gives its value. The first of all is `own`."""
 
     def __init__(self, *parts: Mapping[str, T]) -> None:
-        self.own, self._parts = parts[0], parts
+        self.own: Mapping[str, T] = parts[0]
+        self._parts = parts
 
     def __getitem__(self, name: str) -> T:
         for part in self._parts:

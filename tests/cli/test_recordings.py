@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from strapgen.cli import main
 
@@ -283,3 +284,121 @@ def test_rates_at_the_ends_of_intervals_hold_once_they_are_said_to_be(check):
     status, data = check("rates_at_ends", "--input rates-at-ends")
     assert (status, data["fails"], data["cause"]) == (0, [], None)
     assert data["order"] == pytest.approx(1.99, abs=0.02)
+
+
+# Old names, topics, rates with forces, and the attitude at the start
+
+OLD = {
+    "--rates-csv tests/data/rates_even.csv": (
+        *("--recording tests/data/rates_even.csv --input instants", "--rates-csv is now --recording"),
+    ),
+    "--increments-csv tests/data/increments.csv": (
+        *("--recording tests/data/increments.csv", "--increments-csv is now --recording"),
+    ),
+    "--rates-csv tests/data/rates_even.csv --resample-hz 50": (
+        "--recording tests/data/rates_even.csv --input instants --every 2",
+        "--resample-hz is now --every, a whole number of samples",
+    ),
+}
+
+
+def said_by(line: str, capsys, status: int = 0) -> tuple[str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(line))
+    said = capsys.readouterr()
+    assert (stop.value.code or 0) == status, said.err
+    return said.out, said.err
+
+
+@pytest.mark.parametrize("old", OLD)
+@pytest.mark.parametrize("command", ["simulate euler", "compare euler --backend c --format json"])
+def test_old_options_say_their_new_names(old, command, capsys, monkeypatch):
+    monkeypatch.chdir(DATA.parents[2])
+    new, warning = OLD[old]
+    out, err = said_by(f"{command} {old}", capsys)
+    assert warning in err
+    expected, plain = said_by(f"{command} {new}", capsys)
+    assert "is now" not in plain
+    if command.startswith("simulate"):
+        assert out == expected
+    else:
+        assert json.loads(out)[0]["max_abs_rad"] == json.loads(expected)[0]["max_abs_rad"]
+
+
+@pytest.mark.parametrize("backend", ["numpy", "c"])
+def test_strapdown_takes_rates_with_forces(backend, tmp_path, capsys, monkeypatch):
+    """The example has increments; rates and forces of the same motion give the same course."""
+    monkeypatch.chdir(DATA.parents[2])
+    names, *lines = (Path("examples") / "inertial_log.csv").read_text().split()
+    values = np.array([line.split(",") for line in lines], float)
+    rates, forces = np.degrees(values[:, 1:4] / 0.01), values[:, 4:] / 0.01 / 9.80665
+    log = tmp_path / "imu.csv"
+    rows = (
+        ",".join(map(repr, [*row])) for row in np.column_stack([values[:, 0] * 1e3, rates, forces]).tolist()
+    )
+    log.write_text("\n".join(["t [ms],gx [deg/s],gy,gz,ax [g],ay,az", *rows, ""]))
+    command = f"strapdown dcm --fast-cycles 4 --slow-cycles 25 --backend {backend} --format csv --recording"
+    of_increments, _ = said_by(f"{command} examples/inertial_log.csv", capsys)
+    of_rates, err = said_by(f"{command} {log}", capsys)
+    assert "are means over the intervals" in err
+    first, second = (
+        np.array([line.split(",") for line in text.split()[1:]], float) for text in (of_increments, of_rates)
+    )
+    np.testing.assert_allclose(second, first, rtol=1e-9, atol=1e-9)
+    names = "t=t,x=gx,y=gy,z=gz,fx=ax,fy=ay,fz=az"
+    plain = log.read_text().replace(" [g]", "").replace(" [deg/s]", "").replace(" [ms]", "")
+    log.write_text(plain)
+    options = f"--columns {names} --time-unit ms --rate-unit dps --force-unit g"
+    assert said_by(f"{command} {log} {options}", capsys)[0] == of_rates
+    assert "--force-unit is needed" in said_by(f"{command} {log} {options[:-15]}", capsys, 2)[1]
+
+
+@pytest.mark.parametrize("method", ["rk4", "window-3-3"])
+@pytest.mark.parametrize("state", ["euler", "dcm"])
+def test_a_recording_starts_at_an_attitude(method, state, capsys, monkeypatch):
+    monkeypatch.chdir(DATA.parents[2])
+    line = f"simulate {state} --method {method} --recording tests/data/increments.csv --format json"
+    turned = json.loads(said_by(f"{line} --initial-deg 10,-20,70", capsys)[0])
+    assert turned["initial_deg"] == "10,-20,70"
+    plain = json.loads(said_by(line, capsys)[0])
+    to_matrices = (
+        (lambda rows: np.reshape(rows, (-1, 3, 3)))
+        if state == "dcm"
+        else (lambda rows: Rotation.from_quat(rows).as_matrix())
+    )
+    start = Rotation.from_euler("ZYX", [70, -20, 10], degrees=True).as_matrix()
+    expected = start @ to_matrices(np.array(plain["attitude"]))
+    np.testing.assert_allclose(to_matrices(np.array(turned["attitude"])), expected, atol=1e-12)
+
+
+def test_a_described_system_starts_at_an_attitude_on_a_recording(capsys, monkeypatch):
+    monkeypatch.chdir(DATA.parents[2])
+    line = "simulate examples/attitude.toml --recording tests/data/increments.csv --format json"
+    turned = json.loads(said_by(f"{line} --initial-deg 0,0,90", capsys)[0])
+    plain = json.loads(said_by(line, capsys)[0])
+    np.testing.assert_allclose(turned["attitude"][0], [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-12)
+    start = Rotation.from_euler("z", 90, degrees=True)
+    expected = start * Rotation.from_quat(plain["attitude"])
+    error = expected.inv() * Rotation.from_quat(turned["attitude"])
+    assert np.abs(error.magnitude()).max() < 1e-6
+
+
+def test_split_pieces_are_a_column_and_go_with_simulate_alone(capsys, monkeypatch):
+    monkeypatch.chdir(DATA.parents[2])
+    options = "--recording tests/data/recordings/dropout.csv --rate-unit rad/s --gaps split"
+    out, err = said_by(f"simulate euler {options}", capsys)
+    rows = [line.split(",") for line in out.split()]
+    assert rows[0][:2] == ["time_s", "piece"] and {row[1] for row in rows[1:]} == {"1", "2"}
+    assert "it is split into 2 pieces" in err
+    data = json.loads(said_by(f"simulate euler {options} --format json", capsys)[0])
+    assert len(data["piece"]) == len(data["time_s"]) and {*data["piece"]} == {1, 2}
+    assert "goes with simulate alone" in said_by(f"compare euler {options}", capsys, 2)[1]
+
+
+def test_axes_of_the_sensor_are_turned(capsys, monkeypatch):
+    """A turn about z is one about -z for a body whose z is down."""
+    monkeypatch.chdir(DATA.parents[2])
+    line = "simulate euler --recording tests/data/recordings/time_in_ms.csv --rate-unit rad/s --format json"
+    plain = json.loads(said_by(line, capsys)[0])["attitude"]
+    down = json.loads(said_by(f"{line} --axes x,-y,-z", capsys)[0])["attitude"]
+    np.testing.assert_allclose(np.array(down) * [1, -1, -1, 1], plain, atol=1e-15)

@@ -21,7 +21,7 @@ from strapgen.lab.recordings.formats import csv_table
 from strapgen.lab.recordings.formats.csv_table import CsvTable, LineNumbers
 from strapgen.lab.recordings.formats.decimals import Marks
 from strapgen.lab.recordings.log_file import LogColumn, open_log
-from strapgen.lab.recordings.long_columns import Columns, SampleIntervals, largest_magnitude, parts
+from strapgen.lab.recordings.long_columns import Columns, largest_magnitude, parts
 
 PLAIN = st.sampled_from(
     ["0", "1.5", "-2e-3", " 3 ", "+4", ".5", "1e400", "1_0", "nan", "", "x", "0x1p3", "٣", '"7"', '"8\n"']
@@ -35,8 +35,6 @@ READERS = {
     "rates": lambda path: recording.read_rates(path, "deg/s"),
     "summed": lambda path: recording.read(path, rate_unit="deg/s", every=3),
 }
-
-steps = st.floats(1e-300, 1e300) | st.sampled_from([1e-3, 1e-3 * (1 + 1e-15), 2e-3])
 
 
 def outcome(path: Path) -> str:
@@ -285,22 +283,6 @@ def test_a_full_disk_is_reported(few_on_disk, full_device, monkeypatch):
     ):
         for _ in range(10_000):
             columns.append(np.zeros((100, 1)))
-
-
-@given(st.lists(steps, min_size=1, max_size=40))
-def test_interval_statistics_agree_with_numpy(numbers):
-    time = np.cumsum([0.0, *numbers])
-    exact = np.diff(time)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(long_columns, "PART", 3)
-        intervals = SampleIntervals(time)
-        if intervals.shortest[0] <= 0:
-            return  # refused before it is used
-        assert intervals.median() == np.median(exact)
-        assert intervals.shortest == (exact.min(), exact.argmin())
-        assert intervals.longest == (exact.max(), exact.argmax())
-        departures = np.abs(exact - 1e-3)
-        assert intervals.farthest(1e-3) == (departures.max(), departures.argmax())
 
 
 def read(path: Path) -> list[tuple[int, list[str]]]:

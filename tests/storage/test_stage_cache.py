@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 import strapgen
 from strapgen import catalogue, pipeline
@@ -40,13 +41,12 @@ def test_sources_are_those_of_the_pipeline():
         assert pipeline.compile(choice, target) == strapgen.generate(program, target)
 
 
-def test_changed_files_leave_other_sources_alone():
+def test_all_calls_share_sources_that_cannot_be_written():
     sources = pipeline.compile(catalogue.choose("euler-product"), "numpy")
-    files, operations = {**sources.files}, {**sources.operations}
-    sources.files.clear()
-    sources.operations.clear()
-    again = pipeline.compile(catalogue.choose("euler-product"), "numpy")
-    assert (again.files, again.operations) == (files, operations) and files and operations
+    assert pipeline.compile(catalogue.choose("euler-product"), "numpy") is sources
+    for shared in (sources.files, sources.operations):
+        with pytest.raises(TypeError, match="cannot be written"):
+            shared.clear()
 
 
 def test_sources_that_this_process_has_had_are_not_read_again(monkeypatch):
@@ -68,7 +68,7 @@ def test_process_keeps_the_last_used_entries(monkeypatch, tmp_path):
 
     monkeypatch.setattr(cache, "stored", noted)
     for key in ("a", "b", "a", "c", "a", "b"):
-        assert cache._load("kind", [key], "", lambda key=key: key, False) == key
+        assert cache._load("kind", [key], "", lambda key=key: key) == key
     assert asked == ["a", "b", "c", "b"]
 
 

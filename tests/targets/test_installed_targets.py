@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 import tomllib
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,14 @@ from derived import program, tells_more
 from installed_packages import as_in_a_new_process, importable
 
 import strapgen
-from strapgen import catalogue, pipeline, targets
+from strapgen import Language, catalogue, pipeline, targets
 from strapgen.catalogue import Choice
 from strapgen.cli import main
-from strapgen.ir.exceptions import InputError
+from strapgen.ir.exceptions import InputError, InputTypeError
+from strapgen.ir.program import Constant
 from strapgen.targets import registry
+from strapgen.targets.names import printed
+from strapgen.targets.printer import Printer
 
 TOY = Path(__file__).resolve().parents[2] / "examples" / "toy_target"
 EULER = Choice("euler", "rk4", 2)
@@ -343,3 +347,75 @@ def test_a_printer_that_lacks_a_function_says_which(toy, has_table, monkeypatch)
         match=r"^PlainPrinter does not print sqrt of 1 arguments; its method function must return the text$",
     ):
         strapgen.generate(program(catalogue.choose("euler-normalize")), "plain-python")
+
+
+class Wordless(Printer):
+    """A printer that lacks what a language has to write."""
+
+
+class Numbers(Wordless):
+    """A printer that returns a number in place of its text."""
+
+    def constant(self, value):
+        return float(value)
+
+
+@pytest.mark.parametrize("printer", [Wordless, Numbers])
+def test_a_printer_without_numbers_says_what_is_missing(printer):
+    half = Constant(Fraction(1, 2))
+    message = f"^{printer.__name__} does not print numbers; its method constant must return the text$"
+    with pytest.raises(InputError, match=message):
+        printer().text(half)
+
+
+def words(texts) -> list[set[str]]:
+    return [{word for text in texts for word in re.findall(r"\w+", text)}]
+
+
+#: Faults of a language, or of what prints a program, with the line that says what is missing.
+LACKING = {
+    "all names": (
+        lambda: Language(lambda name: False, words),
+        r"^allows of .* takes neither euler_normalize nor",
+    ),
+    "no scopes": (
+        lambda: Language(bool, lambda texts: None),
+        r"^scopes of .* returned None; a list of sets is",
+    ),
+    "lists": (
+        lambda: Language(bool, lambda texts: [["a"]]),
+        r"^scopes of .* returned a list; a list of sets is",
+    ),
+    "letters": (
+        lambda: Language(bool, lambda texts: [{w for w in words(texts)[0] if w.isascii()}]),
+        r"^scopes of .* finds no name of the program in a\.txt; identifiers whose letters may be beyond ASCII are",
+    ),
+    "text": (lambda: "julia", r"^printed takes a strapgen.Language, not 'julia'$"),
+    "no function": (lambda: Language("end", words), r"^allows of a Language is 'end'; a function is needed$"),
+    "length": (lambda: Language(bool, words, most=-1), r"^most of a Language is -1"),
+}
+
+
+@pytest.mark.parametrize("fault", LACKING)
+def test_a_language_that_lacks_something_says_what(fault):
+    make, line = LACKING[fault]
+    normalize = program(catalogue.choose("euler-normalize"))
+
+    def files(part, _):
+        return {"a.txt": " ".join([part.name, *(element for s in part.inputs for element in s.elements)])}
+
+    assert printed(normalize, files, Language(bool, words))[1]["a.txt"].startswith("euler_normalize ")
+    with pytest.raises((InputError, InputTypeError), match=line):
+        printed(normalize, files, make())
+
+
+def test_files_that_are_no_mapping_are_refused():
+    normalize = program(catalogue.choose("euler-normalize"))
+    with pytest.raises(InputTypeError, match=r"^what prints a program returned None; texts by file name are"):
+        printed(normalize, lambda part, _: None, Language(bool, words))
+    with pytest.raises(
+        InputTypeError, match=r"^files of Sources.of is 'a = 1'; texts by file name are needed$"
+    ):
+        strapgen.Sources.of(normalize, "mine", "f", "a = 1")
+    with pytest.raises(InputError, match=r"^function of Sources.of is no text"):
+        strapgen.Sources.of(normalize, "mine", {"a.txt": ""}, "f")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import sympy as sp
 
@@ -155,8 +155,8 @@ def series_text(analysis: ErrorAnalysis) -> str:
 class SeriesResult(Result):
     """The errors of one step as power series in its length, with the drift of a run; expressions are text for SymPy."""
 
-    each = ErrorAnalysis
-    drawn_by = "strapgen.analysis.analysis_plots:agreement_image"
+    each: ClassVar[type | None] = ErrorAnalysis
+    drawn_by: ClassVar[str] = "strapgen.analysis.analysis_plots:agreement_image"
 
     analyses: Sequence[ErrorAnalysis]
     #: Predicted and simulated drift, for a plot, with its title

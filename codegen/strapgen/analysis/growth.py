@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import sympy as sp
 
@@ -26,6 +26,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel.algebra import cross_elements, dot
 from strapgen.kernel.polynomials import Polynomial
 from strapgen.lab import one_step
@@ -58,18 +59,18 @@ def _invariant(parts: Mapping[str, Mapping[int, Polynomial]]) -> Any:
 
 
 @dataclass(frozen=True)
-class Growth(Record):
+class Growth(ReadOnly, Record):
     """The change in one step of a length and of a determinant that should both stay 1."""
 
     kernel: str = field(metadata=INTERNAL)
     motion: str = field(metadata=INTERNAL)
     #: The first terms that are not zero, by power of the step length, of the length of a state of four
     #: parameters; None for other states
-    length: dict[int, sp.Expr] | None = field(metadata=entry(optional=True, write=_sum, kind=str))
+    length: Mapping[int, sp.Expr] | None = field(metadata=entry(optional=True, write=_sum, kind=str))
     #: The same of the determinant of the direction cosine matrix
-    determinant: dict[int, sp.Expr] = field(metadata=entry(write=_sum, kind=str))
+    determinant: Mapping[int, sp.Expr] = field(metadata=entry(write=_sum, kind=str))
     #: For a general rate the terms of "length" and "determinant" in scalar products
-    invariant: dict[str, dict[int, Polynomial]] = field(
+    invariant: Mapping[str, Mapping[int, Polynomial]] = field(
         metadata=entry(optional=True, write=_invariant, kind=dict[str, dict[str, str]])
     )
 
@@ -144,7 +145,7 @@ def _of_file(general: Growth, motion: str, terms: int, top: int) -> Growth:
     """Return the growth on a user's rate, whose derivatives take the place of those of a general one."""
     inserted = motion_rates.of_file(motion, top)
 
-    def rows(known: dict[int, sp.Expr] | None) -> dict[int, sp.Expr]:
+    def rows(known: Mapping[int, sp.Expr] | None) -> dict[int, sp.Expr]:
         parts = {power: inserted(x) for power, x in (known or {}).items()}
         return dict([(power, x) for power, x in parts.items() if x != 0][:terms])
 
@@ -191,14 +192,14 @@ def contraction(found: ConstantRate) -> list[tuple[float, float | None]] | None:
 
 
 @dataclass(frozen=True)
-class Stability(Record):
+class Stability(ReadOnly, Record):
     """The change of the length of a state in a step at a constant rate."""
 
     kernel: str = field(metadata=entry("step", align="<"))
     #: Square of the factor by which the state grows across the axis, a function of the angle x of the step
     stretch_squared: sp.Expr = field(metadata=entry("square of the stretch, x = |w| h", align="<", cell=str))
     #: The intervals from `contraction`
-    contractive: list[tuple[float, float | None]] | None = field(
+    contractive: Sequence[tuple[float, float | None]] | None = field(
         metadata=entry("x at which no state grows", align="<", least=26, cell=intervals_text)
     )
 
@@ -236,8 +237,8 @@ class StabilityResult(Result):
     """The growth of states in steps at a constant rate: a row for each step."""
 
     rows_in = "steps"
-    row = Stability
-    drawn_by = "strapgen.analysis.analysis_plots:stability_image"
+    row: ClassVar[type | None] = Stability
+    drawn_by: ClassVar[str] = "strapgen.analysis.analysis_plots:stability_image"
 
     steps: Sequence[Stability]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import sympy as sp
 
@@ -17,7 +18,7 @@ from strapgen.analysis.series.motion_rates import is_plain, parameters
 from strapgen.analysis.series.series import series
 from strapgen.catalogue import Choice
 from strapgen.catalogue.methods.tableaux import TABLEAUX
-from strapgen.results.records import Record, entry, properties, reader_table
+from strapgen.results.records import Properties, Record, entry, properties, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import ERROR, Column, TextTable
 
@@ -33,7 +34,7 @@ WORK = 544.0
 class OverviewRow(Record):
     """The errors and the operations of one algorithm."""
 
-    computed = properties(
+    computed: ClassVar[Properties] = properties(
         constant_term=entry("constant", align="<", internal=True),
         coning_drift_deg_h=entry("coning, deg/h", ERROR),
         drift_per_operation_rad=entry("per operation", ".2e"),
@@ -187,7 +188,7 @@ class OverviewResult(Result):
     """Orders, leading errors and operations side by side: a row for each algorithm and method."""
 
     rows_in = "algorithms"
-    row = OverviewRow
+    row: ClassVar[type | None] = OverviewRow
 
     algorithms: Sequence[OverviewRow]
 

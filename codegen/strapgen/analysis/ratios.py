@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import sympy as sp
 
@@ -17,7 +18,7 @@ from strapgen.catalogue import Choice
 from strapgen.ir import checks
 from strapgen.results.display.expressions import expression_latex
 from strapgen.results.display.latex import PAGE, equations, unbroken
-from strapgen.results.records import INTERNAL, Record, entry, properties
+from strapgen.results.records import INTERNAL, Properties, Record, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 
@@ -33,7 +34,7 @@ Terms = Mapping[int, Sequence[sp.Expr]]
 class Ratio(Record):
     """The ratio of the errors of two algorithms."""
 
-    computed = properties(
+    computed: ClassVar[Properties] = properties(
         first_terms=entry(),
         second_terms=entry(),
         expression=entry(key="ratio", write=lambda ratio: sp.sstr(ratio, order="lex"), kind=str | None),

@@ -243,7 +243,8 @@ class UserKernel:
     def __init__(
         self, head: _KernelProperties, restore: Callable[[], Kernel], arguments: str | None = None
     ) -> None:
-        self.head, self.arguments = head, arguments
+        self.head: _KernelProperties = head
+        self.arguments: str | None = arguments
         self._restore = restore
         self._kernel: Kernel | None = None
 

@@ -35,7 +35,7 @@ class Kinematics:
         Source of the equation.
     state, transition, next : Signal
         The state, the transition over one step, and the state after it.
-    identity : Matrix
+    identity : ImmutableMatrix
         The state of zero rotation.
     scale : Rational
         Factor of the body rate in the generator.
@@ -63,7 +63,7 @@ class Kinematics:
     state: Signal
     transition: Signal
     next: Signal
-    identity: sp.Matrix
+    identity: sp.ImmutableMatrix
     scale: sp.Rational
     derivative: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
     product: Callable[[sp.Matrix, sp.Matrix], sp.Matrix]
@@ -119,7 +119,7 @@ DCM = Kinematics(
         constraint="rotation",
         frame="b to n",
     ),
-    identity=sp.eye(3),
+    identity=sp.ImmutableMatrix.eye(3),
     scale=sp.Integer(1),
     derivative=lambda C, g: C * algebra.skew(g),
     product=lambda C, A: C * A,
@@ -154,7 +154,7 @@ EULER = Kinematics(
         constraint="unit",
         frame="b to n",
     ),
-    identity=sp.Matrix([0, 0, 0, 1]),
+    identity=sp.ImmutableMatrix([0, 0, 0, 1]),
     scale=sp.Rational(1, 2),
     derivative=lambda e, g: algebra.quaternion_product(e, sp.Matrix([*g, 0])),
     product=algebra.quaternion_product,
@@ -189,7 +189,7 @@ CAYLEY_KLEIN = Kinematics(
         constraint="unit",
         frame="b to n",
     ),
-    identity=sp.Matrix([1, 0, 0, 0]),
+    identity=sp.ImmutableMatrix([1, 0, 0, 0]),
     scale=sp.Rational(1, 2),
     derivative=cayley_klein_derivative,
     product=cayley_klein_product,

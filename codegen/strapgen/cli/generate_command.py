@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -225,7 +225,8 @@ def generate(
     groups = [sources.files if output.with_runs else sources.step_files for _, sources in results]
     if output.project:
         groups = [
-            files | _project_files(task, output) for (task, _), files in zip(results, groups, strict=True)
+            {**files, **_project_files(task, output)}
+            for (task, _), files in zip(results, groups, strict=True)
         ]
     files = output.chosen(_together(groups))
     groups = [{name: text for name, text in group.items() if name in files} for group in groups]
@@ -249,7 +250,7 @@ def generate(
     show(GenerateResult(generated, said), format)
 
 
-def _together(groups: list[dict[str, str]]) -> dict[str, str]:
+def _together(groups: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """Return the files of all targets, which go into one folder."""
     files: dict[str, str] = {}
     for group in groups:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from strapgen.ir.formats import above, places_above
 from strapgen.ir.interfaces import Interface, RoundingBounds
@@ -134,7 +134,7 @@ class GeneratedSources:
 class GenerateResult(Result):
     """The code of a kernel, for one target or several."""
 
-    each = GeneratedSources
+    each: ClassVar[type | None] = GeneratedSources
 
     generated: Sequence[GeneratedSources]
     said: str = ""

@@ -113,19 +113,20 @@ class Output:
         text = result.written(self.format or "text")
         self.deliver(text, None if self.plot is None else plot(result, self.plot))
 
-    def deliver(self, text: str, image: bytes | None = None) -> None:
+    def deliver(self, content: str | bytes, image: bytes | None = None) -> None:
         """Print the text, or write it and the image into their files, all or none; stderr names those written."""
         from strapgen.storage.files import write_files
 
-        text = text.rstrip("\n")
         files: dict[str, str | bytes] = {}
+        if isinstance(content, str):
+            content = f"{content.rstrip(chr(10))}\n"
         if self.file is not None:
-            files[str(self.file)] = f"{text}\n"
+            files[str(self.file)] = content
         if self.plot is not None and image is not None:
             files[str(self.plot)] = image
         written = write_files(Path(), files)
-        if self.file is None:
-            terminal.write(text)
+        if self.file is None and isinstance(content, str):
+            terminal.write(content.rstrip("\n"))
         if written:
             terminal.remark(f"wrote {' and '.join(map(str, written))}")
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from strapgen.lab.motions.motions import Motion
 from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.parallel_cases import Bundle, Cluster, moved, resume, side_by_side
 from strapgen.lab.runs import measured_drift
-from strapgen.results.records import INTERNAL, entry, plain_record, properties, reader_table
+from strapgen.results.records import INTERNAL, Properties, entry, plain_record, properties, reader_table
 from strapgen.results.result import Result
 from strapgen.results.table import ANGLE, Column, TextTable
 from strapgen.storage import cache as disk_cache
@@ -339,8 +339,8 @@ class AlgorithmCost:
 class FrontierResult(Result):
     """Operations of attitude algorithms, and their drift on every motion."""
 
-    computed = properties(motions=entry(), algorithms=entry())
-    drawn_by = "strapgen.design.design_plots:frontier_image"
+    computed: ClassVar[Properties] = properties(motions=entry(), algorithms=entry())
+    drawn_by: ClassVar[str] = "strapgen.design.design_plots:frontier_image"
 
     drifts_and_costs: Sequence[DriftAndCost] = field(metadata=INTERNAL)
     #: Sampling rate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from strapgen.catalogue.methods.window import Window
 from strapgen.design.family import number
@@ -79,7 +79,7 @@ class NamedSide:
 class WindowResult(Result):
     """The filters of a window with their errors and gains; taps are exact, as text, the oldest first."""
 
-    drawn_by = "strapgen.design.design_plots:window_image"
+    drawn_by: ClassVar[str] = "strapgen.design.design_plots:window_image"
 
     window: Window = field(metadata=INTERNAL)
     name: str

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from strapgen.evidence.collection import Verdict
 from strapgen.results.records import reader_table
@@ -33,7 +34,7 @@ _RESULTS = ("proved", "agrees", "fails", "not examined", "not installed")
 class EvidenceResult(Result):
     """Verdicts of external tools on generated code: a row for each claim, kernel and tool."""
 
-    row = Verdict
+    row: ClassVar[type | None] = Verdict
 
     verdicts: Sequence[Verdict]
 

@@ -25,6 +25,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.navigation.systems import system_command as system
 from strapgen.navigation.two_speed import two_speed_command as two_speed
 from strapgen.run.standard_tree import command_of, text_of
+from strapgen.stamped import stamped_command
 from strapgen.storage import streams
 
 if TYPE_CHECKING:
@@ -43,12 +44,14 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "generate": generate_command.generate,
     "two-speed": two_speed.two_speed,
     "window generate": window_command.generate,
+    "stamped": stamped_command.stamped_grid,
     "system": system.system,
 }
 #: Parameters of these commands that say what is generated. All others write, print or ask for files beside it.
 _VALUES = {
     *("algorithm", "file", "window", "target", "targets"),
     *("sculling", "sample_hz", "cpu", "name", "prefix", "variant"),
+    *("tick_hz", "stamp_bits", "pairs"),
     *(field.name for group in (MethodOptions, FixedOptions) for field in fields(group)),
 }
 
@@ -90,6 +93,11 @@ class HeaderCommand:
                 values["sample_hz"],
                 values["fixed"],
                 values["output"].name,
+            )
+        if self.name == "stamped":
+            stated = ("sample_hz", "tick_hz", "stamp_bits", "pairs", "target", "fixed")
+            return stamped_command.generated(
+                **{key: values[key] for key in stated}, name=values["output"].name
             )
         return self.system(algorithms)[1]
 
@@ -143,7 +151,7 @@ def _values(name: str, words: list[str], text: str) -> dict[str, Any]:
     known = {
         spelling: one for key, one in options.options.items() if key in _VALUES for spelling in one.spellings
     }
-    (argument,) = (one for one in options.options.values() if one.is_argument)
+    argument = next((one for one in options.options.values() if one.is_argument), None)
     stated: dict[str, list[str]] = {}
     rest = iter(words)
     for word in rest:
@@ -158,7 +166,7 @@ def _values(name: str, words: list[str], text: str) -> dict[str, Any]:
             if not value or (not equals and value.startswith("--")):
                 raise InputError(f"{spelling} has no value in the header's command: {text}")
         stated.setdefault(option.parameter.name, []).append(value)
-    if argument.parameter.name not in stated:
+    if argument is not None and argument.parameter.name not in stated:
         raise InputError(f"the header's command names nothing to generate: {text}")
     given = {key: _value(options.options[key], values, text) for key, values in stated.items()}
     if name == "window generate":
@@ -220,7 +228,7 @@ def runner_of_file(
     of_kind = {"system": _of_system, "two-speed": _of_loops}
     if command.name not in of_kind:
         raise InputError(
-            f"{file} is a commit-late unit; one of a described system or of two speeds is needed"
+            f"{file} comes from strapgen {command.name}; that of a described system or of two speeds is needed"
         )
     return of_kind[command.name](header, command, description, algorithms, run_differing)
 

@@ -36,5 +36,5 @@ REGISTRATION = Registration(
         "navigation.source-files": f"{__package__}.header_command:runner_of_file",
         "two-speed.project": f"{__package__}:two_speed_project",
     },
-    requires=("lab", "navigation", "design"),
+    requires=("lab", "navigation", "design", "stamped"),
 )

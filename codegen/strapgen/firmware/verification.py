@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
@@ -24,7 +24,7 @@ from strapgen.ir.fixed_settings import ROTATION_INPUTS
 from strapgen.ir.formats import float_above, places_above
 from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.sources import Sources
-from strapgen.results.records import entry, properties
+from strapgen.results.records import Properties, entry, properties
 from strapgen.results.result import Result
 from strapgen.run.backends import Backend
 from strapgen.run.compiled_code import CEvaluator, ModelEvaluator
@@ -38,7 +38,7 @@ Array = NDArray[Any]
 #: Calls on corners and random input, and steps of the run.
 CALLS, STEPS = 300, 300
 #: What the commands begin with that generate several functions and a whole that calls them.
-_COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ")
+_COMMANDS = ("strapgen system ", "strapgen two-speed ", "strapgen window generate ", "strapgen stamped ")
 _VERSION = re.compile(r'_VERSION "(.*)"')
 
 
@@ -46,7 +46,7 @@ _VERSION = re.compile(r'_VERSION "(.*)"')
 class Verification(Result):
     """The outcome of verifying a generated file."""
 
-    computed = properties(in_step=entry(), holds=entry())
+    computed: ClassVar[Properties] = properties(in_step=entry(), holds=entry())
 
     file: Path
     #: What differs from the file that its command generates, a line of text each; empty if nothing does
@@ -95,9 +95,9 @@ class Verification(Result):
 
 @dataclass(frozen=True)
 class WholeVerification(Result):
-    """The outcome of verifying the files of a described system, of two speeds or of a commit-late unit."""
+    """The outcome of verifying the files of several functions and a whole that calls them."""
 
-    computed = properties(holds=entry())
+    computed: ClassVar[Properties] = properties(holds=entry())
 
     #: Header of the whole
     header: Path
@@ -147,8 +147,8 @@ def whole_header(place: Path) -> Path | None:
     if len(headers) != 1:
         names = ", ".join(path.name for path in headers) or "none"
         raise InputError(
-            f"{place} holds {names} of the headers of a system, of two speeds or of a commit-late unit; a folder with "
-            "one is needed"
+            f"{place} holds {names} of the headers of a system, of two speeds, of a commit-late unit or of stamped "
+            "samples; a folder with one is needed"
         )
     return headers[0]
 

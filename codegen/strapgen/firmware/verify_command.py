@@ -45,8 +45,8 @@ def verify(
     in fixed point it must return the integers of the model, and stay within the certified bound of arithmetic with 40
     digits. The run is a cone, or the motion or recording that the options state. The exit status is 1 on failure.
 
-    FILE may be the folder, or the main header, of a described system, an algorithm in two speeds or a commit-late unit:
-    all files are then compared, and every stage is called.
+    FILE may be the folder, or the main header, of a described system, an algorithm in two speeds, a commit-late unit or
+    of stamped samples: all files are then compared, and every stage is called.
 
     Example: strapgen verify generated/c_fixed/euler_rk4_2_w32.c
     """
@@ -72,7 +72,7 @@ def verify(
 
 
 def _verify_whole(header: Path, algorithms: tuple[str, ...], run_differing: bool, output: Output) -> None:
-    """Verify the C of a system, of two speeds or of a commit-late unit; exit with 1 if it fails."""
+    """Verify the C of several functions and a whole that calls them; exit with 1 if it fails."""
     from strapgen.cli.progress import waiting
     from strapgen.firmware import header_command
     from strapgen.firmware.verification import verify_whole

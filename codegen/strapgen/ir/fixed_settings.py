@@ -14,6 +14,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.formats import MULTIPLICATIONS, SHORTEST_WORD, Format, check_rounding, check_word
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.units import DEFAULT_BITS, Sensor
 
 #: Rounding errors that are fed back from step to step.
@@ -92,7 +93,7 @@ class _WholeStep(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(ReadOnly):
     """The conditions that fixed-point code must meet: word, ranges, rounding.
 
     Parameters
@@ -191,6 +192,7 @@ class Settings:
                 raise InputError(f"range of {name} is {float(largest):g}; a number above 0 is needed")
         for text in self.formats.values():
             Format.parse(text, self.word)
+        super().__post_init__()
 
     def _check_inputs(self) -> None:
         """Check the bits of an increment, and fill in the default for a gyro with counts."""

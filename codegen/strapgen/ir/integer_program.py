@@ -6,7 +6,7 @@ Nothing here knows C or Python text; targets print it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any, TypeVar
@@ -16,6 +16,7 @@ from strapgen.ir.interfaces import ErrorFeedback, Interface
 from strapgen.ir.kernel_info import KernelInfo
 from strapgen.ir.notebook_display import notebook_html, short_repr
 from strapgen.ir.program import Program
+from strapgen.ir.read_only import ReadOnly
 
 T = TypeVar("T")
 
@@ -148,7 +149,7 @@ def _sum_counts(total: IntegerSum, rounding: str) -> dict[str, int]:
 
 
 @dataclass(frozen=True)
-class FixedProgram:
+class FixedProgram(ReadOnly):
     """Straight-line code on integers for one kernel.
 
     Parameters
@@ -158,7 +159,7 @@ class FixedProgram:
     interface : Interface
     body : tuple of Value
         The code.
-    operations : dict of str to int
+    operations : mapping of str to int
         Integer operations of one call.
 
     Examples
@@ -172,7 +173,7 @@ class FixedProgram:
     program: Program
     interface: Interface
     body: tuple[Value, ...]
-    operations: dict[str, int]
+    operations: Mapping[str, int]
 
     __repr__ = short_repr
     _repr_html_ = notebook_html

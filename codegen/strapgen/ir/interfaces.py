@@ -14,6 +14,7 @@ from typing import Any
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format, above, float_above, float_below
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.signals import Signal
 from strapgen.ir.units import Sensor
 
@@ -250,7 +251,7 @@ class StepRounding:
 
 
 @dataclass(frozen=True)
-class RoundingBounds:
+class RoundingBounds(ReadOnly):
     """Bounds of the distance of generated code from exact arithmetic on the same inputs.
 
     They hold in arithmetic of IEEE 754 with rounding to the nearest and with subnormal numbers, where every operation

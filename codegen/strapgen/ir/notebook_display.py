@@ -14,6 +14,8 @@ from dataclasses import MISSING, fields, is_dataclass
 from fractions import Fraction
 from typing import Any
 
+from strapgen.ir.read_only import ReadOnly, read_only
+
 #: Most lines of a `repr`, and most characters of a line.
 LINES, WIDTH = 5, 100
 #: Most lines of a table of names.
@@ -82,23 +84,10 @@ def to_pandas(value: Any) -> Any:
     return _display(value, "frames").pandas_frame(value)
 
 
-def hold_arrays(value: Any) -> None:
-    """Hold views of a dataclass's arrays that cannot be written; the arrays that it was made of stay as they are."""
-    for field in fields(value):
-        array = getattr(value, field.name)
-        if hasattr(array, "setflags"):
-            view = array.view()
-            view.setflags(write=False)
-            object.__setattr__(value, field.name, view)
-
-
-class Records:
-    """Records along a time, whose arrays cannot be written: a plot, and the forms of other libraries."""
+class Records(ReadOnly):
+    """Records along a time, which cannot be written: a plot, and the forms of other libraries."""
 
     __slots__ = ()
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     def plot(self, path: Any = None, title: str = "") -> Any:
         """Return a plot of the records against time as a figure of matplotlib, or write it to a file."""
@@ -137,6 +126,7 @@ def _stated(value: Any) -> list[tuple[str, Any]]:
     for field in fields(value):
         content = getattr(value, field.name)
         default = field.default_factory() if field.default_factory is not MISSING else field.default
+        default = read_only(default) if isinstance(value, ReadOnly) else default
         if field.repr and (
             default is MISSING or type(content) is not type(default) or _differs(content, default)
         ):

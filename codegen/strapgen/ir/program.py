@@ -16,6 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar, overload
 
 from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import notebook_html, short_repr
+from strapgen.ir.read_only import ReadOnlyDict
 from strapgen.ir.renamed import renamed
 from strapgen.ir.signals import Signal
 
@@ -127,7 +128,7 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 #: The key of `Program.operations` under which an operation is counted.
-COUNTED_AS = {
+COUNTED_AS: Mapping[str, str | None] = {
     **{kind: kind for kind in ("add", "multiply", "divide", "sqrt", "negate", "select")},
     **{"subtract": "add", "maximum": "select"},
     "at_least": None,  # counted with its select
@@ -281,7 +282,7 @@ class Program:
         return self.outputs if self.transition is None else (*self.outputs, self.transition)
 
     @once
-    def operations(self) -> dict[str, int]:
+    def operations(self) -> Mapping[str, int]:
         """Count of operations by kind; subtractions count as additions.
 
         "select" counts choices between two values, "function" counts sin, cos, sin(x)/x, atan2 and "wrap".
@@ -292,7 +293,7 @@ class Program:
                 key = COUNTED_AS[node.kind] if isinstance(node, Operation) else None
                 if key:
                     counts[key] += 1
-        return counts
+        return ReadOnlyDict(counts)
 
     @once
     def temporaries(self) -> int:

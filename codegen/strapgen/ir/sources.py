@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Self
 
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputTypeError
 from strapgen.ir.interfaces import Interface, RoundingBounds
 from strapgen.ir.kernel_info import AttitudeStep, KernelInfo, Recursion
 from strapgen.ir.notebook_display import notebook_html, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import renamed
 from strapgen.ir.signals import Signal
 
@@ -28,7 +32,7 @@ class Function:
 
 @renamed(companions="attitude_step", own="bundled_programs")
 @dataclass(frozen=True)
-class Sources:
+class Sources(ReadOnly):
     """Generated source text and its interface.
 
     Parameters
@@ -37,11 +41,11 @@ class Sources:
         What is said of the kernel.
     target : str
         Name of the target.
-    files : dict of str to str
+    files : mapping of str to str
         Text by file name.
     function : Function
         The generated function.
-    operations : dict of str to int
+    operations : mapping of str to int
         Operations of one call, see `Program.operations`.
     temporaries : int
         Intermediate values of one call.
@@ -64,9 +68,9 @@ class Sources:
 
     info: KernelInfo
     target: str
-    files: dict[str, str]
+    files: Mapping[str, str]
     function: Function
-    operations: dict[str, int]
+    operations: Mapping[str, int]
     temporaries: int
     fixed: Interface | None = None
     bundled_programs: tuple[Program, ...] = ()
@@ -82,11 +86,16 @@ class Sources:
         program: Program | FixedProgram,
         target: str,
         function: str,
-        files: dict[str, str],
+        files: Mapping[str, str],
         /,
         **rest: Any,
     ) -> Self:
         """Return the files of a target as sources, whose function has this name; `rest` are further fields."""
+        checks.text("function of Sources.of", function)
+        if not isinstance(files, Mapping):
+            raise InputTypeError(
+                f"files of Sources.of is {checks.describe(files)}; texts by file name are needed"
+            )
         from strapgen.ir.integer_program import FixedProgram  # sources from the cache are there without it
 
         code = program.program if isinstance(program, FixedProgram) else program

@@ -79,7 +79,7 @@ def evaluate_stages(
 
 
 @renamed(**_RENAMED)
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Kernel(KernelInfo):
     """An algorithm as exact expressions. Its `KernelInfo` is the words and names that every stage passes on.
 
@@ -121,7 +121,6 @@ class Kernel(KernelInfo):
     previous: int = 0
     ahead: int = 0
 
-    __repr__ = short_repr
     _repr_latex_ = notebook_latex
 
     def _in_words(self) -> str:

@@ -21,6 +21,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import CompilerError, InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import notebook_html, short_repr, to_pandas
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import warn
 from strapgen.lab.cost import code_size
 from strapgen.lab.motions.motions import motion
@@ -46,7 +47,7 @@ _SMALL_ANGLE = 1 / 32
 
 
 @dataclass(frozen=True)
-class AngleHistory:
+class AngleHistory(ReadOnly):
     """The angle of a back end from the reference along a run."""
 
     #: (1 + N,): the angle after every step in rad, the first one before the run
@@ -61,7 +62,7 @@ def _in_words(operations: Mapping[str, int]) -> str:
 
 
 @dataclass(frozen=True)
-class Comparison(Record):
+class Comparison(ReadOnly, Record):
     """A back end beside a reference.
 
     Parameters
@@ -80,7 +81,7 @@ class Comparison(Record):
         Time of a step in nanoseconds, in a run that records all states.
     bytes : int or None
         Size of code and constants in object code; None for Python.
-    operations : dict of str to int
+    operations : mapping of str to int
         Number of operations of a step by kind.
     history : AngleHistory, optional
         The angle along the run, for a plot; no part of the JSON data.
@@ -101,7 +102,7 @@ class Comparison(Record):
     drift_deg: float = field(metadata=entry("drift", ".4g"))
     ns_per_step: float = field(metadata=entry("ns/step", ".1f"))
     bytes: int | None = field(metadata=entry("bytes"))
-    operations: dict[str, int] = field(metadata=entry("operations", align="<", cell=_in_words, split=True))
+    operations: Mapping[str, int] = field(metadata=entry("operations", align="<", cell=_in_words, split=True))
     history: AngleHistory | None = field(default=None, repr=False, compare=False, metadata=INTERNAL)
     kernel: str = field(default="", metadata=entry("kernel", align="<"))
 

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -52,8 +52,8 @@ class ComparedKernel:
 class ComparisonResult(Result):
     """Back ends beside a reference: a row for each back end and kernel."""
 
-    row = Comparison
-    drawn_by = "strapgen.lab.comparison_report:comparison_image"
+    row: ClassVar[type | None] = Comparison
+    drawn_by: ClassVar[str] = "strapgen.lab.comparison_report:comparison_image"
 
     kernels: Sequence[ComparedKernel]
     #: Back end with which the others are compared

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -36,8 +36,8 @@ _MOST_COLUMNS = 4
 class ConvergenceResult(Result):
     """Errors on a ladder of steps, with observed and predicted orders: a row for each algorithm and back end."""
 
-    row = Convergence
-    drawn_by = "strapgen.lab.convergence_report:convergence_image"
+    row: ClassVar[type | None] = Convergence
+    drawn_by: ClassVar[str] = "strapgen.lab.convergence_report:convergence_image"
 
     outcomes: Sequence[Convergence]
     #: The runs in words

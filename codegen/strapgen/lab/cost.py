@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import ClassVar
 
 from strapgen import catalogue, fixedpoint, pipeline
 from strapgen.catalogue import Choice
@@ -18,6 +19,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.lab.processors import PROCESSORS, executed, run_tool, version
@@ -207,11 +209,11 @@ def _values(signal: Signal, largest: float) -> list[float]:
 
 
 @dataclass(frozen=True)
-class CostResult(Result):
+class CostResult(ReadOnly, Result):
     """Size and execution of kernels on microcontrollers: a row for each kernel and processor."""
 
     rows_in = "costs"
-    row = Cost
+    row: ClassVar[type | None] = Cost
 
     costs: Sequence[Cost]
     #: Whether they are all of the standard catalogue, which is a page in Markdown

@@ -17,6 +17,11 @@ REGISTRATION = Registration(
             "Run",
             summary="Compare back ends on the same increments with a reference",
         ),
+        "log": Command(
+            f"{__package__}.log_command:log",
+            "Run",
+            summary="Show what a log holds, and the command that runs it",
+        ),
         "converge": Command(
             f"{__package__}.converge_command:converge",
             "Analyse",
@@ -40,7 +45,9 @@ REGISTRATION = Registration(
     results={
         "run": f"{__package__}.runs_report:RunResult",
         "attitude": f"{__package__}.runs_report:HistoryResult",
+        "log": f"{__package__}.recordings.log_report:LogResult",
         "comparison": f"{__package__}.comparison_report:ComparisonResult",
+        "spread": f"{__package__}.attitude_spread:SpreadResult",
         "convergence": f"{__package__}.convergence_report:ConvergenceResult",
         "word-length": f"{__package__}.word_length_report:WordLengthResult",
         "cost": f"{__package__}.cost:CostResult",
@@ -49,4 +56,5 @@ REGISTRATION = Registration(
     },
     extensions={"cli.processors": f"{__package__}.processors:PROCESSORS"},
     lists={"motions": f"{__package__}.motions.motions:titles"},
+    requires=("stamped",),
 )

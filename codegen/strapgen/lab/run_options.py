@@ -18,12 +18,15 @@ from strapgen.cli.values import Number, Positive, Vector, line, names, whole
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.motions.motion_names import is_file
+from strapgen.lab.recordings.attitude_names import TRAJECTORIES
+from strapgen.lab.recordings.log_topic import split_topic
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from strapgen.lab.motions.motions import Motion
     from strapgen.lab.parallel_cases import Cluster
+    from strapgen.lab.recordings.reading import Reading
     from strapgen.lab.recordings.recording import Recording
     from strapgen.lab.sensor_errors.instruments import InstrumentErrors
 
@@ -123,7 +126,7 @@ class RecordingOptions:
     rules: ClassVar[tuple[Rule, ...]] = (
         Needs(
             "--input --columns --time-unit --rate-unit --force-unit --sample-hz --axes --start --end --every --gaps "
-            "--repair --resample-hz",
+            "--repair --grid --resample-hz",
             "--recording --rates-csv --increments-csv",
         ),
     )
@@ -212,6 +215,14 @@ class RecordingOptions:
             read=whole(1),
         ),
     ] = None
+    grid: Annotated[
+        bool,
+        option(
+            "--grid",
+            help="The times are the instants of the samples: take these to an even grid by filters.  [default: samples "
+            "are even]",
+        ),
+    ] = False
     gaps: Annotated[
         _Text,
         option(
@@ -254,21 +265,17 @@ class RecordingOptions:
     @property
     def place(self) -> tuple[Path, str]:
         """The file and the topic."""
-        path = Path(self.source)
-        name, colon, topic = self.source.rpartition(":")
-        return (Path(name), topic) if colon and not path.exists() and Path(name).exists() else (path, "")
+        return split_topic(self.source)
 
     @property
     def file(self) -> Path:
         """The file of recorded data."""
         return self.place[0]
 
-    def load(self, *, force: bool = False) -> Recording:
-        """Read the recorded data."""
-        from strapgen.lab.recordings import recording
+    def reading(self, *, force: bool = False) -> Reading:
+        """Return how the recorded data are read."""
         from strapgen.lab.recordings.reading import Reading
 
-        file, topic = self.place
         of_old = (
             "increments"
             if self.increments_csv is not None
@@ -278,7 +285,7 @@ class RecordingOptions:
         )
         if self.resample_hz is not None and self.every is not None:
             raise InputError("--every and --resample-hz are both given; one is needed")
-        reading = Reading(
+        return Reading(
             self.input or of_old,
             None if self.columns is None else ",".join(self.columns),
             *(
@@ -290,8 +297,15 @@ class RecordingOptions:
                 self.start,
                 self.end,
             ),
-            *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz),
+            *(self.every or 1, self.gaps or "refuse", self.repair or (), force, self.resample_hz, self.grid),
         )
+
+    def load(self, *, force: bool = False) -> Recording:
+        """Read the recorded data."""
+        from strapgen.lab.recordings import recording
+
+        file, topic = self.place
+        reading = self.reading(force=force)
         with waiting(f"reading {file.name}"):
             return recording.recorded(file, topic, reading)
 
@@ -545,9 +559,13 @@ class RunOutput(Output):
         Needs("--matrices", "--format=json"),
         Excludes("--print", "--format=json|csv|markdown|latex"),
     )
+    formats: ClassVar[tuple[str, ...]] = (*Output.formats, *TRAJECTORIES, "parquet")
 
     plot: Annotated[Path | None, plot_option("the plots")] = None
-    format: Annotated[_Text, format_option(Output.formats, "  [default: text; csv for recorded data]")] = None
+    format: Annotated[
+        _Text,
+        format_option(formats, "  [default: text; for recorded data csv, or parquet by the file's name]"),
+    ] = None
     title: Annotated[
         _Text, option("--title", metavar="TEXT", help="Title of the text, and of the plots.", read=line)
     ] = None
@@ -562,6 +580,12 @@ class RunOutput(Output):
     matrices: Annotated[
         bool, option("--matrices", help="Add the computed and the true matrices to the JSON output.")
     ] = False
+
+    def check(self, *read: str | Path | None) -> None:
+        """Check what `Output` checks, and that a file without text is none for the terminal."""
+        super().check(*read)
+        if self.format == "parquet" and self.file is None:
+            raise InputError("--format parquet is no text; --out FILE is needed")
 
 
 @dataclass(frozen=True)

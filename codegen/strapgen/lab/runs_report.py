@@ -6,16 +6,17 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from strapgen.lab.recordings.attitude_output import (
-    TRAJECTORIES,
     AttitudeForm,
     attitude_of,
+    kitti,
     parquet,
     roll_pitch_heading,
+    tum,
 )
 from strapgen.lab.recordings.quaternions import inverse, product, rotation_vectors
 from strapgen.lab.recordings.recording import History
@@ -107,6 +108,12 @@ class RunSettings:
     specific_force_m_s2: tuple[float, ...] | None = field(metadata=entry(optional=True))
     #: File of the sensor errors
     errors: str | None = field(metadata=entry(optional=True))
+    #: Rate that is taken off a recording, about x, y, z
+    bias_deg_s: tuple[float, ...] | None = field(metadata=entry(optional=True))
+    #: Standard deviation of that of a rest
+    bias_uncertainty_deg_s: tuple[float, ...] | None = field(metadata=entry(optional=True))
+    #: Latitude at which the Earth's rate is taken off
+    latitude_deg: float | None = field(metadata=entry(optional=True))
 
 
 @dataclass(frozen=True)
@@ -151,7 +158,7 @@ class RunMatrices:
 class RunResult(Result):
     """The nine errors of a run on a motion at its records."""
 
-    drawn_by = "strapgen.lab.runs_report:run_image"
+    drawn_by: ClassVar[str] = "strapgen.lab.runs_report:run_image"
     indented = False
 
     settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))
@@ -273,15 +280,22 @@ def history_table(
 ) -> TextTable:
     """Return an attitude history as a table; an error that is not known is an empty cell."""
     columns = history_columns(history, form, error)
-    rows = [list(row) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
-    if error is not None:
-        rows = [[None if math.isnan(value) else value for value in row] for row in rows]
-    return table_of(columns, rows)
+    return table_of([*columns], _rows_of(columns))
+
+
+def _rows_of(columns: dict[str, Any]) -> list[list[Any]]:
+    """Return columns as rows, None for what is no number."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [[None if value != value else value for value in row] for row in rows]
 
 
 def settings_text(settings: dict[str, Any]) -> str:
     """Return settings that have values as text."""
-    return ", ".join(f"{key} {value}" for key, value in settings.items() if value is not None)
+    stated = {key: value for key, value in settings.items() if value is not None}
+    return ", ".join(
+        f"{key} {' '.join(f'{x:g}' for x in value) if isinstance(value, list) else value}"
+        for key, value in stated.items()
+    )
 
 
 @dataclass(frozen=True)
@@ -353,7 +367,7 @@ class ErrorRecords:
 class HistoryResult(Result):
     """The attitude along a recording."""
 
-    drawn_by = "strapgen.lab.runs_report:history_image"
+    drawn_by: ClassVar[str] = "strapgen.lab.runs_report:history_image"
     indented = False
     computed = properties(records=entry(spread=True, kind=AttitudeRecords))
 
@@ -387,7 +401,8 @@ class HistoryResult(Result):
 
     def written(self, format: str) -> str:
         """Return the attitude in a format of `Result`, or as a trajectory: "tum" or "kitti"."""
-        return TRAJECTORIES[format](self.history) if format in TRAJECTORIES else super().written(format)
+        trajectories = {"tum": tum, "kitti": kitti}
+        return trajectories[format](self.history) if format in trajectories else super().written(format)
 
     def parquet(self) -> bytes:
         """Return the attitude at each time as a Parquet file."""
@@ -401,8 +416,7 @@ class HistoryResult(Result):
         }
         heads = [TIME_COLUMN, *(Column(name, spec=".9f", least=12, gap=1) for name in [*columns][1:])]
         title = {} if self.title is None else {"title": self.title}
-        rows = np.column_stack([*columns.values()]).tolist()
-        lines = [settings_text(title | {**self.settings}), "", *TextTable(heads, rows).lines()]
+        lines = [settings_text(title | {**self.settings}), "", *TextTable(heads, _rows_of(columns)).lines()]
         if len(shown) < len(history.time):
             lines.append(f"({len(shown)} of {len(history.time)} records; --format csv prints all)")
         if history.unused:

@@ -6,7 +6,7 @@ import math
 import pathlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,7 +222,7 @@ class SensorErrorRow:
 class SensorErrorResult(Result):
     """The errors of the attitude that sensors cause, over many runs and in closed form."""
 
-    drawn_by = f"{__name__}:sensor_image"
+    drawn_by: ClassVar[str] = f"{__name__}:sensor_image"
     indented = False
 
     #: The study, with what the errors are along the runs

@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
 
 from strapgen import registration
+from strapgen.cli import terminal
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
-from strapgen.cli.option_groups import Needs, Shown, grouped, rules
+from strapgen.cli.option_groups import Needs, Shown, grouped, rules, stated
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm
 from strapgen.cli.progress import say_unused
 from strapgen.cli.values import Positive, written
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
+from strapgen.lab.recordings.attitude_options import FormOptions, TruthOptions
 from strapgen.lab.run_options import ONE_SCALE, SOURCE_NEEDED, RunOptions, RunOutput, SampleSource, described
 
 if TYPE_CHECKING:
     from strapgen.catalogue import Choice
+    from strapgen.lab.recordings.attitude_output import AttitudeForm
+    from strapgen.lab.recordings.recording import History, Recording
+    from strapgen.lab.runs_report import HistoryResult
     from strapgen.run.backends import Backend
 
 
 @grouped
-@rules(SOURCE_NEEDED, Needs("--rates --matrices --print", "--motion"), ONE_SCALE)
+@rules(
+    SOURCE_NEEDED,
+    Needs("--rates --matrices --print", "--motion"),
+    Needs("@truth @form --format=tum|kitti|parquet", "--recording --increments-csv --rates-csv"),
+    ONE_SCALE,
+)
 def simulate(
     algorithm: RunAlgorithm,
     *,
@@ -31,6 +41,8 @@ def simulate(
     source: SampleSource,
     intervals: RunOptions,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
+    truth: TruthOptions,
+    form: FormOptions,
     output: RunOutput,
 ) -> None:
     """Run an algorithm on a motion, or on recorded gyro data.
@@ -58,9 +70,11 @@ def simulate(
     --out out/attitude.csv
     """
     if (others := described(algorithm)) is not None:
+        for name in [*stated(truth), *stated(form)]:
+            raise InputError(f"{name} is for attitude algorithms; {algorithm} is a described system")
         return others.simulate(algorithm, method, backend, source, intervals, fixed, output)
     choice = method.choose(algorithm)
-    output.check(algorithm, *method.files, *source.files)
+    output.check(algorithm, *method.files, *source.files, *truth.files)
     source.check()
     fixed.check_backend(backend)
 
@@ -75,7 +89,7 @@ def simulate(
         )
 
     with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
-        run = _on_recording if source.motion is None else _on_motion
+        run = _OnRecording(truth, form.form()) if source.motion is None else _on_motion
         run(build, choice, source, intervals, output)
 
 
@@ -145,39 +159,69 @@ def _on_motion(
     output.show(RunResult(facts, run, output.title, matrices, words, every, title))
 
 
-def _on_recording(
-    build: _Build, choice: Choice, source: SampleSource, intervals: RunOptions, output: RunOutput
-) -> None:
-    """Propagate recorded data, and deliver the attitude."""
-    from strapgen.cli.progress import waiting
-    from strapgen.lab.recordings import recording
-    from strapgen.lab.runs_report import HistoryResult, step_facts
+@dataclass(frozen=True)
+class _OnRecording:
+    """A run along recorded data: it is judged beside a true attitude, and written in a form."""
 
-    pulse = source.pulse
-    data = source.recorded()
-    start = intervals.start()
-    length = data.interval * choice.increments_per_step
-    _refuse_many(len(data.samples) / choice.increments_per_step, length, intervals.record)
-    backend = build(length, lambda: data.largest + (pulse or 0.0))
-    pulse = pulse or backend.count
-    with waiting(f"running {backend.kernel}"):
-        options = (intervals.orthonormalize, intervals.record, pulse)
+    truth: TruthOptions
+    form: AttitudeForm
+
+    def __call__(
+        self, build: _Build, choice: Choice, source: SampleSource, intervals: RunOptions, output: RunOutput
+    ) -> None:
+        """Propagate, and deliver the attitude."""
+        from strapgen.cli.progress import waiting
+        from strapgen.lab.recordings import recording
+        from strapgen.lab.recordings.attitude_options import Judge
+        from strapgen.lab.runs_report import HistoryResult, step_facts
+
+        pulse = source.pulse
+        data = source.recorded()
+        judge = Judge.of(self.truth, source, data, intervals.start())
+        data, bias, said = judge.taken_off(data)
+        length = data.interval * choice.increments_per_step
+        _refuse_many(len(data.samples) / choice.increments_per_step, length, intervals.record)
+        backend = build(length, lambda: data.largest + (pulse or 0.0))
+        pulse = pulse or backend.count
         whole = (
             one for one in registration.extensions("lab.whole-recordings") if one.covers(choice, backend.name)
         )
-        if (runner := next(whole, None)) is not None:
-            history = recording.along_pieces(
-                data, lambda piece: runner.propagate_whole(choice, backend.name, piece, *options, start)
-            )
-        else:
-            history = recording.propagate(backend, data, *options, start)
-    source.say_remarks(data)
-    say_unused(source.file, history.unused, choice.increments_per_step)
-    title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
-    facts = step_facts(backend, choice) | {"source": source.source} | source.facts
-    facts |= {} if intervals.initial is None else {"initial_deg": written(intervals.initial)}
-    replace(output, format=output.format or "csv").show(
-        HistoryResult(
-            facts, replace(history, elements=backend.elements, backend=backend), output.title, title
-        )
-    )
+        runner = next(whole, None)
+
+        def along(piece: Recording, record: Positive | None, start: Any) -> History:
+            options = (intervals.orthonormalize, record, pulse, start)
+            if runner is None:
+                return recording.propagate(backend, piece, *options)
+            found: History = runner.propagate_whole(choice, backend.name, piece, *options)
+            return replace(found, elements=backend.elements, backend=backend)
+
+        def run(piece: Recording) -> History:
+            start = judge.start(piece.start)
+            return along(judge.without_earth(piece, start, along), intervals.record, start)
+
+        with waiting(f"running {backend.kernel}"):
+            history = recording.along_pieces(data, run, backend.samples_per_step if runner is None else 1)
+        error = judge.error(history)
+        source.say_remarks(data)
+        for remark in [*judge.remarks, *said]:
+            terminal.remark(f"strapgen: {remark}")
+        say_unused(source.file, history.unused, choice.increments_per_step)
+        title = f"{backend.kernel}, {backend.name}: attitude along {source.file.name}"
+        facts = step_facts(backend, choice) | {"source": source.source} | source.facts
+        facts |= {} if intervals.initial is None else {"initial_deg": written(intervals.initial)}
+        facts |= bias | judge.facts
+        result = HistoryResult(facts, history, output.title, title, self.form, error)
+        deliver_history(result, output)
+
+
+def deliver_history(result: HistoryResult, output: RunOutput) -> None:
+    """Deliver the attitude along a recording; text has the error, beside other formats stderr has it."""
+    from strapgen.results.result import plot
+
+    suffix = "" if output.file is None else output.file.suffix
+    format = output.format or ("parquet" if suffix == ".parquet" else "csv")
+    for line in result.error.lines() if result.error is not None and format != "text" else ():
+        terminal.remark(f"strapgen: {line}")
+    content = result.parquet() if format == "parquet" else result.written(format)
+    output = replace(output, format=format)
+    output.deliver(content, None if output.plot is None else plot(result, output.plot))

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from strapgen.lab.motions.motions import Motion
 from strapgen.lab.motions.users_motions import any_motion
 from strapgen.lab.parallel_cases import Bundle, Cluster, moved, side_by_side
 from strapgen.lab.runs import attitude, drift_between
-from strapgen.results.records import Record, entry, properties
+from strapgen.results.records import Properties, Record, entry, properties
 from strapgen.run.backends import backend
 from strapgen.run.increments import pulses
 from strapgen.storage import cache
@@ -110,7 +110,7 @@ class Outcome(Record):
         independent; None without pulses. See `quantization_noise`.
     """
 
-    computed = properties(dominates=entry())
+    computed: ClassVar[Properties] = properties(dominates=entry())
 
     case: Case = field(metadata=entry(spread=True))
     drift_deg: float | None
@@ -324,12 +324,18 @@ def expected_noise(case: Case, pulse: float, samples: Any) -> float:
     return math.degrees(math.sqrt(noise.mean_square(pulse, float(turned), len(samples))))
 
 
-@lru_cache(maxsize=64)
-def noise_of(algorithm: str, method: str, increments: int) -> QuantizationNoise:
+def noise_of(
+    algorithm: AnyAlgorithm, method: str | None = None, increments: int | None = None
+) -> QuantizationNoise:
     """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
+    return _noise_of(choose_step(algorithm, method, increments))
+
+
+@lru_cache(maxsize=64)
+def _noise_of(choice: Choice) -> QuantizationNoise:
     from strapgen.lab.quantization_noise import quantization_noise
 
-    return quantization_noise(choose_step(algorithm, method, increments))
+    return quantization_noise(choice)
 
 
 def run(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from strapgen.lab.word_length import Outcome, noise_of
 from strapgen.results import figures
@@ -51,8 +51,8 @@ class WordLengthResult(Result):
     """Drift against word length, with its parts: a row for each run."""
 
     rows_in = "outcomes"
-    row = Outcome
-    drawn_by = "strapgen.lab.word_length_report:word_length_image"
+    row: ClassVar[type | None] = Outcome
+    drawn_by: ClassVar[str] = "strapgen.lab.word_length_report:word_length_image"
 
     outcomes: Sequence[Outcome]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from strapgen import pipeline
 from strapgen.catalogue import Choice
@@ -258,7 +258,7 @@ _CONCLUSION = (
 class FormResult(Result):
     """Operations and instructions of a navigator with each form of the attitude."""
 
-    drawn_by = f"{__name__}:attitude_form_image"
+    drawn_by: ClassVar[str] = f"{__name__}:attitude_form_image"
 
     rates: PartRates = field(metadata=INTERNAL)
     #: Processor on which instructions were counted

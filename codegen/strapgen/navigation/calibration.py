@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import sympy as sp
@@ -306,7 +306,7 @@ class CalibrationResult(Result):
     """Observability, deviations and estimates of the coefficients of an inertial measurement unit."""
 
     rows_in = "coefficients"
-    drawn_by = f"{__name__}:calibration_image"
+    drawn_by: ClassVar[str] = f"{__name__}:calibration_image"
 
     file: CalibrationFile = field(metadata=INTERNAL)
     several: Sequence[Calibration] = field(metadata=INTERNAL)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -249,7 +249,7 @@ class CourseRecords:
 class CourseResult(Result):
     """Attitude and velocity along an inertial recording."""
 
-    drawn_by = f"{__name__}:course_image"
+    drawn_by: ClassVar[str] = f"{__name__}:course_image"
     indented = False
 
     settings: Mapping[str, Any] = field(metadata=entry(spread=True, kind=RunSettings))

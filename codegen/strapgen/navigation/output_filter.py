@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -328,7 +329,7 @@ class KnownResponse:
 class FilterResult(Result):
     """The responses of an output's filter: analog, digital and measured."""
 
-    drawn_by = f"{__name__}:output_filter_image"
+    drawn_by: ClassVar[str] = f"{__name__}:output_filter_image"
 
     output_filter: OutputFilter = field(metadata=INTERNAL)
     #: Largest magnitude of a sample

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,8 +210,8 @@ class RateTableResult(Result):
     """The largest drift of the rate-table test: a row for each motion, algorithm and back end."""
 
     rows_in = "drifts"
-    row = Row
-    drawn_by = "strapgen.navigation.rate_table:rate_table_image"
+    row: ClassVar[type | None] = Row
+    drawn_by: ClassVar[str] = "strapgen.navigation.rate_table:rate_table_image"
 
     drifts: Sequence[Row]
     #: Duration of the test, and time between gyro samples, in s

@@ -11,14 +11,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapgen.ir.exceptions import InputError
 from strapgen.results import figures
-from strapgen.results.records import entry, properties
+from strapgen.results.records import Properties, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.run.backends import evaluator
@@ -282,8 +282,8 @@ class TorquingResult(Result):
     """The responses of a pulse torquing loop."""
 
     rows_in = "figures"
-    computed = properties(largest_pole=entry(), gains=entry())
-    drawn_by = f"{__name__}:torquing_image"
+    computed: ClassVar[Properties] = properties(largest_pole=entry(), gains=entry())
+    drawn_by: ClassVar[str] = f"{__name__}:torquing_image"
 
     loop: TorqueLoop
     figures: Sequence[TorquingRow] = field(metadata=entry(key="rows"))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -278,7 +278,7 @@ class TranslationResult(Result):
     """Velocity and position of several algorithms along a motion with a specific force."""
 
     rows_in = "algorithms"
-    drawn_by = f"{__name__}:translation_image"
+    drawn_by: ClassVar[str] = f"{__name__}:translation_image"
 
     #: The motion and the force in words
     described: str = field(metadata=INTERNAL)

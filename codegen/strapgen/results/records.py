@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from strapgen.results.table import Column, TextTable
 
@@ -93,7 +93,11 @@ def entry(
 INTERNAL = {_METADATA: Entry(internal=True)}
 
 
-def properties(**metadata: Mapping[str, Entry]) -> Mapping[str, Mapping[str, Entry]]:
+#: Properties that a record writes, with their metadata.
+Properties: TypeAlias = Mapping[str, Mapping[str, Entry]]
+
+
+def properties(**metadata: Mapping[str, Entry]) -> Properties:
     """Return the properties that a record writes, with their metadata."""
     return metadata
 
@@ -101,7 +105,7 @@ def properties(**metadata: Mapping[str, Entry]) -> Mapping[str, Mapping[str, Ent
 class Record:
     """A dataclass as plain data; `computed` has the metadata of the properties that are written after its fields."""
 
-    computed: ClassVar[Mapping[str, Mapping[str, Entry]]] = {}
+    computed: ClassVar[Properties] = {}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record as plain JSON data."""

@@ -18,6 +18,7 @@ from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
+from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed, renamed_parameters
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sources
@@ -127,25 +128,27 @@ class Backend:
         state, samples = sources.function.inputs
         self._parts = parts
         self.sources = sources
-        self.evaluator = of_sources(sources)
-        self.name = self.evaluator.name
-        self.kernel = sources.kernel
-        self.takes = samples.name
-        self.samples_per_step = samples.shape[0]
-        self.previous, self.ahead = kernels.previous, kernels.ahead
-        self.increments = self.samples_per_step - kernels.extra_increments
-        self.state_shape = state.shape
-        self.elements = state.elements
-        self.attitude = kernels.attitude
+        self.evaluator: Evaluator = of_sources(sources)
+        self.name: str = self.evaluator.name
+        self.kernel: str = sources.kernel
+        self.takes: str = samples.name
+        self.samples_per_step: int = samples.shape[0]
+        self.previous: int = kernels.previous
+        self.ahead: int = kernels.ahead
+        self.increments: int = self.samples_per_step - kernels.extra_increments
+        self.state_shape: tuple[int, ...] = state.shape
+        self.elements: tuple[str, ...] = state.elements
+        self.attitude: str | None = kernels.attitude
         self._orthonormalization = parts.orthonormalization or kernels.orthonormalize
         self._product = kernels.product if self.evaluator.needs_product else None
         self._beside: dict[str, Evaluator] = {}
-        self.dtype = self.evaluator.dtype
-        self.identity: Array = np.array([float(x) for x in kernels.identity], self.dtype).reshape(state.shape)
-        self.unit = float(np.finfo(self.dtype).eps)
+        self.dtype: np.dtype[Any] = self.evaluator.dtype
+        identity = np.array([float(x) for x in kernels.identity], self.dtype)
+        self.identity: Array = read_only(identity.reshape(state.shape))
+        self.unit: float = float(np.finfo(self.dtype).eps)
         self.increment_unit: float | None = None
         self.count: float | None = None
-        self.saturates = False
+        self.saturates: bool = False
         if sources.fixed is not None:
             self.interface = sources.fixed
             taken, result = sources.fixed.inputs[1], sources.fixed.outputs[0]

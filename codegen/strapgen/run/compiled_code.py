@@ -42,13 +42,14 @@ class CEvaluator(Evaluator):
         fixed = sources.fixed
         super().__init__(sources, real_type(sources.target))
         #: Types of the inputs, of all outputs and of error feedback in C.
-        self.input_types, self.word_type = [self.dtype] * len(self.function.inputs), self.dtype
-        self.feedback_type = self.dtype
+        self.input_types: list[np.dtype[Any]] = [self.dtype] * len(self.function.inputs)
+        self.word_type: np.dtype[Any] = self.dtype
+        self.feedback_type: np.dtype[Any] = self.dtype
         if fixed is not None:
             word = fixed.settings.word
             self.input_types = [np.dtype(f"int{argument.format.word}") for argument in fixed.inputs]
             self.word_type, self.feedback_type = np.dtype(f"int{word}"), np.dtype(f"uint{word}")
-        self.module = compiler.load(sources)
+        self.module: Any = compiler.load(sources)
         self._array = getattr(self.module.lib, f"{self.function.name}_array")
 
     @property

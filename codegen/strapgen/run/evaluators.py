@@ -17,7 +17,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import DEFAULT_ALLOWANCE
 from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.notebook_display import counted_shape, short_repr
-from strapgen.ir.sources import Sources
+from strapgen.ir.sources import Function, Sources
 
 Array = NDArray[Any]
 
@@ -77,9 +77,9 @@ class Evaluator(ABC):
 
     def __init__(self, sources: Sources, dtype: Any) -> None:
         self.sources = sources
-        self.kernel = sources.kernel
-        self.function = sources.function
-        self.dtype = np.dtype(dtype)
+        self.kernel: str = sources.kernel
+        self.function: Function = sources.function
+        self.dtype: np.dtype[Any] = np.dtype(dtype)
         #: Type of the numbers that `run` takes and returns: an object is one of mpmath.
         self.number: np.dtype[Any] = self.dtype
         if sources.fixed is not None:

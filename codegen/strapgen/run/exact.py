@@ -149,8 +149,8 @@ class ExactEvaluator(Evaluator):
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources, np.float64)
-        self.number = np.dtype(object)
-        self.digits = Interpreter(program_of(sources))
+        self.number: np.dtype[Any] = np.dtype(object)
+        self.digits: Interpreter = Interpreter(program_of(sources))
 
     def call(self, inputs: Sequence[Any], feedback: Any, where: str = "") -> tuple[Sequence[Any], Any]:
         """Interpret the program on each row, see `Evaluator.call`."""

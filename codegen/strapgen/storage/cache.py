@@ -308,7 +308,7 @@ _MOST_RESULTS = 512
 
 
 def cached(
-    kind: str, label: str, *, depends: Callable[..., str] = lambda *_: "", copies: bool = False
+    kind: str, label: str, *, depends: Callable[..., str] = lambda *_: ""
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return a decorator that caches the results of a stage, whose first argument is a choice.
 
@@ -317,8 +317,7 @@ def cached(
 
     `kind` is the folder of the entries in the cache, and `label` the format of the log's words for a result from the
     arguments, such as "program of {0.kernel}". `depends`, of the arguments behind the choice, refuses what does not go
-    together, and returns what else the result depends on. With `copies` each call gets its own copy, since what holds
-    the result can be changed.
+    together, and returns what else the result depends on. All calls share a result, which cannot be written.
     """
 
     def decorate(stage: Callable[P, R]) -> Callable[P, R]:
@@ -331,8 +330,7 @@ def cached(
             parts = [str(getattr(argument, "identity", argument)) for argument in bound.args]
             parts.append(depends(*bound.args[1:]))
             what = label.format(*bound.args)
-            data = _load(kind, parts, what, lambda: stage(*args, **kwargs), copies)
-            result: R = pickle.loads(data) if copies else data
+            result: R = _load(kind, parts, what, lambda: stage(*args, **kwargs))
             return result
 
         return recall
@@ -340,13 +338,12 @@ def cached(
     return decorate
 
 
-def _load(kind: str, parts: list[str], what: str, work: Callable[[], Any], as_bytes: bool) -> Any:
-    """Return a result, or its pickle, which a process checks and reads once; the log has every use."""
+def _load(kind: str, parts: list[str], what: str, work: Callable[[], Any]) -> Any:
+    """Return a result, which a process checks and reads once; the log has every use."""
     place = root(), kind, generator_digest(), *parts
     result = _results.pop(place, None)
     if result is None:
         result = stored(kind, parts, work, what)
-        result = pickle.dumps(result) if as_bytes else result
     else:
         from_cache(what)
     _results[place] = result  # the last one now

@@ -65,7 +65,8 @@ class CPrinter(Printer):
     """Prints nodes as C expressions of one floating-point type, for a file whose static names begin with `name`."""
 
     def __init__(self, real: Real, name: str = "") -> None:
-        self.real, self.name = real, name
+        self.real: Real = real
+        self.name: str = name
         if real is FLOAT:
             self.resolution = Fraction(1, 1 << 23)
 

@@ -12,10 +12,11 @@ import re
 import symtable
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, islice
 from typing import NamedTuple, TypeVar
 
-from strapgen.ir.exceptions import InputError
+from strapgen.ir import checks
+from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
 from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
 from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
@@ -47,16 +48,61 @@ _P = TypeVar("_P", Program, FixedProgram)
 
 #: A letter that no name has: admission lets letters of ASCII alone in.
 _MARK = "ж"
+#: Most names that are tried in place of one that is not free.
+_MOST_TRIED = 1000
 _IDENTIFIER = re.compile(rf"(?<![\w.])[A-Za-z_{_MARK}]\w*")
 
 
 @dataclass(frozen=True)
 class Language:
-    """The rules of a language for names."""
+    r"""The rules of a language for names, by which `strapgen.targets.names.printed` changes those that collide.
 
-    allows: Callable[[str], bool]  # tells whether an identifier can name a quantity
-    scopes: Callable[[Iterable[str]], list[set[str]]]  # returns the identifiers of each scope of some files
-    most: int | None = None  # characters of a value's name above which words in it are abbreviated
+    Parameters
+    ----------
+    allows : callable
+        ``allows(name)`` returns whether an identifier can name a quantity: False for words that the language reserves.
+    scopes : callable
+        ``scopes(texts)`` returns the identifiers of each scope of some files, a list of sets; those that stand in one
+        scope have to differ. Names are tried as marks with letters beyond ASCII, which count as letters of identifiers.
+    most : int, optional
+        Characters of a value's name above which words in it are abbreviated.
+
+    Raises
+    ------
+    InputTypeError
+        If a rule is no function, or `most` no count.
+
+    Examples
+    --------
+    >>> import re
+    >>> shell = Language(lambda name: name not in {"fi", "done"}, lambda texts: [{*re.findall(r"\w+", *texts)}])
+    >>> shell.allows("done"), sorted(*shell.scopes(["a = b"]))
+    (False, ['a', 'b'])
+    """
+
+    allows: Callable[[str], bool]
+    scopes: Callable[[Iterable[str]], list[set[str]]]
+    most: int | None = None
+
+    def __repr__(self) -> str:
+        return f"<Language of {getattr(self.allows, '__module__', 'no module')}>"
+
+    def __post_init__(self) -> None:
+        for name in ("allows", "scopes"):
+            if not callable(getattr(self, name)):
+                found = checks.describe(getattr(self, name))
+                raise InputTypeError(f"{name} of a Language is {found}; a function is needed")
+        if self.most is not None:
+            checks.count("most of a Language", self.most)
+
+    def identifiers(self, texts: Mapping[str, str]) -> list[set[str]]:
+        """Return the identifiers of each scope of some files."""
+        found = self.scopes(texts.values())
+        if not isinstance(found, list) or not all(isinstance(scope, set) for scope in found):
+            raise InputTypeError(
+                f"scopes of {self!r} returned {checks.describe(found)}; a list of sets is needed"
+            )
+        return found
 
 
 def _c_allows(name: str) -> bool:
@@ -249,10 +295,22 @@ def printed(
     `text` prints the files of a renamed program; it gets the kernel's name of every changed one. Signals that are
     `joined` have one name with their only element.
     """
+    if not isinstance(language, Language):
+        raise InputTypeError(f"printed takes a strapgen.Language, not {checks.describe(language)}")
     names = keys(program, frozenset(joined))
     marks = {key: f"{_MARK}{number}{_MARK}" for number, key in enumerate(names)}
     marked = text(renamed(program, marks, joined), {})
-    chosen = _choose(marks, language, language.scopes(marked.values()))
+    if not isinstance(marked, Mapping):
+        raise InputTypeError(
+            f"what prints a program returned {checks.describe(marked)}; texts by file name are needed"
+        )
+    scopes = language.identifiers(marked)
+    if not any(_MARK in name for scope in scopes for name in scope):
+        raise InputError(
+            f"scopes of {language!r} finds no name of the program in {', '.join(marked)}; "
+            "identifiers whose letters may be beyond ASCII are needed"
+        )
+    chosen = _choose(marks, language, scopes)
     result = renamed(program, chosen, joined)
     return result, text(result, {new: key.name for key, new in chosen.items() if new != key.name})
 
@@ -279,7 +337,11 @@ def _choose(marks: Mapping[Key, str], language: Language, scopes: list[set[str]]
 
     waiting = [key for key in marks if not settle(key, _abbreviate(key, language.most))]
     for key in waiting:
-        next(name for name in _alike(key) if settle(key, name))
+        if not any(settle(key, name) for name in islice(_alike(key), _MOST_TRIED)):
+            raise InputError(
+                f"allows of {language!r} takes neither {key.name} nor a name like {next(_alike(key))}; "
+                "False is for the words that a language reserves"
+            )
     return chosen
 
 

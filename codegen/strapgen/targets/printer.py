@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Callable
 from fractions import Fraction
 
 from strapgen.ir.exceptions import InputError
@@ -19,9 +20,10 @@ class Printer:
     """
 
     #: The step from 1 to the next number of the target.
-    resolution = DOUBLE_RESOLUTION
+    resolution: Fraction = DOUBLE_RESOLUTION
     #: The operators of a product and of a quotient.
-    times, over = "*", "/"
+    times: str = "*"
+    over: str = "/"
 
     def text(self, node: Node) -> str:
         """Return a node as source text."""
@@ -43,22 +45,28 @@ class Printer:
         if isinstance(node, Reference):
             return self.reference(node.name), _ATOM
         if isinstance(node, Constant):
-            text = self.constant(abs(node.value))
+            text = self._written("constant", "numbers", lambda: self.constant(abs(node.value)))
             return (f"-{text}", _UNARY) if node.value < 0 else (text, _ATOM)
         method = getattr(self, f"_{node.kind}", None)
         if method is not None:
             printed: tuple[str, int] = method(*node.arguments)
             return printed
         arguments = [self.text(argument) for argument in node.arguments]
+        what = f"{node.kind} of {len(arguments)} arguments"
+        return self._written("function", what, lambda: self.function(node.kind, arguments), node.kind), _ATOM
+
+    def _written(self, method: str, what: str, write: Callable[[], str], kind: str = "") -> str:
+        """Return the text that a method of a target's printer writes; say which method is missing."""
         try:
-            return self.function(node.kind, arguments), _ATOM
+            text = write()
         except (KeyError, NotImplementedError) as error:
-            if isinstance(error, KeyError) and error.args != (node.kind,):
+            if isinstance(error, KeyError) and error.args != (kind,):
                 raise
-            raise InputError(
-                f"{type(self).__name__} does not print {node.kind} of {len(arguments)} arguments; its method function "
-                "must return the text"
-            ) from None
+            text = None  # as from a method without a return
+        if not isinstance(text, str):
+            printer = type(self).__name__
+            raise InputError(f"{printer} does not print {what}; its method {method} must return the text")
+        return text
 
     def _inside(self, node: Node, level: int) -> str:
         text, binding = self._print(node)

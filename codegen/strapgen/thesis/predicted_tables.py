@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from strapgen import catalogue
 from strapgen.analysis.ratios import Claim, claims_text
 from strapgen.analysis.series.prediction import Prediction, predict
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.runs import simulate
-from strapgen.results.records import Record, entry, properties
+from strapgen.results.records import Properties, Record, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.run.backends import backend
@@ -46,7 +47,7 @@ _COLUMNS = (
 class PredictedEntry(Record):
     """One figure of a table."""
 
-    computed = properties(thesis_printed=entry(), deviation=entry())
+    computed: ClassVar[Properties] = properties(thesis_printed=entry(), deviation=entry())
 
     table: int
     algorithm: str
@@ -144,7 +145,7 @@ class PredictedTablesResult(Result):
     """The tables of the thesis as the series predict them, and the ratios that the thesis reads from them."""
 
     rows_in = "entries"
-    drawn_by = "strapgen.thesis.tables_report:predicted_tables_image"
+    drawn_by: ClassVar[str] = "strapgen.thesis.tables_report:predicted_tables_image"
 
     entries: Sequence[PredictedEntry]
     ratios: Sequence[Claim]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from strapgen.results import figures
 from strapgen.results.result import Result
@@ -70,8 +70,8 @@ class ThesisTablesResult(Result):
     """The tables of the thesis beside simulations: a row for each figure and back end."""
 
     rows_in = "entries"
-    row = TableEntry
-    drawn_by = "strapgen.thesis.tables_report:thesis_tables_image"
+    row: ClassVar[type | None] = TableEntry
+    drawn_by: ClassVar[str] = "strapgen.thesis.tables_report:thesis_tables_image"
 
     entries: Sequence[TableEntry]
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -413,7 +414,7 @@ class StatementsResult(Result):
     """Statements of the thesis and the runs that test them: a row for each statement."""
 
     rows_in = "statements"
-    row = Statement
+    row: ClassVar[type | None] = Statement
 
     statements: Sequence[Statement]
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
+from typing import ClassVar
 
 from strapgen.catalogue import choose_step
 from strapgen.ir.exceptions import InputError
@@ -14,7 +15,7 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.sources import Sources
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.runs import Run, largest_increment, simulate
-from strapgen.results.records import Record, entry, properties
+from strapgen.results.records import Properties, Record, entry, properties
 from strapgen.run.backends import BACKENDS, Backend, backend, sources_to_build
 from strapgen.run.backends import DEFAULT_BACKENDS as DEFAULT_BACKENDS
 from strapgen.run.compiler import compile_together
@@ -222,7 +223,7 @@ def agrees(value: float, printed: str) -> bool:
 class TableEntry(Record):
     """One figure of a table."""
 
-    computed = properties(thesis_printed=entry())
+    computed: ClassVar[Properties] = properties(thesis_printed=entry())
 
     table: int
     backend: str

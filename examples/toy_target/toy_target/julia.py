@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from strapgen import Program, Sources, Target
-from strapgen.targets.names import Language, printed
+from strapgen import Language, Program, Sources, Target
+from strapgen.targets.names import printed
 from toy_target import FUNCTIONS, PlainPrinter, text
 
 _TEXT = """

@@ -14,13 +14,14 @@ from typing import Any
 
 import sympy as sp
 
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Decomposition, Frame
 from strapgen.kernel.polynomials import Polynomial
 
 
 @dataclass(frozen=True)
-class Invariants:
+class Invariants(ReadOnly):
     """The drift and the symmetric part of an error matrix at one power of the step."""
 
     #: Coefficients of the vectors i and of the cross products (i, j), where i is the i-th derivative of the

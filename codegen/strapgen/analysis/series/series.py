@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import sympy as sp
 
@@ -21,12 +21,13 @@ from strapgen.catalogue import AnyAlgorithm
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel import reading
 from strapgen.kernel.power_series import Powers, outputs
 from strapgen.lab import one_step
 from strapgen.lab.motions.motion_names import is_file
 from strapgen.lab.one_step import Step, errors
-from strapgen.results.records import Record, entry, properties
+from strapgen.results.records import Properties, Record, entry, properties
 
 #: Motions for which a series can be derived.
 MOTIONS = ("general", *catalogue.MOTIONS)
@@ -37,7 +38,8 @@ STEP = sp.Symbol("h")
 #: Parts of an error matrix.
 PARTS = ("drift", "scale", "skew")
 #: Coefficients of a vector or of three numbers, by power of the step.
-Coefficients = dict[int, tuple[sp.Expr, sp.Expr, sp.Expr]]
+Row = tuple[sp.Expr, sp.Expr, sp.Expr]
+Coefficients = Mapping[int, Row]
 
 
 def _sums(terms: Coefficients) -> list[str]:
@@ -65,7 +67,7 @@ def _or_none(names: Sequence[str]) -> Sequence[str] | None:
 
 
 @dataclass(frozen=True)
-class ErrorSeries(Record):
+class ErrorSeries(ReadOnly, Record):
     """The error of one step.
 
     Parameters
@@ -82,7 +84,7 @@ class ErrorSeries(Record):
         Coefficients of the kernel that are not known: all terms are polynomials in them.
     """
 
-    computed = properties(order=entry())
+    computed: ClassVar[Properties] = properties(order=entry())
 
     kernel: str
     motion: str
@@ -90,7 +92,7 @@ class ErrorSeries(Record):
     scale: Coefficients = field(metadata=entry(write=_sums, kind=list[str]))
     skew: Coefficients = field(metadata=entry(write=_sums, kind=list[str]))
     known: int = field(metadata=entry(key="known_to_power"))
-    invariant: dict[int, Invariants] = field(
+    invariant: Mapping[int, Invariants] = field(
         default_factory=dict, metadata=entry(optional=True, write=_invariant, kind=dict[str, _Invariant])
     )
     unknowns: tuple[str, ...] = field(default=(), metadata=entry(optional=True, write=_or_none))
@@ -215,7 +217,7 @@ def _general(attitude_step: Step, terms: int, top: int) -> ErrorSeries:
         for power in powers_shown
     }
     vectors = [[sp.Symbol(f"w{j}_{axis}") for axis in "xyz"] for j in range(top)]
-    parts: dict[str, Coefficients] = {part: {} for part in PARTS}
+    parts: dict[str, dict[int, Row]] = {part: {} for part in PARTS}
     for power in powers_shown:
         split = one_step.split([sp.expand(element) for element in matrix(invariant[power], vectors)])
         for part in PARTS:
@@ -231,7 +233,7 @@ def _of_file(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSer
     inserted = motion_rates.of_file(motion, top)
     parts: dict[str, Coefficients] = {}
     for part in PARTS:
-        rows: Coefficients = {}
+        rows: dict[int, Row] = {}
         for power, row in known.coefficients(part).items():
             elements = (inserted(row[0]), inserted(row[1]), inserted(row[2]))
             if any(elements) and len(rows) < terms:
@@ -246,7 +248,7 @@ def _named(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSerie
     error_parts = errors(attitude_step, rate.ring, rate.derivatives, top)
     parts: dict[str, Coefficients] = {}
     for part in PARTS:
-        rows: Coefficients = {}
+        rows: dict[int, Row] = {}
         for power in _powers(error_parts[part]):
             elements = [
                 one_step.shown(attitude_step, x.parts.get(power, rate.ring.zero)) for x in error_parts[part]
@@ -261,9 +263,9 @@ def _named(attitude_step: Step, motion: str, terms: int, top: int) -> ErrorSerie
 def _series(
     attitude_step: Step,
     motion: str,
-    parts: dict[str, Coefficients],
+    parts: Mapping[str, Coefficients],
     known: int,
-    invariant: dict[int, Invariants],
+    invariant: Mapping[int, Invariants],
 ) -> ErrorSeries:
     """Return the series with these coefficients."""
     kernel = attitude_step.kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import sympy as sp
 
@@ -21,6 +21,7 @@ from strapgen.catalogue import AnyAlgorithm
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel import power_series, reading
 from strapgen.kernel.algebra import exact
 from strapgen.kernel.covariants import Coefficients, Frame
@@ -40,7 +41,7 @@ _MOST_POWER = 8
 
 
 @dataclass(frozen=True)
-class VelocitySeries:
+class VelocitySeries(ReadOnly):
     """The error of one step, computed less true change.
 
     Parameters
@@ -59,8 +60,8 @@ class VelocitySeries:
     """
 
     kernel: str
-    velocity: dict[int, Coefficients]
-    position: dict[int, Coefficients]
+    velocity: Mapping[int, Coefficients]
+    position: Mapping[int, Coefficients]
     known: int
     parts: tuple[str, ...] = PARTS
     unknowns: tuple[str, ...] = ()
@@ -78,9 +79,9 @@ class VelocitySeries:
         first = self.coefficients(self.parts[0])
         return min(first) - 1 if first else None
 
-    def coefficients(self, part: str) -> dict[int, Coefficients]:
+    def coefficients(self, part: str) -> Mapping[int, Coefficients]:
         """Return the terms of "velocity" or "position"."""
-        rows: dict[int, Coefficients] = getattr(self, part)
+        rows: Mapping[int, Coefficients] = getattr(self, part)
         return rows
 
     def as_dict(self) -> dict[str, Any]:
@@ -303,7 +304,7 @@ _SYMBOLS = {"velocity": r"\delta\mathbf{v}", "position": r"\delta\mathbf{r}/h"}
 class VelocitySeriesResult(Result):
     """The errors of one step of velocity and position, as power series in its length."""
 
-    each = VelocityTerms
+    each: ClassVar[type | None] = VelocityTerms
 
     several: Sequence[VelocitySeries]
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from operator import le
-from typing import Any
+from typing import Any, ClassVar
 
 import sympy as sp
 from sympy.core.random import rng
@@ -22,8 +22,9 @@ from sympy.polys.orderings import grevlex, lex
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel import power_series, reading
-from strapgen.results.records import entry, properties
+from strapgen.results.records import Properties, entry, properties
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def _repr(expressions: Sequence[sp.Expr]) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Family:
+class Family(ReadOnly):
     """Solutions with free parameters.
 
     Parameters
@@ -71,9 +72,9 @@ class Family:
         Irreducible polynomials in the free unknowns that must be zero; empty for almost all families.
     """
 
-    computed = properties(dimension=entry())
+    computed: ClassVar[Properties] = properties(dimension=entry())
 
-    values: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
+    values: Mapping[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
     free: tuple[sp.Symbol, ...] = field(metadata=entry(key="parameters", kind=list[str]))
     nonzero: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_repr, kind=list[str]))
     equations: tuple[sp.Expr, ...] = field(default=(), metadata=entry(write=_repr, kind=list[str]))

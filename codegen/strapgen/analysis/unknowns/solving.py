@@ -16,6 +16,7 @@ from strapgen.analysis.unknowns.elimination import Equation, Family, PolynomialS
 from strapgen.catalogue import AnyAlgorithm, choose
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.kernel.kernel import Kernel
 from strapgen.lab import one_step
 from strapgen.results.records import entry
@@ -33,7 +34,7 @@ def _terms(terms: Sequence[Equation]) -> dict[str, sp.Expr]:
 
 
 @dataclass(frozen=True)
-class LeadingError:
+class LeadingError(ReadOnly):
     """The leading error of a family on a motion.
 
     Parameters
@@ -54,7 +55,7 @@ class LeadingError:
     power: int
     terms: tuple[Equation, ...] = field(metadata=entry(write=_terms, kind=dict[str, str]))
     square: sp.Expr = field(metadata=entry(key="sum_of_squares", kind=str))
-    least: dict[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
+    least: Mapping[sp.Symbol, sp.Expr] = field(metadata=entry(kind=dict[str, str]))
 
     __repr__ = short_repr
     _repr_latex_ = notebook_latex
@@ -209,7 +210,7 @@ def _leading(state: State, demand: Demand, family: Family) -> LeadingError | Non
     return None
 
 
-def _least(square: sp.Expr, terms: Sequence[Equation], family: Family) -> dict[sp.Symbol, sp.Expr]:
+def _least(square: sp.Expr, terms: Sequence[Equation], family: Family) -> Mapping[sp.Symbol, sp.Expr]:
     """Return the parameters at which a sum of squares is smallest, if its terms are linear in them."""
     free = [symbol for symbol in family.free if symbol in square.free_symbols]
     if not free or family.equations or len(terms) > _MOST_TERMS:

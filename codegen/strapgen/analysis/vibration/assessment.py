@@ -132,7 +132,6 @@ _LOOPS = {
 }
 
 
-@lru_cache
 def two_speed(quantity: str = "drift") -> Assessment:
     """Assess a whole algorithm in two speeds, the fast loop together with the slow loop.
 
@@ -142,7 +141,12 @@ def two_speed(quantity: str = "drift") -> Assessment:
     >>> two_speed().text("computed")
     '-pi*f*theta_x*theta_y*sin(phi)*(2*sin(2*pi*T_l*f)/(3*pi*T_l*f) - sin(4*pi*T_l*f)/(12*pi*T_l*f))'
     """
-    fast, slow = _LOOPS[checks.choice("quantity", quantity, tuple(_LOOPS))]
+    return _two_speed(checks.choice("quantity", quantity, tuple(_LOOPS)))
+
+
+@lru_cache
+def _two_speed(quantity: str) -> Assessment:
+    fast, slow = _LOOPS[quantity]
     parts = [of(catalogue.choose(fast), quantity), of(catalogue.choose(*slow), quantity)]
     none = Form(sp.S.Zero, sp.S.Zero)
     computed = {}

@@ -7,7 +7,7 @@ accurate enough, and from as many digits as are needed where terms cancel.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -21,6 +21,7 @@ from strapgen.analysis.vibration.systems import T_L, T_M, F, T
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly, ReadOnlyDict
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,7 +54,7 @@ class Rates(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Assessment:
+class Assessment(ReadOnly):
     """The mean rate about z that an algorithm computes under a vibration, and the true one.
 
     Parameters
@@ -72,8 +73,8 @@ class Assessment:
     kernel: str
     unit: str
     recursion: bool
-    computed: dict[Pair, Form]
-    continuous: dict[Pair, Form]
+    computed: Mapping[Pair, Form]
+    continuous: Mapping[Pair, Form]
 
     __repr__ = short_repr
 
@@ -81,7 +82,7 @@ class Assessment:
         return f"of {self.kernel}: mean rate in {self.unit}, {len(self.computed)} pairs of channels"
 
     @cached_property
-    def error(self) -> dict[Pair, Form]:
+    def error(self) -> Mapping[Pair, Form]:
         """Factors of the error, computed minus continuous, by pair of channels."""
         none = Form(sp.S.Zero, sp.S.Zero)
         errors = {}
@@ -90,7 +91,7 @@ class Assessment:
             form = Form(computed.real - true.real, computed.imaginary - true.imaginary)
             if form != none:
                 errors[pair] = form
-        return errors
+        return ReadOnlyDict(errors)
 
     @property
     def resonant(self) -> bool:
@@ -118,7 +119,7 @@ class Assessment:
         """The symbols of time."""
         return (T_L, T_M) if self.recursion else (T,)
 
-    def forms(self, part: str) -> dict[Pair, Form]:
+    def forms(self, part: str) -> Mapping[Pair, Form]:
         """Return the factors of one of `PARTS`.
 
         Parameters
@@ -128,7 +129,7 @@ class Assessment:
 
         Returns
         -------
-        dict of (str, str) to Form
+        mapping of (str, str) to Form
 
         Raises
         ------

@@ -29,6 +29,7 @@ from strapgen.catalogue import AnyAlgorithm
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import read_only
 from strapgen.kernel.power_series import Powers
 from strapgen.lab import one_step
 
@@ -341,7 +342,7 @@ def of_transition(transition: Transition, sampling: Sampling, tones: Sequence[To
             continue
         key = degree, turns
         sums[key] = sums.get(key, np.zeros(3, complex)) + rate * (2 if first else 1)
-    return Rectification(tuple(_Term(*key, rate) for key, rate in sums.items()))
+    return Rectification(tuple(_Term(*key, read_only(rate)) for key, rate in sums.items()))
 
 
 @lru_cache(maxsize=16)

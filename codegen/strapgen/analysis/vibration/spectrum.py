@@ -21,6 +21,7 @@ from strapgen.ir import checks
 from strapgen.ir.checks import counted, needed
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.lab.recordings.formats.csv_table import csv_rows, line_blocks
 
 Array = NDArray[Any]
@@ -33,7 +34,7 @@ _MOST_ROWS = 100_000
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(ReadOnly):
     """A stationary random input, and the angles and accelerations that it excites.
 
     The input n has the one-sided power spectral density P, so that E[n^2] is the integral of P over frequencies in Hz.
@@ -95,6 +96,7 @@ class Spectrum:
             raise InputError(
                 "the edges of a spectrum must be two rising frequencies in Hz or more, from 0 or above"
             )
+        super().__post_init__()
 
     def densities(self, hertz: Array) -> Array:
         """Return the density at frequencies.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from strapgen.analysis.vibration import Assessment
 from strapgen.analysis.vibration.mean_rates import Rates
@@ -188,7 +188,7 @@ class UnknownRates:
 class ClosedFormsResult(Result):
     """Mean rates of kernels with unknowns in closed form, without numbers: a row for each."""
 
-    row = UnknownRates
+    row: ClassVar[type | None] = UnknownRates
 
     cases: Sequence[AssessedCase]
 
@@ -243,8 +243,8 @@ def _rate_table(group: Sequence[CaseRates], unit: str) -> TextTable:
 class VibrationResult(Result):
     """Mean rates of algorithms under vibration, computed and true."""
 
-    each = VibrationRates
-    drawn_by = "strapgen.analysis.analysis_plots:vibration_image"
+    each: ClassVar[type | None] = VibrationRates
+    drawn_by: ClassVar[str] = "strapgen.analysis.analysis_plots:vibration_image"
 
     outcomes: Sequence[CaseRates]
     cases: Sequence[AssessedCase]

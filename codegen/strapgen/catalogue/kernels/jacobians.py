@@ -56,7 +56,7 @@ def jacobians(name: str, method: Method, counts: tuple[int, int, int]) -> Kernel
     state = build.input(kinematics.state)
     turn = transition(build, kinematics, method, counts)
     size = kinematics.state.size
-    units = [kinematics.identity.zeros(*kinematics.identity.shape) for _ in range(size)]
+    units = [sp.zeros(*kinematics.identity.shape) for _ in range(size)]
     for place, unit in enumerate(units):
         unit[place] = sp.Integer(1)
     build.output(

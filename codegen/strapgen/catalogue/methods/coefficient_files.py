@@ -50,7 +50,8 @@ class CoefficientFiles(Mapping[str, T], Generic[T]):
     def __init__(
         self, files: Mapping[str, Path], read: Callable[[Path, str], T], without: Container[str] = ()
     ) -> None:
-        self.files, self._read, self._without = files, read, without
+        self.files: Mapping[str, Path] = files
+        self._read, self._without = read, without
         self._known: dict[tuple[str, int], T] = {}
 
     def __getitem__(self, name: str) -> T:

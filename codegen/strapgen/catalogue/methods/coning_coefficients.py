@@ -30,6 +30,7 @@ from strapgen.catalogue.methods.rotation_series import Scalars, fraction
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import notebook_latex, short_repr
+from strapgen.ir.read_only import ReadOnly
 
 SOURCES = {
     "compressed": "M. B. Ignagni, J. Guid. Control Dyn. 13 (1990) 363-369",
@@ -44,7 +45,7 @@ MOST_COMBINED = 17
 
 
 @dataclass(frozen=True)
-class Design:
+class Design(ReadOnly):
     """Coefficients of the cross products of samples."""
 
     form: str  # one of `FORMS`, or "shaped" for coefficients of a file

@@ -284,12 +284,14 @@ class Samples:
         self._build = build
         self._labels = labels(nodes)
         if increments is None:
-            signal, self.fit = node_rotations_signal(nodes), rate_fit.from_rates(nodes)
+            signal, fitted = node_rotations_signal(nodes), rate_fit.from_rates(nodes)
         else:
-            signal = increments_signal(increments, previous, ahead)
-            self.fit = fit(increments, previous, ahead)
+            signal, fitted = increments_signal(increments, previous, ahead), fit(increments, previous, ahead)
+        self.fit: Fit = fitted
         self._symbols = build.input(signal)
-        self.increments, self.previous, self.ahead = increments, previous, ahead
+        self.increments: int | None = increments
+        self.previous: int = previous
+        self.ahead: int = ahead
 
     def order(self, method: int) -> Order:
         """Return the order of a step by a method of this order on any kinematics."""

@@ -111,10 +111,10 @@ class Integrator:
     name: str = ""  # that of its table
     function: str = "method"  # of the module
 
-    file: ClassVar = ""
-    kind: ClassVar = "method"
-    own_samples: ClassVar = None
-    tolerance: ClassVar = Fraction(0)
+    file: ClassVar[str] = ""
+    kind: ClassVar[str] = "method"
+    own_samples: ClassVar[int | None] = None
+    tolerance: ClassVar[Fraction] = Fraction(0)
 
     @property
     def recipe(self) -> tuple[str, str, tuple[Any, ...]]:

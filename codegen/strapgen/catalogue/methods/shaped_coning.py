@@ -101,7 +101,7 @@ class ShapedConing:
         """The option that chooses it on the command line."""
         return f"--coning {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
 
-    kind: ClassVar = "set of coning coefficients"
+    kind: ClassVar[str] = "set of coning coefficients"
 
     @property
     def own_samples(self) -> int:

@@ -251,8 +251,8 @@ class Tableau:
         """The option that chooses it on the command line."""
         return f"--tableau {shlex.quote(self.file)}" if self.file else f"--method {self.name}"
 
-    kind: ClassVar = "tableau"
-    own_samples: ClassVar = None
+    kind: ClassVar[str] = "tableau"
+    own_samples: ClassVar[int | None] = None
 
     @property
     def recipe(self) -> tuple[str, str, tuple[Any, ...]]:

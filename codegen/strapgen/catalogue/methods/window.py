@@ -115,7 +115,7 @@ class Window:
             return f"--method {self.name}"
         return f"--window {shlex.quote(self.file)}" + (f" --ahead {self.ahead}" if self.sibling else "")
 
-    kind: ClassVar = "window"
+    kind: ClassVar[str] = "window"
 
     @property
     def own_samples(self) -> int:

@@ -100,7 +100,7 @@ class Filtered:
     def __init__(self, build: KernelBuilder, samples: Samples, window: Window) -> None:
         self._build, self._samples, self._window = build, samples, window
         self._folded: dict[tuple[int, int], sp.Matrix] = {}
-        self.degree = min(window.degree, DEGREE)
+        self.degree: int = min(window.degree, DEGREE)
 
     def coefficient(self, m: int) -> sp.Matrix:
         """Return a Legendre coefficient of the rate times the step."""

@@ -27,6 +27,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import read_only
 from strapgen.ir.sources import Sources
 from strapgen.run.backend_names import BACKENDS
 from strapgen.run.backends import fit_settings
@@ -98,7 +99,7 @@ class CommitLate:
         self._state: Argument | None = None
         self._rest = np.zeros(3)
         self._unit = self._load(window, algorithm, backend, sample_hz, settings)
-        self.identity = self.attitude
+        self.identity: Array = read_only(self.attitude)
 
     def _load(
         self,

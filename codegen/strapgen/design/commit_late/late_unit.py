@@ -15,9 +15,16 @@ from typing import Any
 import numpy as np
 
 from strapgen.design.commit_late.commit_late_sources import LateSources
-from strapgen.design.commit_late.late_filters import NEXT, NORMALIZED_EVERY, REACH, SHORT, short_place
+from strapgen.design.commit_late.late_filters import (
+    NEXT,
+    NORMALIZED_EVERY,
+    REACH,
+    SHORT,
+    LateFilters,
+    short_place,
+)
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.interfaces import Argument
+from strapgen.ir.interfaces import Argument, Interface
 from strapgen.ir.sources import Sources
 from strapgen.run import compiler
 from strapgen.run.backend_names import of_sources
@@ -77,7 +84,7 @@ class LateUnit:
     _normalized_every = 1
 
     def __init__(self, sources: LateSources) -> None:
-        self.filters = sources.filters
+        self.filters: LateFilters = sources.filters
         self._step = of_sources(sources.step)
         self._rotation = of_sources(sources.rotation)
         self._normalization = of_sources(sources.normalization)
@@ -279,8 +286,8 @@ class LateUnitInC:
     def __init__(self, sources: Sources) -> None:
         module = compiler.load(sources)
         self._ffi, self._lib, self._name = module.ffi, module.lib, sources.function.name
-        self.fixed = sources.fixed
-        self.dtype = real_type(sources.target) if sources.fixed is None else np.dtype(np.int32)
+        self.fixed: Interface | None = sources.fixed
+        self.dtype: np.dtype[Any] = real_type(sources.target) if sources.fixed is None else np.dtype(np.int32)
         self._state = sources.function.inputs[0]
         self._memory = self._ffi.new(f"{self._name}_memory *")
         self._call("init")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from strapgen import pipeline, registration
 from strapgen.catalogue.methods.shaped_coning import ShapedConing
@@ -37,8 +37,8 @@ class JudgedAlgorithm:
 class SelectionResult(Result):
     """The algorithms for a brief: drifts by cause, costs, and exceeded limits."""
 
-    row = JudgedAlgorithm
-    drawn_by = "strapgen.design.design_plots:selection_image"
+    row: ClassVar[type | None] = JudgedAlgorithm
+    drawn_by: ClassVar[str] = "strapgen.design.design_plots:selection_image"
 
     brief: DesignBrief
     ordered: Sequence[Judgement]

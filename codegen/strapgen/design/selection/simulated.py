@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -65,12 +65,12 @@ class Vibration(Motion):
 
     #: As for `Motion`
     name: str = "vibration of a brief"
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
     #: The body rate, and what the gyro passes on of it
     rates: Any = None
     measured: Any = None
     #: Attitudes that were integrated, by shape and times: several algorithms are recorded at the same ones.
-    known: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False, compare=False)
+    _known: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False, compare=False)
 
     def samples(self, interval: Fraction, first: int, stop: int) -> Any:
         """Return the increments that the gyro measures, see `Motion.samples`."""
@@ -81,11 +81,11 @@ class Vibration(Motion):
         """Return the true attitude, see `Motion.attitude`."""
         times = np.asarray(time, float)
         key = times.shape, times.tobytes()
-        if key not in self.known:
+        if key not in self._known:
             highest = float(self.rates.frequencies.max()) / (2 * math.pi)
             substeps = max(16, math.ceil(_SUBSTEPS * highest * KNOT))
-            self.known[key] = ReferenceAttitude(self.rates.rate, substeps)(times)
-        return self.known[key].copy()
+            self._known[key] = ReferenceAttitude(self.rates.rate, substeps)(times)
+        return self._known[key].copy()
 
     def rate(self, time: Any) -> Any:
         """Return the body rate, see `Motion.rate`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ from strapgen.firmware.check_code.probes import (
 )
 from strapgen.firmware.check_code.rotation import rotation, rotation_segments
 from strapgen.lab.motions.motions import motion
-from strapgen.results.records import INTERNAL, entry, properties
+from strapgen.results.records import INTERNAL, Properties, entry, properties
 from strapgen.results.result import Result
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ def without_words(findings: Sequence[Finding]) -> list[MeasuredCheck]:
 class ForeignResult(Result):
     """The findings on a user's function."""
 
-    computed = properties(holds=entry())
+    computed: ClassVar[Properties] = properties(holds=entry())
 
     file: str
     function: str = field(metadata=INTERNAL)

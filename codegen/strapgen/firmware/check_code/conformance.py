@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, overload
+from typing import Any, ClassVar, overload
 
 import mpmath
 import numpy as np
@@ -25,7 +25,7 @@ from strapgen.lab.comparison import certified_angle
 from strapgen.lab.convergence import converge
 from strapgen.lab.motions.motions import motion
 from strapgen.lab.runs import attitude, drift_between, simulate, step_of_increments
-from strapgen.results.records import INTERNAL, Record, entry, properties
+from strapgen.results.records import INTERNAL, Properties, Record, entry, properties
 from strapgen.results.result import Result
 from strapgen.results.table import Column, TextTable
 from strapgen.run import exact
@@ -101,7 +101,7 @@ class FindingsResult(Result):
     """
 
     rows_in = "findings"
-    computed = properties(holds=entry())
+    computed: ClassVar[Properties] = properties(holds=entry())
 
     kernel: str
     title: str = field(metadata=INTERNAL)

@@ -20,6 +20,7 @@ from strapgen import registration
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import renamed_parameters
 from strapgen.lab.motions.motion_names import MOTIONS, MotionEntry
 from strapgen.lab.motions.motion_names import parameters as settings_of
@@ -69,7 +70,7 @@ def titles() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Motion:
+class Motion(ReadOnly):
     """A motion of the catalogue with numbers for its parameters.
 
     Parameters
@@ -88,7 +89,7 @@ class Motion:
     """
 
     name: str
-    parameters: dict[str, float]
+    parameters: Mapping[str, float]
 
     __repr__ = short_repr
 

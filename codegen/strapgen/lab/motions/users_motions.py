@@ -63,7 +63,7 @@ class UsersMotion(Motion):
     """A motion of a user's functions."""
 
     #: Empty: the file has its numbers
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
     #: The functions of the file by name
     functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import io
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,16 +13,12 @@ from numpy.typing import NDArray
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.lab.recordings import quaternions
+from strapgen.lab.recordings.attitude_names import FORMS, QUATERNIONS, SENSES
 
 if TYPE_CHECKING:
     from strapgen.lab.recordings.recording import History
 
 Array = NDArray[np.float64]
-
-#: Forms of an attitude, orders of a quaternion, and what it turns.
-FORMS = ("state", "rpy", "quaternion", "matrix", "rotation-vector")
-QUATERNIONS = ("xyzs", "sxyz")
-SENSES = ("body-to-reference", "reference-to-body")
 
 
 @dataclass(frozen=True)
@@ -102,10 +97,6 @@ def parquet(columns: dict[str, Array]) -> bytes:
     content = io.BytesIO()
     files.write_table(pyarrow.table(columns), content)
     return content.getvalue()
-
-
-#: Trajectories by name.
-TRAJECTORIES: dict[str, Callable[[History], str]] = {"tum": tum, "kitti": kitti}
 
 
 def frame(columns: dict[str, Array]) -> Any:

@@ -33,8 +33,9 @@ _STUCK, _RESTING = 16, 0.1
 _DISPLACED = 64
 #: Share of rows with the time of the row before from which on the clock is coarse.
 _COARSE = 0.1
-#: Intervals of a block whose mean is one value, and rows on both sides that tell a gap from a late stamp.
+#: Intervals of a block whose mean is one value, rows on both sides that tell a gap from a late stamp; most blocks.
 _BLOCK = 64
+_BLOCKS = 1 << 12
 #: Samples on each side that restore a lost one, the band in which they do, and the weight of the squares of the taps.
 REACH, _BAND, _POINTS, _WEIGHT = 8, 1.3, 400, 1e-16
 
@@ -67,6 +68,12 @@ class Samples:
     gaps: list[tuple[int, int]] = field(default_factory=list)
     #: Largest departure of an interval from the mean, in parts of it
     departure: float = 0.0
+    #: Root of the mean square of these departures
+    jitter: float = 0.0
+    #: Rows that are read, those whose time lies before that of the row before, and those with its time
+    read: int = 0
+    backwards: int = 0
+    repeats: int = 0
     #: Number in the file of the first row that is read
     first: int = 0
     #: What restored samples are, a sentence each
@@ -96,7 +103,7 @@ def examined(time: Array, values: Array, names: Sequence[str], *, keep_times: bo
     `time` (N,): in s. `values` (N, K). `names`: of the time and the values, for what is said of a fault. `keep_times`:
     whether times are right however uneven they are.
     """
-    samples = Samples(time, values)
+    samples = Samples(time, values, read=len(time))
     _take_out_not_finite(samples, names)
     if len(samples.time) < 2:
         return samples
@@ -145,6 +152,7 @@ def _put_in_order(samples: Samples) -> None:
     back = _places(samples.time, lambda gaps: gaps < 0)
     if not back.size:
         return
+    samples.backwards = len(back)
     first = int(back[0]) + 1
     words = (
         f"its time lies {samples.time[first - 1] - samples.time[first]:.6g} s before that of the row before"
@@ -167,6 +175,7 @@ def _take_out_repeated(samples: Samples) -> bool:
     repeated = _places(samples.time, lambda gaps: gaps == 0)
     if not repeated.size:
         return False
+    samples.repeats = len(repeated)
     first = int(repeated[0]) + 1
     words = "its time is that of the row before"
     if len(repeated) > _COARSE * len(samples.time):
@@ -208,7 +217,7 @@ def _take_out_stuck(samples: Samples) -> None:
     first = runs[0][0]
     words = f"the same values in {runs[0][1] - first + 1} rows: the gyro is stuck"
     several = f"; {count} rows in {len(runs)} places" if len(runs) > 1 else ""
-    samples.note("stuck", count, first, words + several)
+    samples.note("stuck", count, first - 1, words + several)
     kept = np.ones(len(samples.time), bool)
     for begin, end in runs:
         kept[begin:end] = False
@@ -220,35 +229,43 @@ def mean_interval(time: Array) -> float:
     if len(time) <= 2 * _BLOCK:
         typical = float(np.median(np.diff(time)))
         return typical if typical > 0 else float(time[-1] - time[0]) / (len(time) - 1)
-    blocks = time[::_BLOCK]
-    return float(np.median(np.diff(blocks))) / _BLOCK
+    begins = np.linspace(0, len(time) - 1 - _BLOCK, min(len(time) - _BLOCK, _BLOCKS)).astype(np.int64)
+    return float(np.median(time[begins + _BLOCK] - time[begins])) / _BLOCK
 
 
 def _find_gaps(samples: Samples, is_coarse: bool, keep_times: bool) -> None:
     """Find lost samples, and times that are no sensor's."""
-    time, typical = samples.time, mean_interval(samples.time)
+    time = samples.time
+    typical = float(time[-1] - time[0]) / (len(time) - 1) if is_coarse else mean_interval(time)
     long = _places(time, lambda gaps: gaps > _LOST * typical)
     uneven = _places(
         time, lambda gaps: (np.abs(gaps - typical) > UNEVEN * typical) & (gaps <= _LOST * typical)
     )
-    if uneven.size:  # a stamp that is late is followed by a short interval, a lost sample by an even one
-        late = time - typical * np.arange(len(time))
-        long = np.array([k for k in long if _stays_late(late, int(k), typical)], np.int64)
-    steps = np.diff(time)[long] if long.size else np.empty(0)
-    samples.interval = (float(time[-1] - time[0]) - float(steps.sum())) / max(1, len(time) - 1 - len(long))
-    if not 0 < samples.interval < np.inf:
-        samples.interval = typical
-    interval = samples.interval
-    samples.gaps = [
-        (int(k) + 1, max(1, round(float(step) / interval) - 1)) for k, step in zip(long, steps, strict=True)
-    ]
-    worst = 0
+    if (
+        uneven.size or is_coarse
+    ):  # a stamp that is late is followed by a short interval, a lost sample by an even one
+        gaps = _lasting_delays(time, typical)
+        long = np.array([place - 1 for place, _ in gaps], np.int64)
+        samples.interval = float(time[-1] - time[0]) / (len(time) - 1 + sum(count for _, count in gaps))
+    else:
+        steps = np.diff(time)[long] if long.size else np.empty(0)
+        samples.interval = (float(time[-1] - time[0]) - float(steps.sum())) / max(
+            1, len(time) - 1 - len(long)
+        )
+        if not 0 < samples.interval < np.inf:
+            samples.interval = typical
+        lost = np.maximum(np.rint(steps / samples.interval) - 1, 1)
+        gaps = [(int(k) + 1, int(count)) for k, count in zip(long, lost, strict=True)]
+    samples.gaps, interval = gaps, samples.interval
+    worst, squares = 0, 0.0
     for first, part in parts(time, 1):
         departures = np.abs(np.diff(part) - interval) / interval
         departures[long[(long >= first) & (long < first + len(departures))] - first] = 0
         place = int(departures.argmax())
+        squares += float(departures @ departures)
         if departures[place] > samples.departure:
             samples.departure, worst = float(departures[place]), first + place
+    samples.jitter = float(np.sqrt(squares / (len(time) - 1)))
     if (uneven.size or is_coarse) and not keep_times:
         if not is_coarse:
             step = float(time[worst + 1] - time[worst])
@@ -270,10 +287,20 @@ def _find_gaps(samples: Samples, is_coarse: bool, keep_times: bool) -> None:
         )
 
 
-def _stays_late(late: Array, place: int, typical: float) -> bool:
-    """Return whether the times stay behind from the interval on, as they do after a lost sample."""
-    before, after = late[max(0, place + 1 - _BLOCK) : place + 1], late[place + 1 : place + 1 + _BLOCK]
-    return bool(after.min() - before.min() > (_LOST - 1) * typical)
+def _lasting_delays(time: Array, typical: float) -> list[tuple[int, int]]:
+    """Return the rows from which on the times stay behind, as they do after lost samples, and how many those are."""
+    late = time / typical - np.arange(len(time))
+    found: dict[int, int] = {}
+    for place in map(int, np.flatnonzero(np.diff(late) > (_LOST - 1) / 2) + 1):
+        first = max(0, place - _BLOCK)
+        before, after = late[first:place], late[place : place + _BLOCK]
+        count = round(float(after.min() - before.min()))
+        if count < 1 or len(after) < _BLOCK // 4:  # near the end a late stamp may be no gap
+            continue
+        # Stamps may be late before the gap too: the last that is not is the last row before it.
+        row = first + int(np.flatnonzero(before <= before.min() + _LOST - 1)[-1]) + 1
+        found[row] = max(count, found.get(row, 0))
+    return sorted(found.items())
 
 
 def _make_even(samples: Samples) -> None:

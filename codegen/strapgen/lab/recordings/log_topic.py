@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 from strapgen.ir import units
 
@@ -38,3 +39,9 @@ def unit_of(name: str, stated: str = "") -> str | None:
     match = re.fullmatch(r".*[\[(]([^\])]*)[\])]\s*", name)
     text = stated.strip("[]() ") or ("" if match is None or match[1].strip().isdigit() else match[1])
     return units.spelled(text) if text else None
+
+
+def split_topic(text: str) -> tuple[Path, str]:
+    """Return the file and the topic of FILE or FILE:TOPIC; the topic is empty where a file has the whole name."""
+    path, (name, colon, topic) = Path(text), text.rpartition(":")
+    return (Path(name), topic) if colon and not path.exists() and Path(name).exists() else (path, "")

@@ -40,12 +40,15 @@ _MESSAGES = ("sensor_combined", "imu", "highres_imu", "sensor_msgs/msg/imu", "sc
 KEYS = ("t", "x", "y", "z", "fx", "fy", "fz")
 INPUTS = ("increments", "rates", "instants")
 
-#: The elements of an attitude by the names that logs have for them, in the order w, x, y, z and roll, pitch, heading.
-_QUATERNIONS = (
-    r"(?:.*_)?(?:q|quat\w*|orientation|attitude)_?{}",
-    (("w", "x", "y", "z"), ("s", "x", "y", "z"), ("0", "1", "2", "3"), ("1", "2", "3", "4")),
+#: The elements of an attitude by the names that logs have for them: w, x, y, z, and roll, pitch, heading.
+_QUATERNIONS = tuple(
+    (rf"(?:.*_)?(?:q|quat\w*|orientation|attitude){frame}_?{{}}", names)
+    for frame in ("", "(?:_.*)?")
+    for names in (("w", "x", "y", "z"), ("s", "x", "y", "z"), ("0", "1", "2", "3"), ("1", "2", "3", "4"))
 )
-_ANGLE_NAMES = (r"(?:.*_)?{}(?:_deg|_rad)?", (("roll", "pitch", "yaw"), ("roll", "pitch", "heading")))
+_ANGLE_NAMES = tuple(
+    (r"(?:.*_)?{}(?:_deg|_rad|_angle)?", ("roll", "pitch", heading)) for heading in ("yaw", "heading")
+)
 
 
 class Stated(NamedTuple):
@@ -121,18 +124,18 @@ def find(topics: Sequence[LogTopic], topic: str, stated: Stated) -> tuple[Meanin
             found[one.name] = rank, of_topic(one, stated)
         except InputError:
             continue
-    names = checks.alternatives([*found])
     if not found:
         seen = ", ".join(one.name for one in topics[: checks.MOST_NAMES])
         raise InputError(
             f"no topic has a time and rates about three axes; it has {seen}; FILE:TOPIC names one"
         )
-    first = min(found.values(), key=lambda one: one[0])
+    names, first = checks.alternatives([*found]), min(found.values(), key=lambda one: one[0])
     if first[0] == len(_MESSAGES) and len(found) > 1:
         raise InputError(
             f"{len(found)} topics have rates about three axes, {names}; FILE:TOPIC says which is meant"
         )
-    remark = f"the rates are those of topic {first[1].topic}; {names} have rates" if len(found) > 1 else ""
+    others = ", ".join(name for name in found if name != first[1].topic)
+    remark = f"the rates are those of topic {first[1].topic}; there are others in {others}" if others else ""
     return first[1], remark
 
 
@@ -184,23 +187,78 @@ def of_topic(topic: LogTopic, stated: Stated) -> Meanings:
     )
 
 
-def attitude(topic: LogTopic) -> tuple[str | None, tuple[str, ...]]:
-    """Return the columns of the time and of an attitude: w, x, y, z, or roll, pitch and heading, or none.
+@dataclass(frozen=True)
+class AttitudeColumns:
+    """The columns of an attitude with its time."""
 
-    >>> attitude(LogTopic("", tuple(LogColumn(name) for name in ("t", "q[0]", "q[1]", "q[2]", "q[3]")), None))
-    ('t', ('q[0]', 'q[1]', 'q[2]', 'q[3]'))
+    #: None where the sampling rate is stated
+    time: str | None
+    #: A quaternion, or roll, pitch and heading, in the order of the file's names
+    columns: tuple[str, ...]
+    #: "sxyz" or "xyzs"; "" for angles
+    order: str
+    #: In the spelling of `ir.units`; None where neither file nor user states one
+    time_unit: str | None
+    #: Of angles: "rad" or "deg"
+    unit: str | None
+
+
+def attitude(
+    topic: LogTopic,
+    columns: str | None = None,
+    order: str | None = None,
+    time_unit: str | None = None,
+    *,
+    has_time: bool = True,
+) -> AttitudeColumns:
+    """Return the columns of the time and of an attitude, as a user or their names say.
+
+    `columns`: names or numbers, the time and a quaternion or three angles. `order`: of a quaternion.
+
+    >>> found = attitude(LogTopic("", tuple(LogColumn(name) for name in ("t", "q[0]", "q[1]", "q[2]", "q[3]")), None))
+    >>> found.columns, found.order
+    (('q[0]', 'q[1]', 'q[2]', 'q[3]'), 'sxyz')
     """
-    columns = [_column(one) for one in topic.columns]
-    time = _time(columns)
-    for pattern, orders in (_QUATERNIONS, _ANGLE_NAMES):
-        for names in orders:
-            found = [
-                [one.text for one in columns if re.fullmatch(pattern.format(re.escape(name)), one.name)]
-                for name in names
-            ]
-            if all(len(one) == 1 for one in found):
-                return time and time.text, tuple(one[0] for one in found)
-    return time and time.text, ()
+    known = [_column(one) for one in topic.columns]
+    time: _Column | None
+    if columns is not None:
+        words = [word.strip() for word in columns.split(",")]
+        if len(words) - has_time not in (3, 4):
+            time_too = "the time and " if has_time else ""
+            raise InputError(
+                f"--true-columns {columns} names {len(words)} columns; {time_too}a quaternion, or roll, pitch and "
+                "heading, are needed"
+            )
+        found = [_named(known, word, "--true-columns") for word in words]
+        time = found.pop(0) if has_time else None
+        order = (order or _order(found)) if len(found) == 4 else ""
+    elif (
+        all(one.text.isdigit() for one in known) and len(known) == 8
+    ):  # a trajectory of the TUM RGB-D benchmark
+        time, found, order = known[0], known[4:], order or "xyzs"
+    else:
+        time, found = _time(known) if has_time else None, []
+        for pattern, names in (*_QUATERNIONS, *_ANGLE_NAMES):
+            each = [[one for one in known if re.fullmatch(pattern.format(name), one.name)] for name in names]
+            if all(len(one) == 1 for one in each):
+                found = [one[0] for one in each]
+                break
+        order = "sxyz" if len(found) == 4 else ""  # the patterns have the scalar first
+    if not found or (len(found) == 4 and not order):
+        what = "no attitude is" if not found else "the scalar of the quaternion is not"
+        raise InputError(
+            f"{what} named among the columns {_shown(known)}; --true-columns NAME,... says which are the time and the "
+            "attitude, --true-quaternion the order"
+        )
+    unit = next((one.unit for one in found if one.unit in ("rad", "deg")), None)
+    stamps = _unit("--true-time-unit", time_unit, [time] if time and time.unit else [], units.TIMES, "times")
+    return AttitudeColumns(time and time.text, tuple(one.text for one in found), order, stamps, unit)
+
+
+def _order(columns: Sequence[_Column]) -> str:
+    """Return the order of a quaternion whose columns are named by their element; "" where they are not."""
+    ends = "".join(one.name[-1:] for one in columns).replace("w", "s")
+    return {"sxyz": "sxyz", "0123": "sxyz", "1234": "sxyz", "xyzs": "xyzs"}.get(ends, "")
 
 
 def _column(column: LogColumn) -> _Column:
@@ -279,6 +337,9 @@ def _stated_columns(stated: Stated, columns: Sequence[_Column]) -> _Found:
     pairs = [word.partition("=") for word in words]
     has_keys = all(equals and key in KEYS for key, equals, _ in pairs)
     keys = KEYS if stated.has_time else KEYS[1:]
+    if not has_keys and all(equals for _, equals, _ in pairs) and pairs[0][0] in KEYS:
+        for key, _, _ in pairs:
+            checks.choice("--columns key", key, KEYS)
     if not has_keys:
         pairs = [(key, "=", word) for key, word in zip(keys, words, strict=False)]
     named = {key: name.strip() for key, _, name in pairs}
@@ -298,7 +359,7 @@ def _stated_columns(stated: Stated, columns: Sequence[_Column]) -> _Found:
     return (found[0] if first else None), found[first : first + 3], found[first + 3 :]
 
 
-def _named(columns: Sequence[_Column], name: str) -> _Column:
+def _named(columns: Sequence[_Column], name: str, option: str = "--columns") -> _Column:
     exact = [one for one in columns if name == one.text]
     exact = exact or [one for one in columns if name.lower() in (one.text.lower(), one.name)]
     if len(exact) == 1:
@@ -306,7 +367,7 @@ def _named(columns: Sequence[_Column], name: str) -> _Column:
     if not exact and name.isdigit() and 1 <= int(name) <= len(columns):
         return columns[int(name) - 1]
     raise InputError(
-        f"--columns: {name!r} is {'more than one' if exact else 'no'} column of {_shown(columns)}"
+        f"{option}: {name!r} is {'more than one' if exact else 'no'} column of {_shown(columns)}"
     )
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -21,6 +22,8 @@ from strapgen.lab.recordings.faults import Samples
 from strapgen.lab.recordings.log_file import LogFile
 from strapgen.lab.recordings.long_columns import Columns, parts, release
 from strapgen.lab.recordings.meanings import INPUTS, Meanings, Stated, known_unit
+from strapgen.stamped.grid_clock import StampError
+from strapgen.stamped.stamped_grid import StampedGrid
 
 Array = NDArray[Any]
 
@@ -28,6 +31,8 @@ Array = NDArray[Any]
 _LONG_INTERVAL = 0.5
 #: Most samples of a recording, with those that are put in.
 _MOST_SAMPLES = 50_000_000
+#: Binary digits of an interval in ticks, and pairs of samples, on an even grid.
+_GRID_BITS, _GRID_PAIRS = 26, (7, 7)
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,8 @@ class Reading:
     force: bool = False
     #: Frequency that a number of whole samples comes nearest to, however uneven they are
     near_hz: float | str | Fraction | None = None
+    #: Whether the times are instants of the samples, which are taken to an even grid
+    grid: bool = False
 
     def __post_init__(self) -> None:
         if self.input is not None:
@@ -117,7 +124,7 @@ def loaded(log: LogFile, topic: str, reading: Reading) -> tuple[Samples, Meaning
             f"{log.path} holds {counted(last - first, 'row')} between --start and --end; 2 are needed"
         )
     names = [*([] if meaning.time is None else [meaning.time]), *meaning.samples, *meaning.forces]
-    keep_times = reading.near_hz is not None
+    keep_times = reading.near_hz is not None or reading.grid
     samples = faults.examined(time[first:last], values[first:last], names, keep_times=keep_times)
     samples.first = first
     return samples, meaning, begin, [*log.remarks, *([remark] if remark else [])]
@@ -156,13 +163,19 @@ def increments(log: LogFile, topic: str, reading: Reading) -> Increments:
     table, breaks, left = Columns(samples.values.shape[1]), [], 0
     for first, last in pairwise(edges):
         before = table.rows
-        left += _integrated(table, samples, (first, last), kind, every)
-        start = float(samples.time[first]) - (0.0 if kind == "instants" else samples.interval)
+        if reading.grid:
+            with _at_time(log, begin, samples.time[first:last]):
+                rows = iter([_on_grid(samples, (first, last), kind, remarks)])
+        else:
+            rows = _rows(samples, (first, last), kind)
+        left += _summed(table, rows, every)
+        starts_before = kind != "instants" and not reading.grid
+        start = float(samples.time[first]) - (samples.interval if starts_before else 0.0)
         if table.rows > before:
             breaks.append((before, begin + start))
     if not breaks:
         raise InputError(f"{log.path} holds no piece of {every} samples")
-    remarks += _of_kind(kind, len(samples.time), table.rows, samples)
+    remarks += _of_kind(kind, len(samples.time), table.rows, samples, reading.grid)
     if left and every > 1:
         remarks.append(f"{counted(left, 'increment')} left out, which fill no sum of {every}")
     if len(breaks) > 1:
@@ -254,11 +267,24 @@ def _every(reading: Reading, interval: float, count: int, remarks: list[str]) ->
     return every
 
 
-def _integrated(table: Columns, samples: Samples, edges: tuple[int, int], kind: str, every: int) -> int:
-    """Add the increments of one piece, as many summed as stated; return how many are left over at its end."""
-    first, last = edges
-    is_even = samples.departure <= faults.EVEN
+def _summed(table: Columns, pieces: Iterator[Array], every: int) -> int:
+    """Add increments, as many summed as stated; return how many are left over in the end."""
     waiting = np.empty((0, table.width))
+    for rows in pieces:
+        if every > 1:
+            rows = np.concatenate([waiting, rows])
+            whole = len(rows) // every * every
+            rows, waiting = rows[:whole].reshape(-1, every, table.width).sum(axis=1), rows[whole:]
+        table.append(rows)
+    return len(waiting)
+
+
+def _rows(
+    samples: Samples, edges: tuple[int, int], kind: str, *, even: bool | None = None
+) -> Iterator[Array]:
+    """Yield the increments of one piece, whose times are even ones or not, by default as far as they depart."""
+    first, last = edges
+    is_even = samples.departure <= faults.EVEN if even is None else even
     for begin, part in parts(samples.values[first:last], int(kind == "instants")):
         time = np.asarray(samples.time[first + begin : first + begin + len(part)])
         if kind == "increments":
@@ -270,15 +296,42 @@ def _integrated(table: Columns, samples: Samples, edges: tuple[int, int], kind: 
         else:
             before = time[0] - samples.interval if begin == 0 else samples.time[first + begin - 1]
             rows = part * np.diff(time, prepend=before)[:, None]
-        if every > 1:
-            rows = np.concatenate([waiting, rows])
-            whole = len(rows) // every * every
-            rows, waiting = rows[:whole].reshape(-1, every, table.width).sum(axis=1), rows[whole:]
-        table.append(rows)
-    return len(waiting)
+        yield rows
 
 
-def _of_kind(kind: str, rows: int, count: int, samples: Samples) -> list[str]:
+def _on_grid(samples: Samples, edges: tuple[int, int], kind: str, remarks: list[str]) -> Array:
+    """Return the increments of one piece on an even grid, from the first time to the last."""
+    first, last = edges
+    rows = np.concatenate([*_rows(samples, edges, kind, even=False)])
+    rows = rows[len(rows) - (last - first) + 1 :]
+    # Ticks of about 2^-26 of an interval.
+    ticks_hz = 2.0 ** round(_GRID_BITS - math.log2(samples.interval))
+    stamps = np.rint((samples.time[first:last] - samples.time[first]) * ticks_hz).astype(np.int64)
+    if len(stamps) < 3:
+        return rows
+    grid = StampedGrid(1 / samples.interval, ticks_hz, _GRID_PAIRS)
+    whole = [grid.whole(rows[:, k : k + 3], stamps) for k in range(0, rows.shape[1], 3)]
+    halves = " and ".join(f"{rate:.9g}" for rate in whole[0].halves)
+    remarks.append(
+        f"{len(rows)} increments are taken from their instants to an even grid, {1 / whole[0].interval:.9g} Hz; by "
+        f"halves {halves} Hz"
+    )
+    return np.hstack([one.samples for one in whole])
+
+
+@contextmanager
+def _at_time(log: LogFile, begin: float, time: Array) -> Iterator[None]:
+    """Name the time of a stamp that the grid cannot take."""
+    try:
+        yield
+    except StampError as error:
+        place = f"at {begin + float(time[error.place or 0]):.9g} s"
+        raise InputError(
+            f"{log.path}, {place}: {error.reason}; without --grid the times are taken as even"
+        ) from None
+
+
+def _of_kind(kind: str, rows: int, count: int, samples: Samples, is_on_grid: bool) -> list[str]:
     """Return remarks on what is taken for what."""
     texts = {
         "increments": [],
@@ -288,7 +341,7 @@ def _of_kind(kind: str, rows: int, count: int, samples: Samples) -> list[str]:
             "interval"
         ],
     }[kind]
-    if samples.departure > faults.EVEN:
+    if samples.departure > faults.EVEN and not is_on_grid:
         texts.append(
             f"sample times depart from even ones by up to {100 * samples.departure:.2g} % of an interval, and the "
             "increments count as even"

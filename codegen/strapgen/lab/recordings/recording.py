@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
-from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
+from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.renamed import renamed, warn
 from strapgen.lab.recordings.array_log import ArrayLog, frame_log
 from strapgen.lab.recordings.log_file import LogFile, open_log
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 
 @renamed(increments="samples")
 @dataclass(frozen=True)
-class Recording:
+class Recording(ReadOnly):
     """Angle increments at even intervals.
 
     Parameters
@@ -59,9 +60,6 @@ class Recording:
     breaks: tuple[tuple[int, float], ...] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     @property
     def pieces(self) -> list[Recording]:
@@ -106,7 +104,7 @@ class Recording:
             "m/s^2", "g" or "mg".
         **options
             What `read` takes of the time and of faults: ``time_unit``, ``gaps``, ``repair``, ``axes``, ``start``,
-            ``end`` and ``every``.
+            ``end``, ``every`` and ``grid``.
 
         Returns
         -------
@@ -126,7 +124,7 @@ class Recording:
         reading = Reading(
             input=input, rate_unit=unit, force_unit=force_unit, force=force is not None, **options
         )
-        return _recording(ArrayLog.of(time, rate=rates, force=force), "", reading)
+        return recording_of(ArrayLog.of(time, rate=rates, force=force), "", reading)
 
     @classmethod
     def from_increments(cls, time: Any, angle: Any, velocity: Any = None, **options: Any) -> Recording:
@@ -158,7 +156,7 @@ class Recording:
         0.0
         """
         reading = Reading(input="increments", force=velocity is not None, **options)
-        return _recording(ArrayLog.of(time, delta_angle=angle, delta_velocity=velocity), "", reading)
+        return recording_of(ArrayLog.of(time, delta_angle=angle, delta_velocity=velocity), "", reading)
 
     @classmethod
     def from_frame(cls, frame: Any, columns: str | None = None, **options: Any) -> Recording:
@@ -188,7 +186,7 @@ class Recording:
         >>> Recording.from_frame(frame).samples[:, 2]
         array([0.15707963, 0.15707963])
         """
-        return _recording(frame_log(frame), "", Reading(columns=columns, **options))
+        return recording_of(frame_log(frame), "", Reading(columns=columns, **options))
 
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"
@@ -201,7 +199,7 @@ class Recording:
 
 
 @renamed(increments="samples")
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InertialRecording(Recording):
     """Angle and velocity increments at even intervals.
 
@@ -217,8 +215,6 @@ class InertialRecording(Recording):
     """
 
     velocity_increments: Array
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -325,6 +321,7 @@ def read(
     gaps: str = "refuse",
     repair: str | Sequence[str] = (),
     force: bool = False,
+    grid: bool = False,
 ) -> Recording:
     r"""Read a recording from a log of any format that `strapgen log` shows.
 
@@ -363,6 +360,9 @@ def read(
         restored as lost samples are.
     force : bool, optional
         Whether specific forces, or velocity increments, are read too.
+    grid : bool, optional
+        Whether the times are the instants of the samples, which are taken from there to an even grid by `StampedGrid`;
+        by default they count as even.
 
     Returns
     -------
@@ -379,20 +379,21 @@ def read(
     --------
     >>> import tempfile
     >>> log = Path(tempfile.mkdtemp()) / "gyro.csv"
-    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n30,0,0,90\n")
+    >>> _ = log.write_text("t [ms],gx [deg/s],gy,gz\n0,0,0,90\n10,0,0,90\n20,0,0,90\n40,0,0,90\n")
     >>> read(log, gaps="bridge").samples[:, 2].round(6)
-    array([0.015708, 0.015708, 0.015708, 0.015708])
+    array([0.015708, 0.015708, 0.015708, 0.015708, 0.015708])
     """
     reading = Reading(
         *(input, columns, time_unit, rate_unit, force_unit, sample_hz, axes, start, end),
         *(checks.count("every", every), gaps, repair, force),
+        grid=grid,
     )
     return recorded(path, topic, reading)
 
 
 def recorded(path: str | Path, topic: str, reading: Reading) -> Recording:
     """Return what a file holds, read in a way."""
-    return _recording(open_log(path), topic, reading)
+    return recording_of(open_log(path), topic, reading)
 
 
 def read_rates(
@@ -498,7 +499,7 @@ def read_inertial(path: str | Path) -> InertialRecording:
     return recording
 
 
-def _recording(log: LogFile, topic: str, reading: Reading) -> Recording:
+def recording_of(log: LogFile, topic: str, reading: Reading) -> Recording:
     """Return what a log holds."""
     start, interval, angle, velocity, remarks, breaks = increments(log, topic, reading)
     if velocity is None:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 #: The Earth's rate in rad/s (WGS 84).
 EARTH_RATE_RAD_S = 7.292115e-5
 #: The Earth's rate in level axes from sine and cosine of the latitude, as parts of its magnitude.
-LEVEL_AXES: dict[str, Callable[[float, float], tuple[float, float, float]]] = {
+_LEVEL: dict[str, Callable[[float, float], tuple[float, float, float]]] = {
     "ned": lambda sine, cosine: (cosine, 0.0, -sine),
     "enu": lambda sine, cosine: (0.0, cosine, sine),
 }
@@ -29,7 +29,7 @@ _WINDOW_SECONDS, _LEAST_WINDOWS = 0.5, 4
 #: Samples of a window at least.
 _LEAST_SAMPLES = 8
 #: A rest is where the deviation of a window is within this multiple of the calmest one, and in rad/s at most.
-_CALM, _MOST_DEVIATION = 3.0, math.radians(0.5)
+_CALM, _MOST_DEVIATION = 3.0, math.radians(1.0)
 #: Largest mean rate of a rest, and largest difference of the means of its windows from it, in rad/s.
 _MOST_RATE, _MOST_CHANGE = math.radians(5.0), math.radians(0.5)
 #: Windows that are worked on together.
@@ -68,17 +68,16 @@ class Rest:
     uncertainty: Array
     noise: Array
 
-    def in_words(self, taken: Array | None = None) -> str:
-        """Return the rest for a reader, with what is taken off of it in rad/s."""
-        values = np.degrees(self.rate if taken is None else taken)
+    def in_words(self, start: float, values: Array) -> str:
+        """Return the rest for a reader, with a rate in deg/s; `start` is that of the recording in s."""
         numbers = ", ".join(
             f"{axis} {value:.6g} +- {spread:.2g}"
             for axis, value, spread in zip("xyz", values, np.degrees(self.uncertainty), strict=True)
         )
         walk = np.degrees(self.noise) * 60
         return (
-            f"at rest from {self.start_s:.6g} s to {self.end_s:.6g} s: {numbers} deg/s; "
-            f"noise {', '.join(f'{x:.3g}' for x in walk)} deg/sqrt(h)"
+            f"at rest from {self.start_s - start:.6g} s to {self.end_s - start:.6g} s after the start: {numbers} "
+            f"deg/s; noise {', '.join(f'{x:.3g}' for x in walk)} deg/sqrt(h)"
         )
 
 
@@ -86,7 +85,7 @@ def rests(recording: Recording) -> list[Rest]:
     """Return the intervals in which a gyro rests, found by the variance of its rates.
 
     It is four or more windows of half a second (at least 8 samples) in a row. In each the standard deviation is at most
-    0.5 deg/s, and within three times that of the calmest window or half a step of the samples; the mean is within 5
+    1 deg/s, and within three times that of the calmest window or half a step of the samples; the mean is within 5
     deg/s, and within 0.5 deg/s of those of the neighbours.
 
     Parameters
@@ -125,8 +124,9 @@ def rests(recording: Recording) -> list[Rest]:
         means[part], deviations[part] = rates.mean(axis=1), rates.std(axis=1)
         steps = np.abs(np.diff(rates, axis=1))
         resolution = np.minimum(resolution, np.where(steps > 1e-12, steps, np.inf).min(axis=(0, 1)))
-    floor = np.maximum(deviations.min(axis=0), np.where(np.isfinite(resolution), resolution, 0) / 2)
-    calm = (deviations <= np.minimum(_CALM * floor + 1e-12, _MOST_DEVIATION)).all(axis=1)
+    deviation = np.linalg.norm(deviations, axis=1)
+    floor = max(float(deviation.min()), float(np.linalg.norm(resolution[np.isfinite(resolution)])) / 2)
+    calm = deviation <= min(_CALM * floor + 1e-12, _MOST_DEVIATION)
     calm &= np.linalg.norm(means, axis=1) <= _MOST_RATE
     changes = np.flatnonzero(np.abs(np.diff(means, axis=0)).max(axis=1) > _MOST_CHANGE)
     edges = {0, windows, *(int(k) + 1 for k in changes), *(int(k) + 1 for k in np.flatnonzero(np.diff(calm)))}
@@ -144,8 +144,8 @@ def rest_between(recording: Recording, begin: float, end: float) -> Rest:
     last = recording.start + recording.interval * len(recording.samples)
     if not (first >= 0 and stop <= len(recording.samples) and stop - first >= _LEAST_SAMPLES):
         raise InputError(
-            f"bias from {begin:g} s to {end:g} s: at least {_LEAST_SAMPLES} samples between {recording.start:.6g} s "
-            f"and {last:.6g} s are needed"
+            f"bias from {begin:.12g} s to {end:.12g} s: at least {_LEAST_SAMPLES} samples between "
+            f"{recording.start:.12g} s and {last:.12g} s are needed"
         )
     return _rest(recording, first, stop)
 
@@ -183,7 +183,7 @@ def earth_rate(latitude_deg: float, axes: str = "ned") -> Array:
     if not abs(latitude_deg) <= 90:
         raise InputError(f"latitude is {latitude_deg:g} deg; -90 to 90 deg are allowed")
     angle = math.radians(latitude_deg)
-    parts = LEVEL_AXES[checks.choice("level axes", axes, LEVEL_AXES)](math.sin(angle), math.cos(angle))
+    parts = _LEVEL[checks.choice("level axes", axes, _LEVEL)](math.sin(angle), math.cos(angle))
     return EARTH_RATE_RAD_S * np.array(parts)
 
 

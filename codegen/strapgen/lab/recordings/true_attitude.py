@@ -8,35 +8,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapgen.ir import checks
+from strapgen.ir import checks, units
 from strapgen.ir.checks import counted
 from strapgen.ir.exceptions import InputError
-from strapgen.ir.notebook_display import Records, hold_arrays, short_repr
-from strapgen.lab.recordings import quaternions
-from strapgen.lab.recordings.attitude_output import QUATERNIONS, SENSES, attitude_of
+from strapgen.ir.notebook_display import Records, short_repr
+from strapgen.ir.read_only import ReadOnly, read_only
+from strapgen.lab.recordings import meanings, quaternions
+from strapgen.lab.recordings.attitude_names import ALIGNMENTS, QUATERNIONS, SENSES
+from strapgen.lab.recordings.attitude_output import attitude_of
+from strapgen.lab.recordings.log_file import LogFile, open_log
+from strapgen.lab.recordings.meanings import AttitudeColumns
 from strapgen.lab.recordings.recording import History, Recording
+from strapgen.run.backends import evaluator
 
 Array = NDArray[np.float64]
 
-#: Ways of turning the frames of the truth before the error is taken, and what each does, in words.
-ALIGNMENTS = {
-    "start": "reference axes turned so that both attitudes are equal at the first instant",
-    "none": "frames as they are",
-    "mean": "reference axes turned so that the attitudes agree best over the run",
-    "mounting": "body and reference axes turned so that the turns and the attitudes agree best over the run",
-}
 #: From this multiple of the median interval on, the attitude between two stamps is not known.
 GAP = 10
-#: Clocks that overlap by half the shorter record are taken as one, but for so many seconds.
-_SAME_CLOCK = 5.0
-#: Least overlap of two clocks as a part of the shorter record, and least correlation that tells an offset.
+#: From this interval on times in no stated unit may be in ms, us or ns, in s.
+_LONG_INTERVAL = 1.5
+#: An offset up to so many s is taken where its correlation is nearly as good as that of any other: one clock.
+_SAME_CLOCK, _AS_GOOD = 5.0, 0.9
+#: Least overlap of two records as a part of the shorter one, and least correlation that tells an offset.
 _OVERLAP, _CORRELATED = 0.5, 0.5
 #: Most instants that are correlated, and the least interval between them in s.
 _MOST_INSTANTS, _LEAST_INTERVAL = 1 << 18, 0.01
@@ -49,7 +51,7 @@ _HOUR = 3600
 
 
 @dataclass(frozen=True)
-class TrueAttitude:
+class TrueAttitude(ReadOnly):
     """An attitude that a run along a recording is judged by.
 
     Parameters
@@ -73,9 +75,6 @@ class TrueAttitude:
     remarks: tuple[str, ...] = ()
 
     __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        hold_arrays(self)
 
     def _in_words(self) -> str:
         return f"of {len(self.time)} attitudes, {self.time[0]:g} s to {self.time[-1]:g} s"
@@ -150,17 +149,120 @@ class TrueAttitude:
             stamps[kept], q if sense == "body-to-reference" else quaternions.inverse(q), tuple(remarks)
         )
 
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        topic: str = "",
+        *,
+        columns: str | None = None,
+        order: str | None = None,
+        sense: str = "body-to-reference",
+        time_unit: str | None = None,
+        sample_hz: float | str | Fraction | None = None,
+    ) -> TrueAttitude:
+        r"""Read a true attitude from a log of any format that `read` takes.
+
+        Parameters
+        ----------
+        path : path
+        topic : str, optional
+            Name of the table, by default the first that has an attitude.
+        columns : str, optional
+            Names or numbers of the columns where the log leaves them open, with commas between: the time, and a
+            quaternion or roll, pitch and heading.
+        order : str, optional
+            "xyzs" or "sxyz": the order of the quaternion, where names do not say it.
+        sense : str, optional
+            "body-to-reference" or "reference-to-body": what each turns.
+        time_unit : str, optional
+            "s", "ms", "us" or "ns", where the log has none.
+        sample_hz : number, optional
+            Sampling rate in Hz, in place of a column of times.
+
+        Returns
+        -------
+        TrueAttitude
+
+        Raises
+        ------
+        InputError
+            If the log cannot be read, its columns are open, or `of` refuses what it holds.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> log = Path(tempfile.mkdtemp()) / "poses.tum"
+        >>> _ = log.write_text("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1 0\n")
+        >>> TrueAttitude.read(log).quaternions[1].tolist()
+        [0.0, 0.0, 1.0, 0.0]
+        """
+        log = open_log(path)
+        names = [one.name for one in log.topics]
+        if topic:
+            checks.choice("topic", topic, names)
+        for one in log.topics:
+            if topic not in ("", one.name):
+                continue
+            try:
+                layout = meanings.attitude(one, columns, order, time_unit, has_time=sample_hz is None)
+            except InputError as error:
+                if topic or len(names) == 1:
+                    raise InputError(f"{log.path}: {error}") from None
+                continue
+            return _of_columns(cls, log, one.name, layout, sense, sample_hz)
+        raise InputError(f"{log.path}: no topic has a time and an attitude; it has {checks.some(names)}")
+
     @cached_property
     def longest(self) -> float:
         """The interval in s from which on the attitude between two stamps is not known."""
         return GAP * float(np.median(np.diff(self.time)))
 
-    def at(self, time: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return quaternions at some times in s on its clock, and whether it is known there: inside, and in no gap."""
+    def at(self, time: Array, beyond: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
+        """Return quaternions at some times in s on its clock, and whether it is known there: inside, and in no gap.
+
+        `beyond`: time in s before and after it for which its rate is taken to go on.
+        """
         place = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
-        known = (time >= self.time[0]) & (time <= self.time[-1])
+        known = (time >= self.time[0] - beyond) & (time <= self.time[-1] + beyond)
         known &= np.diff(self.time)[place] <= self.longest
         return quaternions.interpolated(self.time, self.quaternions, time), known
+
+
+def _of_columns(
+    cls: type[TrueAttitude],
+    log: LogFile,
+    topic: str,
+    layout: AttitudeColumns,
+    sense: str,
+    sample_hz: float | str | Fraction | None,
+) -> TrueAttitude:
+    """Return the true attitude of some columns of a log."""
+    read = log.read(topic, [*layout.columns] if layout.time is None else [layout.time, *layout.columns])
+    if layout.time is None:
+        step = 1 / float(checks.number("sample_hz", sample_hz or 0, positive=True))
+        time = step * np.arange(len(read[layout.columns[0]]), dtype=np.float64)
+    else:
+        time = read[layout.time] * float(units.TIMES[layout.time_unit or "s"])
+    values = np.column_stack([np.asarray(read[name], np.float64) for name in layout.columns])
+    is_open = layout.time is not None and layout.time_unit is None
+    if is_open and len(time) > 1 and np.median(np.abs(np.diff(time))) >= _LONG_INTERVAL:
+        raise InputError(
+            f"{log.path}: the truth's time states no unit and grows by {np.median(np.diff(time)):g} from row to row; "
+            "--true-time-unit s, ms, us or ns says what it is"
+        )
+    if not layout.order:
+        if layout.unit is None and np.nanmax(np.abs(values), initial=0) > 2 * math.pi:
+            raise InputError(
+                f"{log.path}: the angles state no unit, and are above 2 pi; a quaternion is needed"
+            )
+        angles = np.radians(values) if layout.unit == "deg" else values
+        values = evaluator("dcm-from-euler-angles")(angles)
+    try:
+        found = cls.of(time, values, order=layout.order or "xyzs", sense=sense)
+    except InputError as error:
+        raise InputError(f"{log.path}: {error}") from None
+    return replace(found, remarks=(*log.remarks, *found.remarks))
 
 
 def _left_out(rows: NDArray[np.bool_], what: str) -> list[str]:
@@ -197,9 +299,9 @@ class TimeOffset:
 def time_offset(recording: Recording, truth: TrueAttitude) -> TimeOffset:
     """Estimate what the clock of the truth shows more than that of the recording, from the magnitude of the rate.
 
-    The peak of the correlation is searched within 5 s where the clocks overlap by half the shorter record, and where at
-    least half of it overlaps otherwise. Least squares refine it; the standard deviation is that of ten parts left out
-    in turn.
+    The peak of the correlation is searched where at least half the shorter record overlaps; one within 5 s counts if it
+    is within a tenth of the highest. Least squares refine it; the standard deviation is that of ten parts left out in
+    turn.
 
     Parameters
     ----------
@@ -246,10 +348,10 @@ def time_offset(recording: Recording, truth: TrueAttitude) -> TimeOffset:
     lags = np.arange(1 - len(rate), len(true))
     # The truth's instant with the number k + lag is that of the recording's k.
     offsets = truth.time[0] - begin + step * lags
-    common = min(end, float(truth.time[-1])) - max(begin, float(truth.time[0]))
-    if common >= _OVERLAP * min(length, of_truth):
-        correlation = np.where(np.abs(offsets) <= _SAME_CLOCK, correlation, -1)
-    peak = int(np.argmax(correlation))
+    near = np.where(np.abs(offsets) <= _SAME_CLOCK, correlation, -1)
+    peak, nearby = int(np.argmax(correlation)), int(np.argmax(near))
+    if near[nearby] >= _AS_GOOD * correlation[peak]:
+        peak = nearby
     if not correlation[peak] >= _CORRELATED:
         raise InputError(
             f"the rates of the recording and of the truth have a correlation of {max(0.0, correlation[peak]):.2f}, too "
@@ -345,7 +447,7 @@ def _shift(difference: Array, slope: Array, rows: NDArray[np.bool_]) -> float:
 
 
 @dataclass(frozen=True)
-class Slope:
+class Slope(ReadOnly):
     """A straight line through values over time."""
 
     #: (K,) or a number: in deg/h
@@ -406,7 +508,7 @@ class AttitudeError(Records):
     @cached_property
     def angle(self) -> Array:
         """The error angle in rad, (N,)."""
-        angle: Array = np.linalg.norm(self.vector, axis=1)
+        angle: Array = read_only(np.linalg.norm(self.vector, axis=1))
         return angle
 
     @cached_property
@@ -440,11 +542,12 @@ class AttitudeError(Records):
             if abs(q[3]) < 1
         }
         turns = "".join(f"; {name} axes by [{vector}] deg" for name, vector in turned.items())
+        begun = "the run begins at the true attitude" if self.align == "start" and not turned else ""
         return [
             self.offset.in_words(),
-            f"frames: {ALIGNMENTS[self.align]}{turns}",
+            f"frames: {begun or ALIGNMENTS[self.align]}{turns}",
             f"error angle: rms {math.sqrt(np.mean(angle**2)):.4g} deg, largest {angle.max():.4g} deg, at the end "
-            f"{angle[-1]:.4g} deg, at {len(angle)} instants from {self.time[0]:.6g} s to {self.time[-1]:.6g} s",
+            f"{angle[-1]:.4g} deg, at {len(angle)} instants over {self.time[-1] - self.time[0]:.6g} s",
             f"slope of the angle {slope.deg_h:.4g} +- {slope.uncertainty_deg_h:.2g} deg/h; of the error about the "
             f"reference axes {by_axis} deg/h (least squares; standard deviations from the slopes between ten "
             "parts)",
@@ -499,20 +602,19 @@ def attitude_error(
     checks.choice("align", align, ALIGNMENTS)
     if not isinstance(offset, TimeOffset):
         offset = TimeOffset(float(checks.number("time offset", offset)))
-    computed = attitude_of(history)
-    shown = history.time + offset.seconds  # on the truth's clock
-    inside = (truth.time >= shown[0]) & (truth.time <= shown[-1])
-    step = float(np.median(np.diff(shown))) if len(shown) > 1 else math.inf
-    if step < float(np.median(np.diff(truth.time))) and inside.sum() > 1:
-        at, true = truth.time[inside], truth.quaternions[inside]
-        found = quaternions.interpolated(shown, computed, at)
+    # A run as a truth of its own, on the truth's clock: it is not known in gaps either.
+    run = TrueAttitude(history.time + offset.seconds, attitude_of(history))
+    shown, computed = run.time, run.quaternions
+    found, inside = run.at(truth.time) if len(shown) > 1 else (computed, np.zeros(len(truth.time), bool))
+    if len(shown) > 1 and np.median(np.diff(shown)) < np.median(np.diff(truth.time)) and inside.sum() > 1:
+        at, true, found = truth.time[inside], truth.quaternions[inside], found[inside]
     else:
         true, known = truth.at(shown)
         at, true, found = shown[known], true[known], computed[known]
     if len(at) < 2:
         raise InputError(
-            f"the truth is from {truth.time[0]:.9g} s to {truth.time[-1]:.9g} s, and the attitude from "
-            f"{shown[0]:.9g} s to {shown[-1]:.9g} s on its clock; they have to overlap"
+            f"the truth is from {truth.time[0]:.12g} s to {truth.time[-1]:.12g} s, and the attitude from "
+            f"{shown[0]:.12g} s to {shown[-1]:.12g} s on its clock; they have to overlap"
         )
     body = _mounting(at, found, true) if align == "mounting" else np.array([0.0, 0, 0, 1])
     found = quaternions.product(found, body)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapgen.catalogue.toml_models import Key
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def zeros() -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class TriadErrors:
+class TriadErrors(ReadOnly):
     """Errors of three gyros, or of three accelerometers; u stands for rad, or for m/s.
 
     Parameters
@@ -113,7 +114,7 @@ class Sampling:
 
 
 @dataclass(frozen=True, eq=False)
-class WarmUp:
+class WarmUp(ReadOnly):
     """A rate that begins at switch-on, ``rate (1 - exp(-t/tau))``.
 
     Parameters
@@ -131,7 +132,7 @@ class WarmUp:
 
 
 @dataclass(frozen=True, eq=False)
-class Heating:
+class Heating(ReadOnly):
     """Scale factors of torqued gyros that change with the heat of their torquers, see ``torquer-heating-errors``.
 
     Parameters
@@ -152,7 +153,7 @@ class Heating:
 
 
 @dataclass(frozen=True, eq=False)
-class OutputNoise:
+class OutputNoise(ReadOnly):
     """Noise of an output whose sum stays bounded: ``b[n] = A b[n-1] + (1 - A)(w[n] - w[n-1])`` with white w.
 
     Parameters

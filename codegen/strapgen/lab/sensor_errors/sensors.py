@@ -61,7 +61,7 @@ class MeasurementUnit:
     def __init__(self, errors: InstrumentErrors, interval: float, run: int = 0) -> None:
         self._interval = interval
         self._streams = _Streams(errors.seed, run)
-        self.errors = _draw(errors, self._streams) if errors.drawn else errors
+        self.errors: InstrumentErrors = _draw(errors, self._streams) if errors.drawn else errors
         self._causes = {*self.errors.causes}
         gyro, accelerometer = self.errors.gyro, self.errors.accelerometer
         self._gyro = _Triad(gyro, self.errors, "gyro", interval, self._streams)

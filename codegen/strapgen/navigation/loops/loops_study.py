@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -324,7 +324,7 @@ class LoopsResult(Result):
     """The loops of an attitude and heading reference through their schedule."""
 
     rows_in = "states"
-    drawn_by = f"{__name__}:loops_image"
+    drawn_by: ClassVar[str] = f"{__name__}:loops_image"
 
     #: Those that were run
     modes: tuple[LoopMode, ...] = field(metadata=INTERNAL)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from strapgen.navigation.redundancy.geometry import SensorGeometry
 from strapgen.navigation.redundancy.geometry_report import FailureTable, failure_table
 from strapgen.navigation.redundancy.redundancy_kernels import SensorSet
 from strapgen.results import figures
-from strapgen.results.records import INTERNAL, entry, properties, reader_table
+from strapgen.results.records import INTERNAL, Properties, entry, properties, reader_table
 from strapgen.results.result import Result
 from strapgen.run.backend_names import BACKENDS, of_sources
 from strapgen.run.evaluators import Evaluator
@@ -78,7 +78,7 @@ class SensorErrors:
 class Outcomes:
     """Counts of trials with sensors removed before, and one that fails by a size."""
 
-    computed = properties(
+    computed: ClassVar[Properties] = properties(
         undetected=entry("undetected", group="equations"),
         false_alarms=entry("false_alarms", group="equations"),
     )
@@ -240,8 +240,8 @@ _KEYS = (
 class RedundancyResult(Result):
     """Detected and isolated failures of redundant sensors."""
 
-    computed = properties(name=entry())
-    drawn_by = f"{__name__}:redundancy_image"
+    computed: ClassVar[Properties] = properties(name=entry())
+    drawn_by: ClassVar[str] = f"{__name__}:redundancy_image"
 
     sensors: SensorSet = field(metadata=INTERNAL)
     errors: SensorErrors

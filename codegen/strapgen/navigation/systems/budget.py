@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import ClassVar
 
 from strapgen.ir.exceptions import CompilerError
 from strapgen.ir.program import Constant, Node, Operation, Program
 from strapgen.lab import cost as costs
 from strapgen.navigation.systems.fitting import GeneratedStages
 from strapgen.navigation.systems.system import Rate
-from strapgen.results.records import INTERNAL, entry, properties
+from strapgen.results.records import INTERNAL, Properties, entry, properties
 from strapgen.targets import TARGETS
 
 #: Bytes of a number in floating point, by its type in C.
@@ -41,7 +42,7 @@ class StageBudget:
 class RateBudget:
     """Operations and instructions of the stages of one rate in a second."""
 
-    computed = properties(
+    computed: ClassVar[Properties] = properties(
         operations=entry(),
         per_second=entry(key="operations_per_second", write=float, kind=float),
         executed_per_second=entry(key="instructions_per_second", write=float, kind=float | None),
@@ -77,7 +78,7 @@ class RateBudget:
 class Budget:
     """Operations, memory and code of a system."""
 
-    computed = properties(
+    computed: ClassVar[Properties] = properties(
         per_second=entry(key="operations_per_second", write=float, kind=float),
         executed_per_second=entry(key="instructions_per_second", write=float, kind=float | None),
         memory_bytes=entry(),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -247,7 +247,7 @@ class SystemComparisonResult(Result):
     """The outputs of a described system on several back ends: a row for each output and back end."""
 
     rows_in = "outputs"
-    row = OutputComparison
+    row: ClassVar[type | None] = OutputComparison
 
     outputs: Sequence[OutputComparison]
     #: The system and its run in words

@@ -16,11 +16,12 @@ from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.formats import Format
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.signals import CYCLE
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems import system_generation
 from strapgen.navigation.systems.fitting import GeneratedStages, fitted
-from strapgen.navigation.systems.system import Push, Rate, SystemStage
+from strapgen.navigation.systems.system import DescribedSystem, Push, Rate, SystemStage
 from strapgen.navigation.systems.system_bounds import SystemBounds, bounds
 from strapgen.navigation.systems.wiring import Description
 from strapgen.run import compiler
@@ -63,8 +64,8 @@ class SystemRunner:
     def __init__(self, fit: GeneratedStages, backend: str) -> None:
         self.fit = fit
         self.backend = backend
-        self.system = fit.description.system
-        self.many_digits = BACKENDS[backend].many_digits
+        self.system: DescribedSystem = fit.description.system
+        self.many_digits: bool = BACKENDS[backend].many_digits
 
     @cached_property
     def evaluators(self) -> dict[str, Evaluator]:
@@ -290,8 +291,8 @@ class SystemMemory:
 
 
 @dataclass(frozen=True)
-class SystemRun:
-    """The result of a run."""
+class SystemRun(ReadOnly):
+    """The result of a run; its memory can be written, and goes into a next run."""
 
     values: Mapping[str, Array]  # by the name of the cell, in SI units, (times, shape)
     memory: SystemMemory = field(repr=False)  # at the end, from which a next run goes on
@@ -315,9 +316,9 @@ class CompiledSystem(SystemRunner):
 
     def __init__(self, fit: GeneratedStages, backend: str, sources: Sources | None = None) -> None:
         super().__init__(fit, backend)
-        self.sources = sources or system_generation.unit(fit, f"strapgen system {self.system.name}")
-        self.module = compiler.load(self.sources)
-        self.name = self.sources.function.name
+        self.sources: Sources = sources or system_generation.unit(fit, f"strapgen system {self.system.name}")
+        self.module: Any = compiler.load(self.sources)
+        self.name: str = self.sources.function.name
 
     @property
     def number(self) -> np.dtype[Any]:

@@ -13,6 +13,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import ROTATION_INPUTS
 from strapgen.ir.notebook_display import short_repr
 from strapgen.ir.program import Program
+from strapgen.ir.read_only import ReadOnly
 from strapgen.ir.signals import ANY, Signal
 from strapgen.navigation.systems import built_in, system_file
 from strapgen.navigation.systems.ports import (
@@ -32,7 +33,7 @@ from strapgen.navigation.systems.system_file import SystemText
 
 
 @dataclass(frozen=True)
-class Description:
+class Description(ReadOnly):
     """A described system: its structure, and the settings of each stage."""
 
     system: DescribedSystem

@@ -19,12 +19,14 @@ from strapgen.ir.exceptions import InputError
 from strapgen.ir.fixed_settings import Settings
 from strapgen.ir.interfaces import Argument
 from strapgen.ir.notebook_display import short_repr
+from strapgen.ir.read_only import read_only
 from strapgen.ir.renamed import renamed_parameters
+from strapgen.ir.signals import Signal
 from strapgen.ir.sources import Sources
 from strapgen.navigation.systems.system import DescribedSystem
 from strapgen.navigation.systems.system_runner import EXACT_BITS, SystemMemory, SystemRun, carried
 from strapgen.navigation.two_speed import two_speed_sources
-from strapgen.navigation.two_speed.two_speed_sources import LOOPS, wiring
+from strapgen.navigation.two_speed.two_speed_sources import LOOPS, Wiring, wiring
 from strapgen.run import compiler
 from strapgen.run.backend_names import BACKENDS, evaluator_class
 from strapgen.run.backends import fit_settings
@@ -116,11 +118,11 @@ class TwoSpeed:
     def _load(self, name: str, sources: LoopSources) -> None:
         """Load the code of the loops."""
         self.name = name
-        self.loops = sources.loops
+        self.loops: tuple[Sources, ...] = sources.loops
         loops = Loops if sources.whole is None else LoopsInC
         self._runner = loops(sources, evaluator_class(self.loops[0].target))
-        self.state = self.loops[1].function.inputs[0]
-        self.identity: Array = np.eye(3) if self.state.size == 9 else np.array([0.0, 0, 0, 1])
+        self.state: Signal = self.loops[1].function.inputs[0]
+        self.identity: Array = read_only(np.eye(3) if self.state.size == 9 else np.array([0.0, 0, 0, 1]))
 
     def __getstate__(self) -> tuple[str, LoopSources]:
         """Return the name of the back end and the sources, which say all."""
@@ -205,8 +207,8 @@ class TwoSpeed:
         with np.errstate(all="ignore"):  # numbers that overflow are refused, in one line
             attitudes, changes = self._runner.run(cycles)
         run = TwoSpeedRun(
-            self._runner.in_si("state", attitudes).reshape(-1, *self.state.shape),
-            self._runner.in_si("velocity_change", changes),
+            read_only(self._runner.in_si("state", attitudes).reshape(-1, *self.state.shape)),
+            read_only(self._runner.in_si("velocity_change", changes)),
         )
         for what, values in zip(("attitude", "velocity"), run, strict=True):
             if not np.isfinite(values).all():
@@ -268,7 +270,7 @@ class Loops:
     def __init__(self, sources: LoopSources, evaluator: Callable[[Sources], Evaluator]) -> None:
         self.sources = sources
         self.evaluator = evaluator
-        self.wires = wiring(sources.system, sources.loops)
+        self.wires: Wiring = wiring(sources.system, sources.loops)
         self._arguments: dict[str, tuple[Argument, str]] = {}
         for loop in sources.loops:
             if loop.fixed is not None:
@@ -278,9 +280,9 @@ class Loops:
 
     def _load(self) -> None:
         """Load the code."""
-        self.evaluators = tuple(map(self.evaluator, self.sources.loops))
+        self.evaluators: tuple[Evaluator, ...] = tuple(map(self.evaluator, self.sources.loops))
         #: Type of the samples in floating point; an object is one of mpmath.
-        self.number = self.evaluators[0].number
+        self.number: np.dtype[Any] = self.evaluators[0].number
 
     def stored(self, name: str, values: Array, *, summed: bool = False) -> Array:
         """Return samples of an input in SI units, (count, elements), as the loops take them.
@@ -375,7 +377,7 @@ class LoopsInC(Loops):
     def _load(self) -> None:
         whole = self.sources.whole
         assert whole is not None, "loops without a whole are called from Python"
-        self.number = real_type(whole.target)
+        self.number: np.dtype[Any] = real_type(whole.target)
         self._function = whole.function.name
         self._module = compiler.load(whole)
 

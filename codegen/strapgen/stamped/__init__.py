@@ -1,0 +1,1 @@
+"""Samples with instants of their own, taken to an even grid."""
