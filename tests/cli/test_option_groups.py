@@ -211,4 +211,4 @@ def test_one_option_is_the_same_in_every_command_that_shares_its_group():
                 if p.name in {field.name for field in dataclasses.fields(SampleSource)}
             ]
     assert shown["simulate"] == shown["compare"]
-    assert len(shown["simulate"]) == 23
+    assert len(shown["simulate"]) == 24
