@@ -195,6 +195,8 @@ class StampedGrid:
     def whole(self, samples: Any, stamps: Any) -> GridSamples:
         """Take a whole recording to the grid: the numbers of `push` for every sample, then of `flush`.
 
+        What was pushed before is forgotten.
+
         Parameters
         ----------
         samples : array_like, (N, 3)

@@ -5,22 +5,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from strapgen.run.backends import evaluator
+
 Array = NDArray[np.float64]
 
 #: Below this sine of half the angle the ratio of angle and sine is taken as that at zero.
 _SMALL = 1e-12
 
 
+def kernel(name: str, *values: Array) -> Array:
+    """Return what a kernel of the catalogue makes of arrays."""
+    return np.asarray(evaluator(name)(*values))
+
+
 def product(p: Array, q: Array) -> Array:
     """Return the products p q: the rotation q, then p.
 
-    >>> product(np.array([1.0, 0, 0, 0]), np.array([0, 1.0, 0, 0]))
-    array([0., 0., 1., 0.])
+    >>> product(np.array([[1.0, 0, 0, 0]]), np.array([[0, 1.0, 0, 0]]))
+    array([[0., 0., 1., 0.]])
     """
-    v, w = p[..., :3], q[..., :3]
-    s, t = p[..., 3:], q[..., 3:]
-    vector = s * w + t * v + np.cross(v, w)
-    return np.concatenate([vector, s * t - (v * w).sum(axis=-1, keepdims=True)], axis=-1)
+    return kernel("euler-product", *np.broadcast_arrays(p, q))
 
 
 def inverse(q: Array) -> Array:
@@ -31,11 +35,10 @@ def inverse(q: Array) -> Array:
 def from_rotation_vectors(vectors: Array) -> Array:
     """Return the quaternions of rotation vectors in rad.
 
-    >>> from_rotation_vectors(np.array([0, 0, np.pi])).round(9) + 0.0
-    array([0., 0., 1., 0.])
+    >>> from_rotation_vectors(np.array([[0, 0, np.pi]])).round(9) + 0.0
+    array([[0., 0., 1., 0.]])
     """
-    half = np.linalg.norm(vectors, axis=-1, keepdims=True) / 2
-    return np.concatenate([np.sinc(half / np.pi) / 2 * vectors, np.cos(half)], axis=-1)
+    return kernel("euler-update", np.broadcast_to((0.0, 0, 0, 1), (*vectors.shape[:-1], 4)), vectors)
 
 
 def rotation_vectors(q: Array) -> Array:
@@ -57,37 +60,17 @@ def matrices(q: Array) -> Array:
     >>> matrices(np.array([0, 0, 1.0, 0]))[0]
     array([-1.,  0.,  0.])
     """
-    x, y, z, s = np.moveaxis(q, -1, 0)
-    rows = [
-        [s * s + x * x - y * y - z * z, 2 * (x * y - s * z), 2 * (x * z + s * y)],
-        [2 * (x * y + s * z), s * s - x * x + y * y - z * z, 2 * (y * z - s * x)],
-        [2 * (x * z - s * y), 2 * (y * z + s * x), s * s - x * x - y * y + z * z],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return kernel("dcm-from-euler", q)
 
 
 def from_matrices(C: Array) -> Array:
     """Return the rotations nearest to direction cosine matrices (N, 3, 3), without jumps of sign; the first has s >= 0.
 
-    Each is the main eigenvector of a matrix of order four, by two iterations from its largest column. I. Y.
-    Bar-Itzhack, "New method for extracting the quaternion from a rotation matrix", J. Guidance 23 (2000), page 1085.
-
     >>> from_matrices(np.array([np.diag([-1.0, -1, 1])]))
     array([[0., 0., 1., 0.]])
     """
-    trace = np.trace(C, axis1=-2, axis2=-1)
-    skew = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], axis=-1)
-    square = np.empty((len(C), 4, 4))
-    square[:, :3, :3] = C + np.swapaxes(C, -2, -1)
-    unit = np.cbrt(np.abs(np.linalg.det(C)))
-    square[:, range(3), range(3)] += (unit - trace)[:, None]
-    square[:, :3, 3] = square[:, 3, :3] = skew
-    square[:, 3, 3] = unit + trace
-    largest = np.argmax(np.diagonal(square, axis1=-2, axis2=-1), axis=-1)
-    q = square[np.arange(len(C)), largest]
-    for _ in range(2):  # others than the main eigenvalue are as small as C departs from a rotation
-        q = np.einsum("nij,nj->ni", square, q / np.linalg.norm(q, axis=-1, keepdims=True))
-    return continuous(q / np.linalg.norm(q, axis=-1, keepdims=True))
+    q = kernel("euler-from-dcm-sheppard", kernel("dcm-orthonormalize-optimal", C), np.zeros((len(C), 4)))
+    return continuous(kernel("euler-normalize", q))
 
 
 def continuous(q: Array) -> Array:
@@ -109,7 +92,7 @@ def interpolated(time: Array, q: Array, at: Array) -> Array:
     place = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     part = (at - time[place]) / (time[place + 1] - time[place])
     turn = rotation_vectors(product(inverse(q[place]), q[place + 1]))
-    return product(q[place], from_rotation_vectors(part[:, None] * turn))
+    return kernel("euler-update", q[place], part[:, None] * turn)
 
 
 def nearest(matrix: Array) -> Array:
