@@ -1,4 +1,4 @@
-"""strapgen: attitude algorithms derived symbolically, generated as numpy and C code, and compared with truth.
+"""Attitude algorithms derived symbolically, generated as numpy, C, C++, Rust and MATLAB, and compared with truth.
 
 Begin with one object: ``alg = strapgen.algorithm("euler", "rk4", increments=2)``.
 
@@ -11,15 +11,16 @@ What there is, each a table of names: ALGORITHMS, METHODS, KERNELS, MOTIONS, TAR
 Functions take the object, a name or a Choice alike:
 
   stages      derive, lower, quantize, generate, build; backend and evaluator do all at once, from the cache
-  motions     motion, read_motion; read, Recording, InertialRecording; simulate, propagate
-  recordings  propagate; StampedGrid; rests; TrueAttitude, time_offset, attitude_error
+  numbers     Settings, Format, gyro, exact: fixed point, pulses of a gyro, 40 digits
+  motions     motion, read_motion, simulate; sensors with errors
+  recordings  read, Recording, StampedGrid, propagate; rests, TrueAttitude, time_offset, attitude_error
   judgement   compare, converge, check, rounding_bounds; unknowns, vibration, study
-  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, Target, Language
-  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes, sensors
+  your own    KernelBuilder, Signal, Stage, algebra, tableaux, windows, window_design; Target, Language
+  navigation  read_system, system_runner, course, TwoSpeed, CommitLate, recording_attitudes
   notebooks   formulas; to_rotation and from_rotation; plot, to_pandas and to_xarray of what runs return
 
-Units are SI and angles rad, unless a name says otherwise; matrices lead from body to reference axes. Wrong input
-raises a StrapgenError with one line. ``help(strapgen.NAME)`` has shapes, units, errors and an example of each.
+SI units and rad, unless a name says otherwise; matrices lead from body to reference axes. Wrong input raises a
+StrapgenError with one line. ``help(strapgen.NAME)`` has shapes, units, errors and an example of each.
 """
 
 import importlib as _importlib

@@ -70,7 +70,13 @@ class AttitudeAlgorithm:
 
     @property
     def name(self) -> str:
-        """Name of the kernel."""
+        """Name of the kernel.
+
+        Examples
+        --------
+        >>> algorithm("dcm", "magnus4", increments=3).name
+        'dcm-magnus4-3'
+        """
         return self.choice.kernel
 
     @property
@@ -91,11 +97,23 @@ class AttitudeAlgorithm:
         return Formulas(kernel, None if kernel.unknowns else self.program())
 
     def derive(self) -> Kernel:
-        """Return the exact kernel, see `strapgen.derive`."""
+        """Return the exact kernel, see `strapgen.derive`.
+
+        Examples
+        --------
+        >>> algorithm("euler", "rk4", increments=2).derive().order.step
+        4
+        """
         return pipeline.derive(self.choice)
 
     def program(self) -> Program:
-        """Return the straight-line code with its counts, see `strapgen.lower`; the cache holds it."""
+        """Return the straight-line code with its counts, see `strapgen.lower`; the cache holds it.
+
+        Examples
+        --------
+        >>> algorithm("euler", "rk4", increments=2).program().operations["multiply"]
+        38
+        """
         return pipeline.program(self.choice)
 
     @needing("series")
@@ -128,7 +146,15 @@ class AttitudeAlgorithm:
         return analyse(self.choice, motion, terms)
 
     def backend(self, name: str = "numpy", settings: Settings | None = None) -> Backend:
-        """Return the algorithm on a back end, a key of `strapgen.BACKENDS`; see `strapgen.backend`."""
+        """Return the algorithm on a back end, a key of `strapgen.BACKENDS`; see `strapgen.backend`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> runner = algorithm("euler", "rk4", increments=2).backend("numpy")
+        >>> runner.step(runner.identity, np.full((2, 3), [0.0, 0.0, 0.1])).round(6)
+        array([0.      , 0.      , 0.099833, 0.995004])
+        """
         from strapgen.run.backends import backend
 
         return backend(self.choice, backend=name, settings=settings)

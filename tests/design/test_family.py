@@ -96,6 +96,11 @@ def test_a_spectrum_without_rate_is_refused(spectrum, message):
         responses.weights(spectrum, Fraction(1), Fraction(100))
 
 
+def test_more_conditions_than_samples_are_refused():
+    with pytest.raises(InputError, match=r"^conditions is 4; a whole number from 1 to 3 is needed$"):
+        FamilyBrief(previous=1, ahead=1, band=Fraction(1, 2))
+
+
 def test_numbers_of_a_file_are_exact():
     for value in (Fraction(1, 3), Fraction(13, 10), Fraction(-1, 2**13), Fraction(10**14), Fraction(0)):
         assert Fraction(family.number(value)) == value

@@ -33,6 +33,7 @@ COMMANDS = {
     "simulate dcm --recording tests/data/increments.csv --title a": "attitude",
     "log tests/data/increments.csv": "log",
     f"compare euler --method rk1,rk2 --backend numpy,c {RUN}": "comparison",
+    "compare euler,dcm --method rk1 --recording tests/data/increments.csv": "spread",
     "converge euler --method rk1 --steps 1/2,1/4 --duration 1 --backend numpy": "convergence",
     "cost euler --cpu cortex-m3": "cost",
     "study word-length --method rk1 --word 16 --carry none --duration 1": "word-length",

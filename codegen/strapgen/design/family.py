@@ -1,4 +1,9 @@
-"""Designs a family of filters, those that commit an attitude and one-sided ones for the same samples, and writes it."""
+"""Designs a family of filters, those that commit an attitude and one-sided ones for the same samples, and writes it.
+
+>>> from strapgen import window_design
+>>> window_design.FamilyBrief(previous=7, ahead=7, band=Fraction(13, 10)).full_title
+'Window 1+7+7 to 1.3 rad'
+"""
 
 from __future__ import annotations
 
@@ -14,6 +19,7 @@ from strapgen.catalogue.methods.window import GyroResponse, Taps, Window, siblin
 from strapgen.catalogue.methods.windows import one_sided_sizes, start_sizes, stored_sizes
 from strapgen.design.filters import exchange, mean_square, responses
 from strapgen.design.filters.filter_taps import Shape, Unknowns, rounded
+from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError
 from strapgen.ir.notebook_display import short_repr
 
@@ -54,6 +60,12 @@ class FamilyBrief:
     ------
     InputError
         If the rotation of a step of several samples is not exact.
+
+    Examples
+    --------
+    >>> brief = FamilyBrief(previous=2, ahead=2, band=Fraction(1))
+    >>> brief.objective, brief.full_title
+    ('minimax', 'Window 1+2+2 to 1 rad')
     """
 
     previous: int
@@ -74,7 +86,8 @@ class FamilyBrief:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        """Refuse a rotation that is not good enough for steps of several samples."""
+        """Refuse more conditions than samples, and a rotation that is not good enough for steps of several samples."""
+        checks.count("conditions", self.conditions, largest=self.previous + self.increments + self.ahead)
         if self.increments > 1 and self.rotation != "exact":
             raise InputError(
                 f"rotation is {self.rotation!r}; steps of {self.increments} samples take the exact one"
@@ -210,7 +223,15 @@ def _filters(brief: FamilyBrief, size: tuple[int, int], one_sided_noise: Fractio
 
 
 def written(family: Window, command: str) -> str:
-    """Return a family as a TOML file that says which command designed it."""
+    """Return a family as a TOML file that says which command designed it.
+
+    Examples
+    --------
+    >>> from strapgen import WINDOWS
+    >>> print(*written(WINDOWS["window-3-3"], "strapgen window design ...").splitlines()[:2], sep=chr(10))
+    # Designed by: strapgen window design ...
+    # Levels of F_1 to F_4: 2.160751e-03, 3.647130e-05, 3.112845e-04, 3.872884e-06
+    """
     levels = ", ".join(
         f"{responses.level(family, m):.6e}" for m in range(0 if family.gyro else 1, family.degree + 1)
     )

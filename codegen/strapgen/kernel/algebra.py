@@ -3,6 +3,13 @@
 Vectors are 3 x 1 matrices. Quaternions are 4 x 1 matrices with the scalar **last**, as the Euler parameters.
 All functions of rotations but `rotation` and `quaternion` use only sums and products, so they also take polynomials
 and numbers.
+
+>>> from strapgen import algebra
+>>> algebra.skew(sp.Matrix([1, 2, 3]))
+Matrix([
+[ 0, -3,  2],
+[ 3,  0, -1],
+[-2,  1,  0]])
 """
 
 from __future__ import annotations
@@ -56,17 +63,35 @@ CROSS = ((1, 2), (2, 0), (0, 1))
 
 
 def cross_elements(u: Sequence[Any], v: Sequence[Any]) -> list[Any]:
-    """Return the elements of the cross product of two 3-vectors of symbols, polynomials or numbers."""
+    """Return the elements of the cross product of two 3-vectors of symbols, polynomials or numbers.
+
+    Examples
+    --------
+    >>> cross_elements([1, 0, 0], [0, 1, 0])
+    [0, 0, 1]
+    """
     return [u[i] * v[j] - u[j] * v[i] for i, j in CROSS]
 
 
 def cross(u: sp.Matrix, v: sp.Matrix) -> sp.Matrix:
-    """Return the cross product of two 3-vectors."""
+    """Return the cross product of two 3-vectors.
+
+    Examples
+    --------
+    >>> cross(sp.Matrix([1, 0, 0]), sp.Matrix([0, 1, 0])).T
+    Matrix([[0, 0, 1]])
+    """
     return sp.Matrix(cross_elements(u, v))
 
 
 def dot(u: Sequence[Any], v: Sequence[Any]) -> Any:
-    """Return the scalar product of two vectors of the same length, of symbols, polynomials or numbers."""
+    """Return the scalar product of two vectors of the same length, of symbols, polynomials or numbers.
+
+    Examples
+    --------
+    >>> dot([1, 2, 3], sp.symbols("x y z"))
+    x + 2*y + 3*z
+    """
     first, *rest = (a * b for a, b in zip(u, v, strict=True))
     return sum(rest, first)
 
@@ -85,12 +110,27 @@ def quaternion_product(p: sp.Matrix, q: sp.Matrix) -> sp.Matrix:
 
 
 def quaternion_conjugate(q: sp.Matrix) -> sp.Matrix:
-    """Return the conjugate of a quaternion, 4 x 1, scalar last."""
+    """Return the conjugate of a quaternion, 4 x 1, scalar last.
+
+    Examples
+    --------
+    >>> quaternion_conjugate(sp.Matrix([1, 2, 3, 4])).T
+    Matrix([[-1, -2, -3, 4]])
+    """
     return sp.Matrix([-q[0], -q[1], -q[2], q[3]])
 
 
 def quaternion_matrix(q: sp.Matrix) -> sp.Matrix:
-    """Return the matrix of ``v -> q v q*``, 3 x 3: ``|q|^2`` times the direction cosine matrix of q, scalar last."""
+    """Return the matrix of ``v -> q v q*``, 3 x 3: ``|q|^2`` times the direction cosine matrix of q, scalar last.
+
+    Examples
+    --------
+    >>> quaternion_matrix(sp.Matrix([0, 0, 1, 0]))
+    Matrix([
+    [-1,  0, 0],
+    [ 0, -1, 0],
+    [ 0,  0, 1]])
+    """
     columns = []
     for axis in range(3):
         unit = sp.Matrix([int(k == axis) for k in range(4)])
@@ -108,12 +148,24 @@ PAULI = (
 
 
 def cayley_klein_matrix(a: sp.Matrix) -> sp.Matrix:
-    """Return U = a1 I + i (a2 s1 + a3 s2 + a4 s3), the complex 2 x 2 form of Cayley-Klein parameters, a1 the scalar."""
+    """Return U = a1 I + i (a2 s1 + a3 s2 + a4 s3), the complex 2 x 2 form of Cayley-Klein parameters, a1 the scalar.
+
+    Examples
+    --------
+    >>> cayley_klein_matrix(sp.Matrix([1, 0, 0, 0])) == sp.eye(2)
+    True
+    """
     return a[0] * sp.eye(2) + sp.I * sum((a[k + 1] * PAULI[k] for k in range(3)), sp.zeros(2, 2))
 
 
 def cayley_klein_parameters(U: sp.Matrix) -> sp.Matrix:
-    """Return the real parameters, 4 x 1, scalar **first**, of a 2 x 2 matrix: the inverse of `cayley_klein_matrix`."""
+    """Return the real parameters, 4 x 1, scalar **first**, of a 2 x 2 matrix: the inverse of `cayley_klein_matrix`.
+
+    Examples
+    --------
+    >>> cayley_klein_parameters(cayley_klein_matrix(sp.Matrix([4, 1, 2, 3]))).T
+    Matrix([[4, 1, 2, 3]])
+    """
     parts = [U.trace() / 2, *((U * s).trace() / (2 * sp.I) for s in PAULI)]
     return sp.Matrix([sp.expand(part) for part in parts])
 
@@ -159,6 +211,14 @@ def rotation(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = No
     Returns
     -------
     Matrix, 3 x 3
+
+    Examples
+    --------
+    >>> rotation(sp.Matrix([0, 0, sp.Symbol("z")]), order=2)
+    Matrix([
+    [1 - z**2/2,         -z, 0],
+    [         z, 1 - z**2/2, 0],
+    [         0,          0, 1]])
     """
     square = dot(v, v) if square is None else square
     K = skew(v)
@@ -184,6 +244,11 @@ def quaternion(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = 
     -------
     Matrix, 4 x 1
         Scalar last.
+
+    Examples
+    --------
+    >>> quaternion(sp.Matrix([0, 0, sp.Symbol("z")]), order=2).T
+    Matrix([[0, 0, z/2, 1 - z**2/8]])
     """
     square = dot(v, v) if square is None else square
     if order is not None:
@@ -193,13 +258,26 @@ def quaternion(v: sp.Matrix, order: int | None = None, square: sp.Expr | None = 
 
 
 def adjugate(A: sp.Matrix) -> sp.Matrix:
-    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns."""
+    """Return the adjugate of a 3 x 3 matrix, from cross products of its columns.
+
+    Examples
+    --------
+    >>> A = sp.Matrix([[2, 0, 0], [0, 3, 0], [0, 0, 4]])
+    >>> adjugate(A) * A == sp.det(A) * sp.eye(3)
+    True
+    """
     a, b, c = A[:, 0], A[:, 1], A[:, 2]
     return sp.Matrix([cross_elements(b, c), cross_elements(c, a), cross_elements(a, b)])
 
 
 def exact(number: Fraction | sp.Expr) -> sp.Expr:
-    """Return a fraction as a number of SymPy, and any other exact number unchanged."""
+    """Return a fraction as a number of SymPy, and any other exact number unchanged.
+
+    Examples
+    --------
+    >>> exact(Fraction(1, 3)) + sp.Rational(1, 6)
+    1/2
+    """
     return sp.Rational(number.numerator, number.denominator) if isinstance(number, Fraction) else number
 
 

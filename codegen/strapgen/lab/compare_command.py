@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from strapgen import registration
+from strapgen.cli import values
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
 from strapgen.cli.option_groups import Shown, grouped, rules, stated
 from strapgen.cli.options import (
@@ -22,6 +23,7 @@ from strapgen.cli.options import (
     option,
 )
 from strapgen.cli.output import Output
+from strapgen.cli.progress import waiting
 from strapgen.cli.values import NotNegative
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.run_options import ONE_SCALE, SOURCE_NEEDED, SampleSource, described
@@ -71,6 +73,16 @@ def compare(
     ] = None,
     run_differing: RunDiffering = False,
     source: SampleSource,
+    noise: Annotated[
+        NotNegative | None,
+        option(
+            "--noise-deg-sqrt-h",
+            metavar="N",
+            help="Random walk of the gyro in deg per root of an hour, beside which several algorithms are judged.  "
+            "[default: that of the longest rest]",
+            panel="Input",
+        ),
+    ] = None,
     fixed: Annotated[FixedOptions, Shown(only=RUN_OPTIONS)],
     fail_above: Annotated[
         NotNegative | None,
@@ -90,6 +102,9 @@ def compare(
     object code and its operations. Fixed-point formats are chosen for the increments of the run, or for
     --max-rate-deg-s if you give it. --plot draws the angle over time, and the certified bound after as many steps.
 
+    Several algorithms, as euler,dcm, run along one recording on one back end: the spread of their attitudes is what the
+    algorithm costs on this log, and a line says what a better one would be worth beside the noise of the gyro.
+
     Of a described system you see how far each output departs over the run, and after a single pass from equal memories,
     beside the certified bound of a pass; the exit status is 1 if one is outside its bound.
 
@@ -97,6 +112,11 @@ def compare(
     --reference exact --motion coning --set a_deg_s=10 b_deg_s=10 g_deg_s=10 --step 0.125 --duration 180
     """
     output.check(algorithm, *methods.files, *source.files)
+    if "," in algorithm:
+        beside = {"--source": files, "--fail-above": fail_above, **stated(fixed)}
+        return _compare_algorithms(algorithm, methods, backend, beside, source, noise, output)
+    if noise is not None:
+        raise InputError("--noise-deg-sqrt-h goes with several algorithms, as euler,dcm, along a recording")
     # A file alone is compared with the reference.
     names = backend or (() if files else default_backends())
     if (system := described(algorithm)) is not None:
@@ -120,6 +140,40 @@ def compare(
     drift = "drift from the truth" if source.motion is not None else f"drift from {reference}"
     output.show(ComparisonResult(kernels, reference, drift))
     _fail_above(kernels, fail_above, f"further from {reference} than {fail_above} rad")
+
+
+def _compare_algorithms(
+    algorithm: str,
+    methods: SeveralMethods,
+    backend: Sequence[str] | None,
+    beside: Mapping[str, Any],
+    source: SampleSource,
+    noise: NotNegative | None,
+    output: Output,
+) -> None:
+    """Compare the attitudes of several algorithms along a recording."""
+    from strapgen.run.backends import BACKENDS
+
+    names = values.listed("ALGORITHM", algorithm)
+    source.check()
+    name, *more = backend or ("numpy",)
+    refused = [option for option, value in beside.items() if value is not None]
+    if more or BACKENDS[name].fixed:
+        refused.append(f"--backend {','.join((name, *more))}")
+    if source.motion is not None or source.pulse is not None or refused:
+        what = refused[0] if refused else "--motion" if source.motion is not None else "--pulse-arcsec"
+        raise InputError(
+            f"{what} does not go with several algorithms; they run along a --recording on one back end of doubles"
+        )
+    choices = _taking_increments([choice for one in names for choice in methods.choices(one)])
+
+    from strapgen.lab.attitude_spread import spread
+
+    data = source.recorded()
+    with waiting(f"running {len(choices)} algorithms"):
+        result = spread(choices, data, name, source.source, None if noise is None else float(noise))
+    source.say_remarks(data)
+    output.show(result)
 
 
 def _compare(

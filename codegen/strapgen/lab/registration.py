@@ -47,6 +47,7 @@ REGISTRATION = Registration(
         "attitude": f"{__package__}.runs_report:HistoryResult",
         "log": f"{__package__}.recordings.log_report:LogResult",
         "comparison": f"{__package__}.comparison_report:ComparisonResult",
+        "spread": f"{__package__}.attitude_spread:SpreadResult",
         "convergence": f"{__package__}.convergence_report:ConvergenceResult",
         "word-length": f"{__package__}.word_length_report:WordLengthResult",
         "cost": f"{__package__}.cost:CostResult",

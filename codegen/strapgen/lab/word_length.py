@@ -1,4 +1,9 @@
-"""The word-length study measures how much rounding, quantization and truncation each add to the drift."""
+"""The word-length study measures how much rounding, quantization and truncation each add to the drift.
+
+>>> from strapgen import study
+>>> [(case.word, case.carry) for case in study.cases(words=(12, 16), carries="full")]
+[(12, 'full'), (16, 'full')]
+"""
 
 from __future__ import annotations
 
@@ -61,6 +66,12 @@ class Case:
     motion : str
     settings : tuple of (str, str)
         Parameters of the motion.
+
+    Examples
+    --------
+    >>> [case] = cases(words=12, carries="full")
+    >>> case.algorithm, case.method, case.increments, case.word, case.carry
+    ('euler', 'rk4', 2, 12, 'full')
     """
 
     algorithm: str
@@ -108,6 +119,12 @@ class Outcome(Record):
     expected_deg : float or None
         Root mean square of the angle that pulses cause at the end of the run, if the errors of the counted angles are
         independent; None without pulses. See `quantization_noise`.
+
+    Examples
+    --------
+    >>> [case] = cases(words=12, carries="full", duration="2")
+    >>> run_case(case).dominates
+    'rounding'
     """
 
     computed: ClassVar[Properties] = properties(dominates=entry())
@@ -152,6 +169,11 @@ class Study:
     motion_name : str
     settings : dict of str to str, optional
         Parameters of the motion; by default those of the thesis's table 5, and none for the file of a motion.
+
+    Examples
+    --------
+    >>> len(Study(words=(12, 16), methods=("rk2", "rk4")).cases())
+    12
     """
 
     algorithm: AnyAlgorithm = "euler"
@@ -265,7 +287,14 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 
 def run_case(case: Case) -> Outcome:
-    """Run one case, or take its outcome from the cache, so that an interrupted study resumes."""
+    """Run one case, or take its outcome from the cache, so that an interrupted study resumes.
+
+    Examples
+    --------
+    >>> [case] = cases(words=12, carries="full", duration="2")
+    >>> 0 < run_case(case).rounding_deg < 0.1
+    True
+    """
     motion = Path(case.motion).read_bytes() if is_file(case.motion) else b""
     return cache.stored("studies", [json.dumps(asdict(case), sort_keys=True), motion], lambda: _run(case))
 
@@ -318,6 +347,12 @@ def expected_noise(case: Case, pulse: float, samples: Any) -> float:
     """Return the root mean square of the angle in deg that pulses cause in a run, if their errors are independent.
 
     `pulse`: angle in rad. `samples` (N, K, 3): exact increments of the run in rad.
+
+    Examples
+    --------
+    >>> [case] = cases(words=12, carries="full")
+    >>> 0 < expected_noise(case, 1e-5, np.full((9, 2, 3), 1e-3)) < 0.01
+    True
     """
     noise = noise_of(case.algorithm, case.method, case.increments)
     turned = np.square(samples.sum(axis=1)).sum()
@@ -327,7 +362,13 @@ def expected_noise(case: Case, pulse: float, samples: Any) -> float:
 def noise_of(
     algorithm: AnyAlgorithm, method: str | None = None, increments: int | None = None
 ) -> QuantizationNoise:
-    """Return the noise that quantized increments cause in a step; see `quantization_noise`."""
+    """Return the noise that quantized increments cause in a step; see `quantization_noise`.
+
+    Examples
+    --------
+    >>> noise_of("euler", "rk4", 2).across() > 0
+    True
+    """
     return _noise_of(choose_step(algorithm, method, increments))
 
 
@@ -354,6 +395,12 @@ def run(
     Yields
     ------
     Outcome
+
+    Examples
+    --------
+    >>> planned = cases(words=(12, 16), carries="full", duration="2")
+    >>> sorted(outcome.case.word for outcome in run(planned, jobs=1))
+    [12, 16]
     """
     cases = {str(k): case for k, case in enumerate(planned)}
     users = {case.motion for case in planned if is_file(case.motion)}

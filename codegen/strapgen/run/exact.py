@@ -2,6 +2,11 @@
 
 Nothing is generated: the back end interprets the lowered program of a kernel on numbers of mpmath. Inputs are the exact
 numbers that doubles are, and results are rounded to double at the end. An `Interpreter` takes and returns all digits.
+
+>>> from strapgen import algorithm, exact
+>>> program = algorithm("euler", "rk4", increments=1).program()
+>>> exact.propagate(program, [[[0, 0, 0.5]]])[-1].round(6)
+array([0.      , 0.      , 0.247396, 0.968913])
 """
 
 from __future__ import annotations
@@ -50,7 +55,13 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {**OPERATIONS, "sqrt": _sqrt, **FUN
 
 
 def number(value: Fraction) -> Any:
-    """Return a fraction in the digits that mpmath is set to."""
+    """Return a fraction in the digits that mpmath is set to.
+
+    Examples
+    --------
+    >>> number(Fraction(1, 4))
+    mpf('0.25')
+    """
     return mpmath.mpf(value.numerator) / value.denominator
 
 
@@ -95,6 +106,13 @@ def states(program: Program, samples: Iterable[Sequence[Any]], initial: Sequence
     """Return all states of a run of an attitude step in the digits that mpmath is set to, the initial one first.
 
     Angle increments of each step, and states, are row-major.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> program = algorithm("euler", "rk4", increments=1).program()
+    >>> [float(x) for x in states(program, [[0, 0, 0.5]], [0, 0, 0, 1])[-1]]
+    [0.0, 0.0, 0.24739583333333334, 0.9689127604166666]
     """
     return list(itertools.accumulate(samples, Interpreter(program), initial=list(initial)))
 
@@ -134,7 +152,13 @@ def propagate(program: Program, samples: Any, initial: Any = None) -> NDArray[np
 
 
 def interpreter(name: str, step: Program | None = None) -> Interpreter:
-    """Return the interpreter of a kernel by name: one that a step brings, or of the catalogue."""
+    """Return the interpreter of a kernel by name: one that a step brings, or of the catalogue.
+
+    Examples
+    --------
+    >>> [round(float(x), 6) for x in interpreter("euler-normalize").outputs([0, 0, 3, 4])["next"]]
+    [0.0, 0.0, 0.6, 0.8]
+    """
     programs = () if step is None else step.bundled_programs
     return Interpreter(next((one for one in programs if one.kernel == name), None) or _program(name))
 
@@ -145,7 +169,14 @@ def _program(name: str) -> Program:
 
 
 class ExactEvaluator(Evaluator):
-    """A kernel in 40 digits: doubles go in, and doubles come out; `digits` interprets its program."""
+    """A kernel in 40 digits: doubles go in, and doubles come out; `digits` interprets its program.
+
+    Examples
+    --------
+    >>> from strapgen import evaluator
+    >>> evaluator("euler-normalize", "exact")([0, 0, 3.0, 4.0])
+    array([0. , 0. , 0.6, 0.8])
+    """
 
     def __init__(self, sources: Sources) -> None:
         super().__init__(sources, np.float64)
@@ -170,6 +201,13 @@ def attitudes(backend: Backend, samples: Iterable[Sequence[Any]]) -> Iterator[li
     """Yield the matrices of a run of the back end "exact", row by row with all digits, from zero rotation on.
 
     Samples are the increments of each step in rad, row-major, as numbers of mpmath.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> backend = algorithm("euler", "rk4", increments=1).backend("exact")
+    >>> [[round(float(x), 3) for x in matrix] for matrix in attitudes(backend, [[0, 0, 0.5]])][-1]
+    [0.878, -0.479, 0.0, 0.479, 0.878, 0.0, 0.0, 0.0, 1.0]
     """
     step, convert = backend.evaluator, backend.attitude and backend.companion(backend.attitude)
     assert isinstance(step, ExactEvaluator), "doubles hold no further digits"

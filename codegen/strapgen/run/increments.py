@@ -1,4 +1,9 @@
-"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into those of each step."""
+"""Prepares gyro increments for an algorithm: `pulses` quantizes them, `windows` cuts them into those of each step.
+
+>>> from strapgen import gyro
+>>> gyro.pulses(np.full((1, 2, 3), 2.6e-5), 1e-5)[0, :, 0]  # of 1e-5 rad; what remains goes on
+array([3.e-05, 2.e-05])
+"""
 
 from __future__ import annotations
 
@@ -125,6 +130,12 @@ class StepWindows:
         As for `windows`.
     pulse : number, optional
         As for `pulses`; by default increments are not quantized.
+
+    Examples
+    --------
+    >>> row = np.arange(24.0).reshape(8, 3)
+    >>> StepWindows(lambda first, stop: row[first:stop], 2)(1, 2).shape  # steps 1 and 2, of 2 increments each
+    (2, 2, 3)
     """
 
     __repr__ = short_repr
@@ -169,6 +180,11 @@ def run_parts(steps: int, segment: int) -> Iterator[tuple[int, int, int]]:
 
     Yields first step, number of steps, and steps from orthonormalization to orthonormalization in the part, 0 for
     never. A part holds whole segments, or a piece of one that is longer than `PART`.
+
+    Examples
+    --------
+    >>> list(run_parts(5, 2))
+    [(0, 5, 2)]
     """
     first = 0
     while first < steps:

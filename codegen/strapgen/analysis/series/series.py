@@ -82,6 +82,13 @@ class ErrorSeries(ReadOnly, Record):
         For a general rate the same powers in vector-invariant form.
     unknowns : tuple of str
         Coefficients of the kernel that are not known: all terms are polynomials in them.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> error = algorithm("euler", "rk4", increments=2).series("constant", terms=1).step
+    >>> error.order, list(error.drift), list(error.scale)
+    (4, [5], [6])
     """
 
     computed: ClassVar[Properties] = properties(order=entry())

@@ -57,6 +57,12 @@ class VelocitySeries(ReadOnly):
         What the kernel computes, of `PARTS`; the terms of another part are empty.
     unknowns : tuple of str, optional
         Coefficients of the kernel that are not known: all terms are polynomials in them.
+
+    Examples
+    --------
+    >>> from strapgen import choose, unknowns
+    >>> unknowns.velocity_series(choose("velocity-position", "magnus2", 1)).order
+    2
     """
 
     kernel: str

@@ -39,6 +39,11 @@ class Equation:
         Its order; those of lower orders are solved first.
     value : Expr
         A polynomial in the unknowns, or a quotient whose numerator has to be zero.
+
+    Examples
+    --------
+    >>> Equation("the sum of the weights", 1, sp.Symbol("b1") + sp.Symbol("b2") - 1).order
+    1
     """
 
     label: str
@@ -70,6 +75,13 @@ class Family(ReadOnly):
         Polynomials in the free unknowns that must not be zero.
     equations : tuple of Expr
         Irreducible polynomials in the free unknowns that must be zero; empty for almost all families.
+
+    Examples
+    --------
+    >>> a, b = sp.symbols("a b")
+    >>> family = Family({b: 1 - a}, (a,))
+    >>> family.dimension, family.holds(a + b - 1)
+    (1, True)
     """
 
     computed: ClassVar[Properties] = properties(dimension=entry())
@@ -127,6 +139,12 @@ class PolynomialSolution:
         Why there is no solution; "" if there is one.
     solvable : int or None
         If there is no solution, the highest order up to which the equations have one; None if not even the lowest have.
+
+    Examples
+    --------
+    >>> x = sp.Symbol("x")
+    >>> solve([Equation("a square", 1, x**2 - 4)], [x]).families[0].values
+    {x: 2}
     """
 
     unknowns: tuple[sp.Symbol, ...] = field(metadata=entry(kind=list[str]))

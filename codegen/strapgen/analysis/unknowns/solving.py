@@ -49,6 +49,13 @@ class LeadingError(ReadOnly):
     least : dict of Symbol to Expr
         The free parameters at which that sum is smallest; empty where it does not depend on them, or not as a
         polynomial of second degree.
+
+    Examples
+    --------
+    >>> from strapgen import unknowns
+    >>> a = sp.Symbol("a")
+    >>> LeadingError("coning", 5, (unknowns.Equation("drift", 4, a - 1),), (a - 1) ** 2, {a: sp.Integer(1)}).least
+    {a: 1}
     """
 
     motion: str
@@ -79,6 +86,12 @@ class SolvedStep:
     solution : PolynomialSolution
     leading : tuple of tuple of LeadingError
         For each family its leading error on every motion, where there is one within a few powers.
+
+    Examples
+    --------
+    >>> from strapgen import unknowns
+    >>> unknowns.solve("examples/three_samples.py", 4).families[0].free
+    (a,)
     """
 
     kernel: Kernel

@@ -45,6 +45,13 @@ class UnknownTableau:
     matrix : tuple of tuple of Expr
         Below the diagonal, the first row empty.
     weights : tuple of Expr
+
+    Examples
+    --------
+    >>> from strapgen import unknowns
+    >>> tableau = unknowns.read_tableau("examples/heun3.toml")
+    >>> tableau.order, tableau.unknowns[:3]
+    (3, ('c2', 'c3', 'a31'))
     """
 
     name: str
@@ -249,6 +256,12 @@ def read(path: str | Path) -> UnknownTableau:
     ------
     InputError
         If the file cannot be read, or a key or a coefficient is wrong; the message names it.
+
+    Examples
+    --------
+    >>> from strapgen import unknowns
+    >>> unknowns.read_tableau("examples/heun3.toml").unknowns[:3]
+    ('c2', 'c3', 'a31')
     """
     return UNKNOWN_TABLEAU.convert(path, UnknownTableauFile.tableau)
 

@@ -1,4 +1,9 @@
-"""Algorithms with unknown coefficients: their series, their conditions, and the families that satisfy these."""
+"""Algorithms with unknown coefficients: their series, their conditions, and the families that satisfy these.
+
+>>> from strapgen import unknowns
+>>> unknowns.series("euler", "constant", terms=1).order
+4
+"""
 
 from strapgen.analysis.series.series import ErrorSeries, series
 from strapgen.analysis.series.velocity_series import VelocitySeries

@@ -1,6 +1,10 @@
 """The mean drift and sculling rates that an algorithm computes under vibration, derived from its kernel.
 
 Source: P. G. Savage, Strapdown System Algorithms, AGARD Lecture Series 133 (1984), paper 3, equations (65) to (83).
+
+>>> from strapgen import vibration
+>>> print(vibration.of("euler", "drift").unit)
+rad/s
 """
 
 from importlib import import_module as _import_module

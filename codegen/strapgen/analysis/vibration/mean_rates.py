@@ -46,6 +46,11 @@ class Rates(NamedTuple):
     ----------
     continuous, computed, error : float
         The true rate, the rate of the algorithm, and the latter minus the former.
+
+    Examples
+    --------
+    >>> Rates(continuous=1e-3, computed=1.5e-3, error=5e-4).error
+    0.0005
     """
 
     continuous: float
@@ -68,6 +73,13 @@ class Assessment(ReadOnly):
         step T.
     computed, continuous : dict of (str, str) to Form
         Factors of the pairs of channels.
+
+    Examples
+    --------
+    >>> from strapgen import vibration
+    >>> assessed = vibration.of("euler")
+    >>> assessed.unit, assessed.resonant, sorted(assessed.computed)
+    ('rad/s', False, [('angle_x', 'angle_y')])
     """
 
     kernel: str

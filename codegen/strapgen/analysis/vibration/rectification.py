@@ -179,6 +179,12 @@ class Tone(NamedTuple):
         Amplitudes c of the angles about x, y and z in rad, for a tone that begins at the phase 0; -1j is a sine.
     gain : complex, optional
         What the gyro passes on of them.
+
+    Examples
+    --------
+    >>> coning = Tone(10, (-1e-3j, 1e-3, 0))  # a cone of 1 mrad at 10 Hz
+    >>> coning.gain
+    1.0
     """
 
     frequency_hz: float | str | Fraction
@@ -215,6 +221,14 @@ class Rectification:
     ----------
     terms : tuple of _Term
         Terms of orders 1 to 4, with the phases on which they depend.
+
+    Examples
+    --------
+    >>> from strapgen import vibration
+    >>> tones = [vibration.Tone(10, (-1e-3j, 1e-3, 0))]
+    >>> rectified = vibration.rectified("euler", "0.01", tones)
+    >>> f"{rectified.worst():.1e} rad/s"
+    '1.0e-08 rad/s'
     """
 
     terms: tuple[_Term, ...]

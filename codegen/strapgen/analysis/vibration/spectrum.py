@@ -177,6 +177,15 @@ class RandomRates(NamedTuple):
     rates : Rates
     quadrature : Rates
         Estimated error of the integral of each; that of `computed` is the sum of the other two.
+
+    Examples
+    --------
+    >>> from strapgen import vibration
+    >>> turning = {"angle_x": np.ones_like, "angle_y": lambda f: -1j + 0 * f}
+    >>> flat = vibration.Spectrum(lambda f: 1e-6 + 0 * f, turning, (5.0, 50.0))
+    >>> found = vibration.random_rates(vibration.of("euler"), flat, "0.01")
+    >>> abs(found.quadrature.error) < 1e-6 * abs(found.rates.error)
+    True
     """
 
     rates: Rates
@@ -220,6 +229,14 @@ def random_rates(
         If an argument has the wrong type, or a function of the spectrum returns no numbers.
     InputError
         If a function or an integral is not finite, a density is below 0, or an integral does not converge.
+
+    Examples
+    --------
+    >>> from strapgen import vibration
+    >>> turning = {"angle_x": np.ones_like, "angle_y": lambda f: -1j + 0 * f}
+    >>> flat = Spectrum(lambda f: 1e-6 + 0 * f, turning, (5.0, 50.0))
+    >>> f"{random_rates(vibration.of('euler'), flat, '0.01').rates.error:.1e} rad/s"
+    '-4.3e-04 rad/s'
     """
     if not isinstance(assessment, Assessment):
         raise InputTypeError(f"assessment is {assessment!r}; what vibration.of returns is needed")
@@ -256,7 +273,7 @@ def random_rates(
 
 
 def read_spectrum(path: str | Path) -> Spectrum:
-    """Read a spectrum from a file of comma-separated values.
+    r"""Read a spectrum from a file of comma-separated values.
 
     The first line names the columns: ``frequency_hz``; ``density``, in the unit of the input squared per Hz; and any
     of ``angle_x_rad``, ``angle_y_rad``, ``acceleration_x_m_s2``, ``acceleration_y_m_s2``, the magnitudes of the
@@ -280,6 +297,14 @@ def read_spectrum(path: str | Path) -> Spectrum:
         If `path` is no path.
     InputError
         If the file cannot be read, or a column, a number or the order of the rows is not allowed.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> file = Path(mkdtemp()) / "spectrum.csv"
+    >>> _ = file.write_text("frequency_hz,density,angle_x_rad\n5,1e-6,1\n50,1e-6,1\n")
+    >>> read_spectrum(file).edges
+    (5.0, 50.0)
     """
     if not isinstance(path, str | os.PathLike):
         raise InputTypeError(f"spectrum is {path!r}; the path of a file is needed")

@@ -3,6 +3,10 @@
 Munthe-Kaas methods apply a tableau to the rotation vector of the step, and take its exponential. Crouch-Grossman
 methods are a product of exponentials of the rate at the nodes, each times a weight and the step; on attitude kinematics
 the rate does not depend on the attitude, so that nodes and weights are all that is left of the tableau.
+
+>>> from strapgen import TABLEAUX, runge_kutta
+>>> [str(node) for node in runge_kutta.nodes(TABLEAUX["rk4"])]
+['0', '1/2', '1']
 """
 
 from __future__ import annotations
@@ -26,7 +30,14 @@ from strapgen.kernel.kernel import Kernel, KernelBuilder
 
 
 def verified(tableau: Tableau) -> Method:
-    """Return the method of a tableau, a built-in one too, if it meets the conditions of its order."""
+    """Return the method of a tableau, a built-in one too, if it meets the conditions of its order.
+
+    Examples
+    --------
+    >>> from strapgen import TABLEAUX
+    >>> verified(TABLEAUX["rk4"]).order
+    4
+    """
     _require_conditions(tableau)
     return method(tableau)
 
@@ -41,7 +52,14 @@ def _require_conditions(tableau: Tableau) -> None:
 
 
 def method(tableau: Tableau) -> Method:
-    """Return the method of a tableau."""
+    """Return the method of a tableau.
+
+    Examples
+    --------
+    >>> from strapgen import TABLEAUX
+    >>> method(TABLEAUX["ralston3"]).order
+    3
+    """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         turns = {node: samples.turn(node, kinematics.scale) for node in nodes(tableau)}
@@ -72,6 +90,12 @@ def staged_step(kinematics: Kinematics, tableau: Tableau, increments: int | None
 
     The step from `method` is the same polynomial of its inputs; this form is for comparison. It takes so many angle
     increments in rad, or the rate at every node if they are None.
+
+    Examples
+    --------
+    >>> from strapgen import EULER, TABLEAUX
+    >>> [stage.signal.name for stage in staged_step(EULER, TABLEAUX["rk2"], 2).stages][-2:]
+    ['point_2', 'slope_2']
     """
     build = KernelBuilder()
     state = build.input(kinematics.state)
@@ -124,6 +148,15 @@ def advance(
     Returns
     -------
     Matrix
+
+    Examples
+    --------
+    >>> from strapgen import TABLEAUX, Signal
+    >>> build, axis = KernelBuilder(), Signal.vector("axis", "u")
+    >>> start, turns = build.input(axis), {0: sp.Matrix([0, 0, 1])}
+    >>> end = advance(build, TABLEAUX["rk1"], turns, start, sp.Matrix.cross, like=axis, origin="axis")
+    >>> end.T
+    Matrix([[slope_1_x + u_x, slope_1_y + u_y, slope_1_z + u_z]])
     """
 
     def named(name: str, meaning: str) -> Signal:
@@ -147,7 +180,14 @@ def advance(
 
 
 def nodes(tableau: Tableau) -> tuple[Number, ...]:
-    """Return the distinct nodes at which the result needs the rate, as fractions of the step."""
+    """Return the distinct nodes at which the result needs the rate, as fractions of the step.
+
+    Examples
+    --------
+    >>> from strapgen import TABLEAUX
+    >>> [str(node) for node in nodes(TABLEAUX["rk4"])]
+    ['0', '1/2', '1']
+    """
     used = _used(tableau)
     return tuple(dict.fromkeys(node for place, node in enumerate(tableau.nodes) if place in used))
 
@@ -163,7 +203,13 @@ def _used(tableau: Tableau) -> set[int]:
 
 
 def munthe_kaas(order: int) -> Method:
-    """Return the method of an order on the classical tableau `rk<order>`."""
+    """Return the method of an order on the classical tableau `rk<order>`.
+
+    Examples
+    --------
+    >>> munthe_kaas(4).order
+    4
+    """
     tableau = TABLEAUX[f"rk{order}"]
     nodes = tuple(dict.fromkeys(tableau.nodes))
 
@@ -194,6 +240,12 @@ def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
 
     The equation is dphi/dt = sum_k (-1)^k B_k/k! phi x (phi x ... w) with Bernoulli's numbers B_k, B_1 = -1/2, which
     begins w + phi x w/2 + phi x (phi x w)/12 (J. E. Bortz, IEEE Trans. Aerosp. Electron. Syst. 7 (1971) 61-66).
+
+    Examples
+    --------
+    >>> phi, turn = sp.Matrix([0, 0, sp.Symbol("p")]), sp.Matrix([sp.Symbol("w"), 0, 0])
+    >>> bortz(phi, turn, 2).T
+    Matrix([[-p**2*w/12 + w, p*w/2, 0]])
     """
     total, nested = turn, turn
     for k in range(1, products + 1):
@@ -203,7 +255,13 @@ def bortz(phi: sp.Matrix, turn: sp.Matrix, products: int) -> sp.Matrix:
 
 
 def bortz_coefficient(products: int) -> sp.Rational:
-    """Return the coefficient of a number of nested cross products in Bortz's equation."""
+    """Return the coefficient of a number of nested cross products in Bortz's equation.
+
+    Examples
+    --------
+    >>> [bortz_coefficient(products) for products in range(5)]
+    [1, 1/2, 1/12, 0, -1/720]
+    """
     # B_1 of SymPy is +1/2 or -1/2, depending on its release.
     if products == 1:
         return abs(sp.bernoulli(1))
@@ -220,7 +278,13 @@ _WEIGHTS = (Fraction(13, 51), Fraction(-2, 3), Fraction(24, 17))
 
 
 def crouch_grossman(order: int) -> Method:
-    """Return the method of third order."""
+    """Return the method of third order.
+
+    Examples
+    --------
+    >>> crouch_grossman(3).order
+    3
+    """
 
     def transition(build: KernelBuilder, kinematics: Kinematics, samples: Samples) -> sp.Matrix:
         total = None

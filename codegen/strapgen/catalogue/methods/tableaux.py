@@ -1,6 +1,9 @@
 """Butcher tableaux of explicit Runge-Kutta methods, read from files, and their verified order conditions.
 
 `TABLEAUX` are those of the folder `butcher_tableaux`; a user's file is read by `read`.
+
+>>> from strapgen import tableaux
+>>> tableaux.verify(tableaux.TABLEAUX["rk4"])
 """
 
 from __future__ import annotations
@@ -38,7 +41,15 @@ Numbers = tuple[Number, ...]
 
 @dataclass(frozen=True)
 class TableauFile:
-    """An explicit Runge-Kutta method in exact numbers; strapgen verifies its order."""
+    """An explicit Runge-Kutta method in exact numbers; strapgen verifies its order.
+
+    Examples
+    --------
+    >>> quarter, third, no = Fraction(1, 4), Fraction(1, 3), Fraction(0)
+    >>> rows = ((), (2 * third,))
+    >>> TableauFile("Two thirds", "a textbook", 2, (no, 2 * third), rows, (quarter, 3 * quarter)).order
+    2
+    """
 
     name: Title
     source: Source
@@ -104,7 +115,7 @@ TITLES: Merged[str] = Merged(_BUILT_IN_TITLES, Titles(_INSTALLED))
 
 
 def read(path: str | Path) -> Tableau:
-    """Read a tableau from a file and check that it is explicit, its rows sum to its nodes, and it has the stated order.
+    r"""Read a tableau from a file and check that it is explicit, its rows sum to its nodes, and the order is right.
 
     Parameters
     ----------
@@ -120,6 +131,15 @@ def read(path: str | Path) -> Tableau:
     ------
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> file = Path(mkdtemp()) / "two-thirds.toml"
+    >>> text = 'name = "Two thirds"\nsource = "a textbook"\norder = 2\nnodes = [0, "2/3"]\n'
+    >>> _ = file.write_text(text + 'matrix = [[], ["2/3"]]\nweights = ["1/4", "3/4"]\n')
+    >>> read(file).order
+    2
     """
     if "unknowns" in TABLEAU.content(path):
         raise InputError(
@@ -129,7 +149,15 @@ def read(path: str | Path) -> Tableau:
 
 
 def verified(stated: TableauFile, file: str = "") -> Tableau:
-    """Return the tableau of a file, its conditions checked; errors are those of `read`."""
+    """Return the tableau of a file, its conditions checked; errors are those of `read`.
+
+    Examples
+    --------
+    >>> quarter, third, no = Fraction(1, 4), Fraction(1, 3), Fraction(0)
+    >>> rows = ((), (2 * third,))
+    >>> verified(TableauFile("Two thirds", "a textbook", 2, (no, 2 * third), rows, (quarter, 3 * quarter))).name
+    'two-thirds'
+    """
     name = coefficient_files.slug(stated.name)
     if name in _BUILT_IN:
         raise InputError(f"name {stated.name!r} is that of the method {name}; another one is needed")
@@ -144,7 +172,15 @@ def verified(stated: TableauFile, file: str = "") -> Tableau:
 def check_shape(
     nodes: Sequence[Any], matrix: Sequence[Sequence[Any]], **weights: Sequence[Any] | None
 ) -> None:
-    """Check that a matrix and weights go with the number of nodes."""
+    """Check that a matrix and weights go with the number of nodes.
+
+    Examples
+    --------
+    >>> check_shape([0, 1], [[], [1]], weights=[1])
+    Traceback (most recent call last):
+        ...
+    strapgen.InputError: weights has 1 entry; as many as nodes are needed: 2
+    """
     stages = len(nodes)
     if len(matrix) != stages:
         raise InputError(f"matrix has {counted(len(matrix), 'row')}; as many as nodes are needed: {stages}")
@@ -178,6 +214,15 @@ def verify(tableau: Tableau) -> None:
     ------
     InputError
         If one does not hold; the message names the first.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> verify(TABLEAUX["rk4"])
+    >>> verify(replace(TABLEAUX["rk4"], order=5))
+    Traceback (most recent call last):
+        ...
+    strapgen.InputError: order 5: sum b_i c_i^4 = 5/24, 1/5 is needed (off by 1/120)
     """
     for number, defect in enumerate(order_conditions.row_residuals(tableau), 1):
         if defect != 0 and not (tableau.tolerance and abs(defect) <= tableau.tolerance):

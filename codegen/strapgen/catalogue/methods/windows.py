@@ -2,6 +2,10 @@
 
 `WINDOWS` are those of the folder `window_filters`; a user's file is read by `read`. A file is a family: the filters
 that commit an attitude, and one-sided filters for the same samples.
+
+>>> from strapgen import windows
+>>> windows.named_window("window-3-3").total_increments
+7
 """
 
 from __future__ import annotations
@@ -53,7 +57,14 @@ Noise = Annotated[
 
 @dataclass(frozen=True)
 class SideFile:
-    """Filters of a family for other samples before and ahead of the step."""
+    """Filters of a family for other samples before and ahead of the step.
+
+    Examples
+    --------
+    >>> row = (Fraction(0), Fraction(1))
+    >>> SideFile(1, 0, "minimax", (row,)).noise
+    Fraction(0, 1)
+    """
 
     previous: Previous
     ahead: Ahead
@@ -66,7 +77,13 @@ class SideFile:
 
 @dataclass(frozen=True)
 class WindowFile:
-    """A family of filters that estimate the rate over a step; strapgen verifies their conditions."""
+    """A family of filters that estimate the rate over a step; strapgen verifies their conditions.
+
+    Examples
+    --------
+    >>> [*WindowFile.__annotations__][:4]
+    ['name', 'source', 'previous', 'ahead']
+    """
 
     name: Title
     source: Source
@@ -218,7 +235,13 @@ def named_window(name: str) -> Window | None:
 
 
 def with_exact_rotation(window: Window) -> Window:
-    """Return a window of the catalogue with the exact rotation of its polynomial."""
+    """Return a window of the catalogue with the exact rotation of its polynomial.
+
+    Examples
+    --------
+    >>> with_exact_rotation(WINDOWS["window-3-3"]).name
+    'window-3-3-exact'
+    """
     one_sided, start = (tuple(map(with_exact_rotation, some)) for some in (window.one_sided, window.start))
     name, title = f"{window.name}{EXACT}", f"{window.title}; exact rotation"
     terms = max(window.terms, EXACT_TERMS)  # a family may state more
@@ -244,6 +267,15 @@ def read(path: str | Path) -> Window:
     ------
     InputError
         If the file cannot be read, a key or number is wrong, or a condition does not hold; the message names it.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> from strapgen import window_design
+    >>> file = Path(mkdtemp()) / "mine.toml"
+    >>> _ = file.write_text(window_design.written(WINDOWS["window-3-3"], "strapgen window"))
+    >>> read(file).total_increments
+    7
     """
     window = _read(path)
     file = checks.text("the name of the file", str(path))
@@ -273,6 +305,10 @@ def verify(window: Window) -> None:
     ------
     InputError
         If one does not hold; the message names the first.
+
+    Examples
+    --------
+    >>> verify(WINDOWS["window-3-3"])
     """
     for one in (window, *window.one_sided, *window.start):
         place = "" if one is window else f"{one.previous} before and {one.ahead} ahead: "

@@ -29,7 +29,7 @@ _WINDOW_SECONDS, _LEAST_WINDOWS = 0.5, 4
 #: Samples of a window at least.
 _LEAST_SAMPLES = 8
 #: A rest is where the deviation of a window is within this multiple of the calmest one, and in rad/s at most.
-_CALM, _MOST_DEVIATION = 3.0, math.radians(0.5)
+_CALM, _MOST_DEVIATION = 3.0, math.radians(1.0)
 #: Largest mean rate of a rest, and largest difference of the means of its windows from it, in rad/s.
 _MOST_RATE, _MOST_CHANGE = math.radians(5.0), math.radians(0.5)
 #: Windows that are worked on together.
@@ -85,7 +85,7 @@ def rests(recording: Recording) -> list[Rest]:
     """Return the intervals in which a gyro rests, found by the variance of its rates.
 
     It is four or more windows of half a second (at least 8 samples) in a row. In each the standard deviation is at most
-    0.5 deg/s, and within three times that of the calmest window or half a step of the samples; the mean is within 5
+    1 deg/s, and within three times that of the calmest window or half a step of the samples; the mean is within 5
     deg/s, and within 0.5 deg/s of those of the neighbours.
 
     Parameters
@@ -124,8 +124,9 @@ def rests(recording: Recording) -> list[Rest]:
         means[part], deviations[part] = rates.mean(axis=1), rates.std(axis=1)
         steps = np.abs(np.diff(rates, axis=1))
         resolution = np.minimum(resolution, np.where(steps > 1e-12, steps, np.inf).min(axis=(0, 1)))
-    floor = np.maximum(deviations.min(axis=0), np.where(np.isfinite(resolution), resolution, 0) / 2)
-    calm = (deviations <= np.minimum(_CALM * floor + 1e-12, _MOST_DEVIATION)).all(axis=1)
+    deviation = np.linalg.norm(deviations, axis=1)
+    floor = max(float(deviation.min()), float(np.linalg.norm(resolution[np.isfinite(resolution)])) / 2)
+    calm = deviation <= min(_CALM * floor + 1e-12, _MOST_DEVIATION)
     calm &= np.linalg.norm(means, axis=1) <= _MOST_RATE
     changes = np.flatnonzero(np.abs(np.diff(means, axis=0)).max(axis=1) > _MOST_CHANGE)
     edges = {0, windows, *(int(k) + 1 for k in changes), *(int(k) + 1 for k in np.flatnonzero(np.diff(calm)))}

@@ -547,7 +547,7 @@ class AttitudeError(Records):
             self.offset.in_words(),
             f"frames: {begun or ALIGNMENTS[self.align]}{turns}",
             f"error angle: rms {math.sqrt(np.mean(angle**2)):.4g} deg, largest {angle.max():.4g} deg, at the end "
-            f"{angle[-1]:.4g} deg, at {len(angle)} instants from {self.time[0]:.12g} s to {self.time[-1]:.12g} s",
+            f"{angle[-1]:.4g} deg, at {len(angle)} instants over {self.time[-1] - self.time[0]:.6g} s",
             f"slope of the angle {slope.deg_h:.4g} +- {slope.uncertainty_deg_h:.2g} deg/h; of the error about the "
             f"reference axes {by_axis} deg/h (least squares; standard deviations from the slopes between ten "
             "parts)",

@@ -2,6 +2,10 @@
 
 `read` reads a file or a class by name, `measured` and `measured_recording` make a motion and a recording those of
 sensors with errors.
+
+>>> from strapgen import sensors
+>>> list(sensors.read("ahrs").causes)
+['bias', 'scale', 'misalignment', 'noise']
 """
 
 from importlib import import_module as _import_module

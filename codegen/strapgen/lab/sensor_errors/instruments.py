@@ -66,6 +66,12 @@ class TriadErrors(ReadOnly):
         Damping ratio of the response.
     delay : array, (3,)
         In s.
+
+    Examples
+    --------
+    >>> gyro = TriadErrors(bias=np.full(3, 1e-6), pulse=np.full(3, 5e-6))
+    >>> gyro.bias, gyro.noise
+    (array([1.e-06, 1.e-06, 1.e-06]), array([0., 0., 0.]))
     """
 
     bias: Array = field(default_factory=zeros)
@@ -96,6 +102,11 @@ class Sampling:
     lost_as : str
         What stands in the place of a lost sample: "late" for zero, with the increment in the next one, "repeat" for the
         sample before, or "zero".
+
+    Examples
+    --------
+    >>> Sampling(jitter=1e-5, lost=0.01).lost_as
+    'late'
     """
 
     jitter: Annotated[
@@ -123,6 +134,11 @@ class WarmUp(ReadOnly):
         Steady value in rad/s.
     tau : array, (3,)
         Time constant in s.
+
+    Examples
+    --------
+    >>> WarmUp(rate=np.full(3, 1e-6), tau=np.full(3, 60.0)).tau
+    array([60., 60., 60.])
     """
 
     rate: Array = field(default_factory=zeros)
@@ -143,6 +159,11 @@ class Heating(ReadOnly):
         Time constant in s.
     unbalance : float
         Mass unbalance of the gyros in rad/s per m/s^2.
+
+    Examples
+    --------
+    >>> Heating(gain=np.full(3, 1e-5)).tau
+    150.0
     """
 
     gain: Array = field(default_factory=zeros)
@@ -162,6 +183,11 @@ class OutputNoise(ReadOnly):
         A, from 0 to below 1.
     rms : array, (3,)
         Standard deviation of w in rad.
+
+    Examples
+    --------
+    >>> OutputNoise(decay=0.9, rms=np.full(3, 1e-6)).decay
+    0.9
     """
 
     decay: float = 0.0
@@ -187,6 +213,12 @@ class InstrumentErrors:
         values; otherwise they are the values.
     seed : int
         Of the random numbers.
+
+    Examples
+    --------
+    >>> errors = InstrumentErrors(gyro=TriadErrors(bias=np.full(3, 1e-6)))
+    >>> list(errors.causes), list(errors.without("bias").causes)
+    (['bias'], [])
     """
 
     title: str = ""

@@ -160,6 +160,14 @@ def measured_recording(recording: Recorded, errors: InstrumentErrors, run: int =
     ------
     InputError
         If errors of the gyros depend on acceleration, and the recording has none.
+
+    Examples
+    --------
+    >>> from strapgen import Recording, sensors
+    >>> still = Recording(0.0, 0.01, np.zeros((4, 3)))
+    >>> biased = sensors.InstrumentErrors(gyro=sensors.TriadErrors(bias=np.full(3, 1e-3)))
+    >>> measured_recording(still, biased).samples[0]
+    array([1.e-05, 1.e-05, 1.e-05])
     """
     if not any(errors.causes):
         return recording

@@ -1,4 +1,9 @@
-"""Formulas of kernels and programs as text, LaTeX or plain data."""
+"""Formulas of kernels and programs as text, LaTeX or plain data.
+
+>>> from strapgen import derive, formulas
+>>> print(formulas.as_text(derive("euler-normalize")).splitlines()[0])
+Euler parameters: normalization to length 1, exact
+"""
 
 from __future__ import annotations
 
@@ -31,7 +36,14 @@ _OPERATION_COLUMNS = (Column("operation", "<"), Column("number"))
 
 
 def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
-    """Return a kernel's formulas as text, stage by stage, with notes, by default the kernel's own."""
+    """Return a kernel's formulas as text, stage by stage, with notes, by default the kernel's own.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> print(as_text(derive("euler-normalize")).splitlines()[-1])
+      next_s = e_s*inverse_norm
+    """
     lines = [kernel.title, f"source: {kernel.source}", ""]
     for signal in kernel.inputs:
         shape = " x ".join(map(str, signal.shape)) or "scalar"
@@ -56,7 +68,14 @@ def as_text(kernel: Kernel, notes: Sequence[str] | None = None) -> str:
 
 
 def program_as_text(program: Program) -> str:
-    """Return the straight-line code of a program with exact constants."""
+    """Return the straight-line code of a program with exact constants.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> print(program_as_text(algorithm("euler", "rk4", increments=2).program()).splitlines()[0])
+    Euler parameters: step by classical fourth-order Runge-Kutta method from 2 angle increments
+    """
     printer = ExactPrinter()
     lines = [program.title, f"operations: {operations_text(program)}"]
     for assignment in program.body:
@@ -67,7 +86,15 @@ def program_as_text(program: Program) -> str:
 
 
 def operations_as_text(kernel: Kernel, program: Program) -> str:
-    """Return the number of operations of each kind, and of temporaries, as a table."""
+    """Return the number of operations of each kind, and of temporaries, as a table.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> alg = algorithm("euler", "rk4", increments=2)
+    >>> print(operations_as_text(alg.derive(), alg.program()).splitlines()[-1])
+      temporaries    14
+    """
     columns = (Column(align="<", least=12), Column(least=5, gap=0))
     return "\n".join([kernel.name, *TextTable(columns, _counts(program)).lines("  ")])
 
@@ -78,7 +105,14 @@ def _counts(program: Program) -> list[tuple[str, int]]:
 
 @dataclass(frozen=True)
 class StageData:
-    """A stage of a kernel: expressions by element are text that SymPy can read."""
+    """A stage of a kernel: expressions by element are text that SymPy can read.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> StageData.of(derive("euler-normalize").outputs[0]).signal.name
+    'next'
+    """
 
     signal: Signal = field(metadata=entry(spread=True))
     expressions: dict[str, str]
@@ -92,7 +126,15 @@ class StageData:
 
 @dataclass(frozen=True)
 class KernelResult(Result):
-    """The formulas, the program and the operations of a kernel; expressions are text that SymPy can read."""
+    """The formulas, the program and the operations of a kernel; expressions are text that SymPy can read.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> alg = algorithm("euler", "rk4", increments=2)
+    >>> KernelResult.of(alg.derive(), alg.program()).temporaries
+    14
+    """
 
     of_kernel: Kernel = field(metadata=INTERNAL)
     of_program: Program | None = field(metadata=INTERNAL)
@@ -181,6 +223,12 @@ class Formulas:
     kernel : Kernel
     straight_line : Program or None
         Its program; None for a kernel with unknowns, which has none.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> algorithm("euler", "rk4", increments=2).formulas.operations["add"]
+    30
     """
 
     kernel: Kernel
@@ -223,7 +271,14 @@ class Formulas:
 
 
 def program_as_data(program: Program) -> dict[str, str]:
-    """Return the straight-line code of a program by the names that it assigns, in order, with exact constants."""
+    """Return the straight-line code of a program by the names that it assigns, in order, with exact constants.
+
+    Examples
+    --------
+    >>> from strapgen import algorithm
+    >>> len(program_as_data(algorithm("euler", "rk4", increments=2).program()))
+    18
+    """
     printer = ExactPrinter()
     return {assignment.name: printer.text(assignment.value) for assignment in program.body}
 
@@ -234,12 +289,25 @@ def as_latex(kernel: Kernel) -> str:
     A step is in vectors, their scalar and cross products, as its program computes it. Where that would be longer than
     the stages, these are written, as sums and products of vectors, quaternions (a vector has the scalar part 0) and
     matrices; what is no such sum is written element by element.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> as_latex(derive("euler", "rk4", 2)).count("&=")
+    4
     """
     return _in_vectors(kernel) or elements_latex(kernel)
 
 
 def short_latex(kernel: Kernel) -> str | None:
-    """Return a kernel's formulas as LaTeX; None if they are longer than half a page."""
+    """Return a kernel's formulas as LaTeX; None if they are longer than half a page.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> len(short_latex(derive("euler", "rk4", 2)).splitlines())
+    6
+    """
     text = _in_vectors(kernel)
     if text is None:
         rows = sum(stage.signal.size for stage in (*kernel.stages, *kernel.outputs))
@@ -260,6 +328,12 @@ def elements_latex(kernel: Kernel) -> str:
     """Return a kernel's formulas element by element as one LaTeX align environment.
 
     A function or root that no line holds gets a letter with a number, and a line of its own before.
+
+    Examples
+    --------
+    >>> from strapgen import derive
+    >>> elements_latex(derive("euler", "rk4", 2)).count("&=")
+    45
     """
     names = {
         sp.Symbol(element, real=True): _latex_name(element)
