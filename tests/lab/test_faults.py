@@ -111,9 +111,10 @@ def test_pieces_start_anew():
         np.testing.assert_allclose(own.states[0], [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-15)
 
 
-def test_rows_are_restored_within_pieces():
+@pytest.mark.parametrize("places", [[60], [60, 300], [300]])
+def test_rows_are_restored_within_pieces(places):
     kept, broken = np.ones(COUNT, bool), RATES.copy()
-    kept[150:170], broken[[60, 300], 0] = False, np.nan
+    kept[150:170], broken[places, 0] = False, np.nan
     got = read(TIME[kept], broken[kept], gaps="split", repair="nan")
     assert [len(piece.samples) for piece in got.pieces] == [150, 230]
     whole = np.concatenate([RATES[:150], RATES[170:]]) * STEP
