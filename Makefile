@@ -134,7 +134,7 @@ check-prose:
 $(BENCH): pyproject.toml
 	$(PYTHON) -m venv .venv-bench
 	.venv-bench/bin/python -m pip install --disable-pip-version-check -e .
-	@for name in symforce casadi wrenfold; do \
+	@for name in symforce casadi wrenfold logs; do \
 	  .venv-bench/bin/python -m pip install --disable-pip-version-check -e ".[bench-$$name]" \
 	    || echo "$$name cannot be installed; the benchmark goes on without it" >&2; \
 	done
@@ -146,6 +146,7 @@ bench: $(BENCH)
 	.venv-bench/bin/python benchmarks/backends.py
 	.venv-bench/bin/python benchmarks/throughput.py
 	.venv-bench/bin/python benchmarks/jacobians.py
+	.venv-bench/bin/python benchmarks/logs.py
 
 generate: $(READY)
 	$(BIN)/strapgen generate --all

@@ -82,3 +82,18 @@ def test_the_fixed_point_step_is_timed_against_one_written_out(tmp_path):
     ]
     assert list(timed) == ["double, staged, written out", "double, strapgen", *words]
     assert all(float(time) > 0 for time in timed.values())
+
+
+def test_logs_are_timed_beside_what_reads_them_too():
+    command = [sys.executable, "logs.py", "--rows", "20000", "--rounds", "1"]
+    done = subprocess.run(command, cwd=FOLDER, capture_output=True, text=True)
+    timed = re.findall(r"^  (.+?): ([\d.]+) s of processor time, (\d+) MB$", done.stdout, flags=re.MULTILINE)
+    assert {name for name, *_ in timed} >= {
+        "strapgen, CSV",
+        "strapgen without pyarrow, CSV",
+        "numpy.loadtxt, CSV",
+    }
+    assert re.search(
+        r"^strapgen simulate: [\d.]+ s of processor time, \d+ MB", done.stdout, flags=re.MULTILINE
+    )
+    assert all(int(megabytes) > 20 for _, _, megabytes in timed)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapgen.ir.exceptions import InputError
@@ -21,7 +21,7 @@ from strapgen.lab.recordings.formats import csv_table
 from strapgen.lab.recordings.formats.csv_table import CsvTable, LineNumbers
 from strapgen.lab.recordings.formats.decimals import Marks
 from strapgen.lab.recordings.log_file import LogColumn, open_log
-from strapgen.lab.recordings.long_columns import Columns, largest_magnitude, parts
+from strapgen.lab.recordings.long_columns import Columns, SideBySide, largest_magnitude, parts
 
 PLAIN = st.sampled_from(
     ["0", "1.5", "-2e-3", " 3 ", "+4", ".5", "1e400", "1_0", "nan", "", "x", "0x1p3", "٣", '"7"', '"8\n"']
@@ -50,16 +50,19 @@ def outcome(path: Path) -> str:
 
 
 @given(st.lists(ROWS, max_size=12), st.sampled_from(["\n", "\r\n", "\r"]), st.sampled_from([16, 50, 1000]))
+@settings(deadline=None)
 def test_blocks_equal_single_cells(lines, end, block):
     path = Path(tempfile.gettempdir()) / f"rows-{np.random.default_rng().integers(1 << 60)}.csv"
     good = [f"{k},{k},{k},{k}" for k in range(20)]
     path.write_bytes(end.join([*good, *lines, *good, ""]).encode())
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(csv_table, "_SAMPLE", 20)
-            patch.setattr(csv_table, "_BLOCK", 1000)
+            patch.setattr(csv_table, "_SAMPLE", 4)
+            patch.setattr(csv_table, "_BLOCK", 100)
             whole = outcome(path)
-            patch.setattr(CsvTable, "_marks", lambda self, block: None)
+            patch.setattr(csv_table, "_arrow", lambda: None)
+            assert outcome(path) == whole
+            patch.setattr(CsvTable, "_plain", lambda self, block, places: None)
             assert outcome(path) == whole
             patch.undo()
             patch.setattr(csv_table, "_SAMPLE", 4)
@@ -275,6 +278,21 @@ def test_parts_cover_all_rows(few_on_disk, overlap, count, rng):
     assert largest_magnitude(columns.array()) == np.abs(rows).max()
 
 
+def test_columns_side_by_side_are_as_their_table(rng):
+    table = rng.normal(size=(9, 4))
+    lazy = SideBySide([*table.T])
+    assert (len(lazy), lazy.shape, lazy.ndim) == (9, (9, 4), 2)
+    keys = (slice(2, 7), slice(None), 3, -1, np.array([4, 0]), table[:, 0] > 0, (3, 1), (slice(1, 5), 2))
+    for key in (
+        *keys,
+        (slice(None), slice(None, 3)),
+        (slice(3, 1), slice(1, 3)),
+        (np.array([1, 2]), slice(None, 2)),
+    ):
+        np.testing.assert_array_equal(np.asarray(lazy[key]), table[key])
+    assert [(first, part.tolist()) for first, part in parts(lazy)] == [(0, table.tolist())]
+
+
 def test_a_full_disk_is_reported(few_on_disk, full_device, monkeypatch):
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: full_device.open("wb"))
     columns = Columns(1)
@@ -338,7 +356,7 @@ def test_blocks_are_read_lazily(tmp_path, monkeypatch):
     path = tmp_path / "x.csv"
     path.write_text("1\n2\n3\n4\n5\n")
     blocks = csv_table.line_blocks(path)
-    assert next(blocks) == b"1\n2\n"
+    assert next(blocks) == (1, 2, b"1\n2\n")
     with path.open("a") as file:
         file.write("6")
-    assert b"".join(blocks) == b"3\n4\n5\n6\n"
+    assert [*blocks] == [(3, 3, b"3\n4\n5\n"), (6, 1, b"6\n")]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import strapgen
 from strapgen.ir.exceptions import InputError, MissingExtraError
 from strapgen.lab.recordings import long_columns
 from strapgen.lab.recordings.formats import column_tables, ros
@@ -22,7 +23,7 @@ scipy_io = pytest.importorskip("scipy.io")
 from pyarrow import feather, parquet  # noqa: E402
 from rosbags.rosbag1 import Writer as Bag1  # noqa: E402
 from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: E402
-from rosbags.typesys import Stores, get_typestore  # noqa: E402
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
 
 ROWS = 30
 STAMPS = np.arange(ROWS) * 5_000_000 + 1_700_000_000_000_000_000
@@ -263,6 +264,24 @@ def test_topics_of_bags(bag, monkeypatch):
     assert [got[f"angular_velocity.{axis}"] for axis in "xyz"] == RATES.T.tolist()
     assert got["orientation.w"] == [1] * ROWS and got["linear_acceleration.z"] == [9.75] * ROWS
     assert log.place("/imu", 16) == "message 17"
+
+
+def test_messages_of_one_length_with_texts_of_several(tmp_path):
+    store, kind, path = get_typestore(Stores.ROS1_NOETIC), "test/msg/Between", tmp_path / "x.bag"
+    store.register(get_types_from_msg("string before\nfloat64 number\nstring after\n", kind))
+    with Bag1(path) as bag:
+        connection = bag.add_connection("/between", kind, typestore=store)
+        for k, (before, after) in enumerate([("a", "bbb"), ("aaa", "b"), ("aa", "bb")] * 3):
+            message = store.types[kind](before=before, number=k + 0.5, after=after)
+            bag.write(connection, k, store.serialize_ros1(message, kind))
+    assert columns(path, "/between")["number"] == [k + 0.5 for k in range(9)]
+
+
+def test_a_bag_is_a_recording_without_more_words(bag):
+    """Its covariances are no rates."""
+    recording = strapgen.read(bag)
+    assert recording.interval == pytest.approx(0.005, rel=1e-9)
+    np.testing.assert_allclose(recording.samples[:, 1], RATES[:, 1] * 0.005, rtol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["mcap", "mcap, lz4", "mcap, zstd"])

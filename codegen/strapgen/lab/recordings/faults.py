@@ -130,8 +130,7 @@ def refuse(samples: Samples, where: Callable[[int], str], repair: Container[str]
 def _take_out_not_finite(samples: Samples, names: Sequence[str]) -> None:
     bad: list[Array] = []
     for (first, time), (_, values) in zip(parts(samples.time), parts(samples.values), strict=True):
-        sums = time + values.sum(axis=1)
-        if not np.isfinite(sums.sum()):
+        if not np.isfinite(time.sum() + values.sum()):
             good = np.isfinite(time) & np.isfinite(values).all(axis=1)
             bad.append(first + np.flatnonzero(~good))
     if not (rows := np.concatenate([np.empty(0, np.int64), *bad])).size:
@@ -198,7 +197,8 @@ def _take_out_repeated(samples: Samples) -> bool:
 def _take_out_stuck(samples: Samples) -> None:
     found: list[Array] = []
     for first, part in parts(samples.values, 1):
-        found.append(first + 1 + np.flatnonzero((part[1:, :3] == part[:-1, :3]).all(axis=1)))
+        places = np.flatnonzero(part[1:, 0] == part[:-1, 0])
+        found.append(first + 1 + places[(part[places + 1, :3] == part[places, :3]).all(axis=1)])
         if sum(map(len, found)) > _RESTING * len(samples.values):
             return
     equal = np.concatenate(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
 import numpy as np
@@ -47,7 +47,7 @@ class Columns:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(prefix="strapgen-")  # noqa: SIM115
             for waiting in self._parts:
-                self._file.write(waiting.tobytes())
+                self._file.write(waiting.data)
         except OSError as error:
             raise _disk_full(error) from None
         self._parts.clear()
@@ -75,8 +75,38 @@ def _disk_full(error: OSError) -> InputError:
     )
 
 
+class SideBySide:
+    """Columns of doubles as the columns of one table, of which as much is put together as is asked for."""
+
+    ndim = 2
+    dtype = np.dtype(np.float64)
+
+    def __init__(self, columns: Sequence[Array]) -> None:
+        self.columns = columns
+        self.shape = (len(columns[0]), len(columns))
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return rows by a slice, which are not put together yet; rows by numbers; one row; or columns of those."""
+        rows, *columns = key if isinstance(key, tuple) else (key,)
+        if not isinstance(rows, slice):
+            return np.stack([column[rows] for column in self.columns], axis=-1)[..., *columns]
+        chosen: Any = np.arange(len(self.columns))[*columns]
+        if np.ndim(chosen) == 0:
+            return np.asarray(self.columns[int(chosen)][rows], np.float64)
+        return SideBySide([self.columns[int(place)][rows] for place in chosen])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.stack(self.columns, axis=1, dtype=np.float64)
+
+
 def release(array: Any) -> None:
     """Let the system forget what it has read of an array on the disk; others stay as they are."""
+    if isinstance(array, SideBySide):
+        for column in array.columns:
+            release(column)
     while array is not None and not isinstance(array, mmap.mmap):
         array = getattr(array, "base", None)
     if array is not None and hasattr(array, "madvise"):

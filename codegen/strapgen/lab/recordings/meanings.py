@@ -26,10 +26,10 @@ _SUFFIXES = ("ns", "us", "ms", "s", "sec", "rad_s", "rads", "deg_s", "dps", "mdp
 _ANGLES = re.compile(r"(?:.*_)?(?:d|d_?theta|d_?ang(?:le)?|delta_?(?:theta|ang(?:le)?))")
 _VELOCITIES = re.compile(r"(?:.*_)?(?:d_?v|d_?vel(?:ocity)?|delta_?v(?:el(?:ocity)?)?)")
 _RATES = re.compile(
-    r"(?:.*_)?(?:gyr\w*|angular_?(?:velocity|rate|vel|speed)|ang_?vel|omega|rotation_?rate|w_rs_s)(?:_.*)?|g|w|rate"
+    r"(?!.*covariance)(?:.*_)?(?:gyr\w*|angular_?(?:velocity|rate|vel|speed)|ang_?vel|omega|rotation_?rate|w_rs_s)(?:_.*)?|g|w|rate"
 )
 _FORCES = re.compile(
-    r"(?:.*_)?(?:acc\w*|linear_?acc\w*|specific_?force|force|a_rs_s)(?:_.*)?|a|f|user_?acc\w*"
+    r"(?!.*covariance)(?:.*_)?(?:acc\w*|linear_?acc\w*|specific_?force|force|a_rs_s)(?:_.*)?|a|f|user_?acc\w*"
 )
 #: Those of a magnetometer and an attitude, beside which, as beside forces, a bare axis is open.
 _OTHER = re.compile(r"(?:.*_)?(?:mag\w*|quat\w*|euler\w*)(?:_.*)?|m|b|e|q")

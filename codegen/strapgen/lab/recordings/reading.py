@@ -20,7 +20,7 @@ from strapgen.ir.exceptions import InputError
 from strapgen.lab.recordings import faults, meanings
 from strapgen.lab.recordings.faults import Samples
 from strapgen.lab.recordings.log_file import LogFile
-from strapgen.lab.recordings.long_columns import Columns, parts, release
+from strapgen.lab.recordings.long_columns import Columns, SideBySide, parts
 from strapgen.lab.recordings.meanings import INPUTS, Meanings, Stated, known_unit
 from strapgen.stamped.grid_clock import StampError
 from strapgen.stamped.stamped_grid import StampedGrid
@@ -116,7 +116,7 @@ def loaded(log: LogFile, topic: str, reading: Reading) -> tuple[Samples, Meaning
     count = len(read[wanted[0]])
     if count < 2:
         raise InputError(f"{log.path} holds {counted(count, 'row')} of numbers; at least 2 are needed")
-    values = _values(read, [*meaning.samples, *meaning.forces])
+    values: Any = SideBySide([read[name] for name in (*meaning.samples, *meaning.forces)])
     begin, time = _times(log, read, meaning, reading, count)
     first, last = _between(time, reading.start, reading.end)
     if last - first < 2:
@@ -193,17 +193,6 @@ def increments(log: LogFile, topic: str, reading: Reading) -> Increments:
     return Increments(
         breaks[0][1], samples.interval * every, angle, velocity, tuple(remarks), tuple(breaks[1:])
     )
-
-
-def _values(read: dict[str, Array], names: Sequence[str]) -> Array:
-    """Return columns side by side."""
-    table = Columns(len(names))
-    for first, part in parts(read[names[0]]):
-        rows = slice(first, first + len(part))
-        table.append(np.column_stack([np.asarray(read[name][rows], np.float64) for name in names]))
-        for name in names:
-            release(read[name])
-    return table.array()
 
 
 def _times(

@@ -14,9 +14,11 @@ from array import array
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
+from importlib import import_module
 from itertools import chain, islice
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +52,14 @@ _COMPRESSED: dict[bytes, Any] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xf
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
 
 
+class Block(NamedTuple):
+    """Whole lines, each ended by a line feed: the number of the first, how many, and their text."""
+
+    first: int
+    lines: int
+    text: bytes
+
+
 class LineNumbers:
     """Line numbers of rows, stored where the distance between row and line changes."""
 
@@ -79,7 +89,7 @@ class CsvTable:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._rows = LineNumbers()
-        first = next(line_blocks(path), b"")
+        first = next((block.text for block in line_blocks(path)), b"")
         sample = list(islice(io.StringIO(_decoded(first)), _SAMPLE))
         self._separator = _separator(sample)
         #: Lines before the first row
@@ -132,13 +142,13 @@ class CsvTable:
         stores = [Columns(1, np.int64) for _ in places]
         self._rows, count = LineNumbers(), 0
         blocks = self._blocks()
-        for first, block in blocks:
-            parts = self._plain(block, places)
-            lines: Sequence[int] = range(first, first + len(parts[0])) if parts else ()
+        for block in blocks if columns else ():
+            parts = (self._by_arrow(block, places, stores) if count else None) or self._plain(block, places)
+            lines: Sequence[int] = range(block.first, block.first + block.lines)
             if parts is None:
                 # A cell in quotation marks may go on in the next block.
-                rest = (more for _, more in blocks) if b'"' in block else ()
-                lines, parts = self._one_by_one(chain([block], rest), first, places)
+                rest = blocks if b'"' in block.text else ()
+                lines, parts = self._one_by_one(chain([block], rest), places)
             self._rows.add(count, lines)
             count += len(lines)
             for store, part in zip(stores, parts, strict=True):
@@ -153,37 +163,30 @@ class CsvTable:
     def _mark(self) -> bytes:
         return (self._separator or "\t").encode()
 
-    def _blocks(self) -> Iterator[tuple[int, bytes]]:
-        """Yield the lines below the header in blocks, with the number of the first line of each."""
-        line = 1
-        for block in line_blocks(self.path):
-            if line <= self._head:
-                block = b"".join(block.splitlines(keepends=True)[self._head :])
-                line += self._head
-            count = block.count(b"\n")
+    def _blocks(self) -> Iterator[Block]:
+        """Yield the lines below the header, with a point in numbers and one separator between cells."""
+        for first, lines, text in line_blocks(self.path):
+            if first <= self._head:
+                text = b"".join(text.splitlines(keepends=True)[self._head :])
+                first, lines = first + self._head, lines - self._head
             if self._separator != ",":
-                block = block.replace(b",", b".")  # a decimal comma
+                text = text.replace(b",", b".")
             if self._separator is None:
-                block = b"".join(b"\t".join(cells.split()) + b"\n" for cells in block.split(b"\n")[:-1])
-            yield line, block
-            line += count
+                text = b"".join(b"\t".join(cells.split()) + b"\n" for cells in text.split(b"\n")[:-1])
+            yield Block(first, lines, text)
 
-    def _marks(self, block: bytes) -> Marks | None:
-        """Return where the cells of a block stand in which every line is a row of plain cells; None for any other."""
-        if b'"' in block or any(block.startswith(mark) or b"\n" + mark in block for mark in _COMMENT_BYTES):
-            return None
-        width = block[: block.find(b"\n")].count(self._mark) + 1
-        marks = Marks(block, self._mark, width)
-        if width < self._width or not marks.is_plain or not marks.rows:
-            return None
-        blank = (marks.cells(place) for place in range(self._width, width))
-        return marks if all(bool((start >= end).all()) for start, end in blank) else None
-
-    def _plain(self, block: bytes, places: list[int]) -> list[Array] | None:
+    def _plain(self, block: Block, places: list[int]) -> list[Array] | None:
         """Return columns of a block in which every line is a row; None for any other."""
-        marks = self._marks(block)
-        if marks is None:
+        if _has_marks(block.text):
             return None
+        width = block.text[: block.text.find(b"\n")].count(self._mark) + 1
+        marks = Marks(block.text, self._mark, width)
+        if width < self._width or not marks.is_plain:
+            return None
+        for place in range(self._width, width):
+            start, end = marks.cells(place)
+            if (start < end).any():
+                return None
         columns = []
         for place in places:
             doubles, integers, is_read, are_integers = marks.numbers(place)
@@ -197,13 +200,31 @@ class CsvTable:
             columns.append(integers if are_integers and is_read.all() else doubles)
         return columns
 
-    def _one_by_one(
-        self, blocks: Iterable[bytes], first: int, places: list[int]
-    ) -> tuple[list[int], list[Array]]:
+    def _by_arrow(self, block: Block, places: list[int], stores: list[Columns]) -> list[Array] | None:
+        """Return columns of a block of plain rows whose cells are as those before; None for any other."""
+        if _arrow() is None or _has_marks(block.text):
+            return None
+        names = [str(place) for place in range(self._width)]
+        kinds = {
+            names[place]: "int64" if store.is_integer else "float64"
+            for place, store in zip(places, stores, strict=True)
+        }
+        try:
+            table = _arrow().read_csv(
+                io.BytesIO(block.text),
+                _arrow().ReadOptions(column_names=names, use_threads=False, block_size=len(block.text) + 1),
+                _arrow().ParseOptions(delimiter=self._mark.decode(), quote_char=False),
+                _arrow().ConvertOptions(column_types=kinds, include_columns=[*kinds], null_values=[]),
+            )
+        except ValueError:  # a cell that is no number, or a row of another length
+            return None
+        return None if table.num_rows != block.lines else [table[names[place]].to_numpy() for place in places]
+
+    def _one_by_one(self, blocks: Iterable[Block], places: list[int]) -> tuple[list[int], list[Array]]:
         """Return columns of rows that are not all plain, and their lines; refuse the first that is no row."""
         lines: list[int] = []
         columns: list[list[int | float]] = [[] for _ in places]
-        for line, row in csv_rows(self.path, blocks, first, self._mark.decode()):
+        for line, row in csv_rows(self.path, blocks, self._mark.decode()):
             if row[0].lstrip().startswith(_COMMENTS):
                 continue
             where = f"{self.path}, line {line}"
@@ -234,6 +255,22 @@ def _number(cell: str) -> int | float | None:
     if math.isnan(number):
         return number if text.lower() in _MISSING else None
     return int(text) if _INTEGER.fullmatch(text) and abs(int(text)) < 2**63 else number
+
+
+@cache
+def _arrow() -> Any:
+    """Return the reader of pyarrow, which is faster than numpy, where it is installed."""
+    try:
+        return import_module("pyarrow.csv")
+    except ImportError:
+        return None
+
+
+def _has_marks(text: bytes) -> bool:
+    """Return whether there are cells in quotation marks or comments; a single character is looked for fast."""
+    return b'"' in text or any(
+        mark[:1] in text and (text.startswith(mark) or b"\n" + mark in text) for mark in _COMMENT_BYTES
+    )
 
 
 def _separator(sample: list[str]) -> str | None:
@@ -273,8 +310,8 @@ def _are_units(cells: list[str]) -> bool:
     return not known.isdisjoint(stated) and not any(map(_resembles_number, cells))
 
 
-def line_blocks(path: Path) -> Iterator[bytes]:
-    """Yield the lines of a file in blocks; each line ends with a line feed."""
+def line_blocks(path: Path) -> Iterator[Block]:
+    """Yield the lines of a file in blocks."""
     count, rest = 0, b""
     try:
         with _opened(path) as file:
@@ -294,22 +331,28 @@ def line_blocks(path: Path) -> Iterator[bytes]:
                     lines += b"\n"
                     end = len(lines)
                 block, rest = lines[:end], lines[end:] + held
-                ends = np.flatnonzero(np.frombuffer(lines, np.uint8) == 10)
-                sizes = np.diff(ends, prepend=-1, append=len(lines)) - 1
-                if sizes.max() > MOST_CHARACTERS:
-                    raise InputError(
-                        f"{path}, line {count + 1 + int(sizes.argmax())}: over {MOST_CHARACTERS} characters, which no "
-                        "line may have"
-                    )
-                count += len(ends)
+                _require_short(path, lines, count)
+                number = block.count(b"\n")
+                count += number
                 if count > MOST_ROWS:
                     raise InputError(f"{path} has over {MOST_ROWS} lines; that is too many")
                 if block:
-                    yield block
+                    yield Block(count - number + 1, number, block)
                 if not chunk:
                     return
     except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
         raise InputError(f"{path} cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
+def _require_short(path: Path, lines: bytes, before: int) -> None:
+    """Refuse a line that is too long: between two line feeds far apart a stretch of half the distance has none."""
+    half = MOST_CHARACTERS // 2
+    if all(lines.find(b"\n", first, first + half) >= 0 for first in range(0, len(lines) - half, half)):
+        return
+    sizes = [*map(len, lines.split(b"\n"))]
+    if max(sizes) > MOST_CHARACTERS:
+        number = before + 1 + next(k for k, size in enumerate(sizes) if size > MOST_CHARACTERS)
+        raise InputError(f"{path}, line {number}: over {MOST_CHARACTERS} characters, which no line may have")
 
 
 def _opened(path: Path) -> IO[bytes]:
@@ -338,13 +381,17 @@ def _decoded(block: bytes) -> str:
         return block.decode("latin-1")  # as a degree sign in a header
 
 
-def csv_rows(
-    path: Path, blocks: Iterable[bytes], first: int = 1, separator: str = ","
-) -> Iterator[tuple[int, list[str]]]:
+def csv_rows(path: Path, blocks: Iterable[Block], separator: str = ",") -> Iterator[tuple[int, list[str]]]:
     """Yield the cells of each row with the number of the line at which it ends."""
-    reader = csv.reader(
-        chain.from_iterable(io.StringIO(_decoded(block)) for block in blocks), delimiter=separator
-    )
+    first = 1
+
+    def lines() -> Iterator[str]:
+        nonlocal first
+        for place, block in enumerate(blocks):
+            first = first if place else block.first
+            yield from io.StringIO(_decoded(block.text))
+
+    reader = csv.reader(lines(), delimiter=separator)
     try:
         for row in reader:
             if len(row) > MOST_CELLS:
