@@ -114,7 +114,7 @@ def explanation(error: Any) -> str:
         name = parameter.opts[0] if parameter.param_type_name == "option" else _label(parameter)
         return f"Missing {parameter.param_type_name} '{name}': {_meaning(parameter, context)}"
     if name is not None and command is not None and said.startswith("No such option"):
-        known = [option.opts[0] for option in _options_of(command, context)]
+        known = [option.opts[0] for option in _shown_options(command, context)]
         return f"No such option: {name}{_question(suggestions('option', name, known))}; --help shows all"
     return said
 
@@ -136,11 +136,12 @@ def _meaning(parameter: Any, context: Any) -> str:
 
 
 def _options_of(command: Any, context: Any) -> list[Any]:
-    return [
-        p
-        for p in command.get_params(context)
-        if p.param_type_name == "option" and not getattr(p, "hidden", False)
-    ]
+    return [p for p in command.get_params(context) if p.param_type_name == "option"]
+
+
+def _shown_options(command: Any, context: Any) -> list[Any]:
+    """Return the options without old ones, which no help and no suggestion names."""
+    return [p for p in _options_of(command, context) if not getattr(p, "hidden", False)]
 
 
 def _refuse_missing_values(command: Any, context: Any, words: Sequence[str]) -> None:
@@ -188,7 +189,7 @@ def _in_options(command: Any, message: str) -> str:
 def _panels(command: Any, context: Any) -> dict[str, list[tuple[str, str]]]:
     """Return the arguments and the options by the titles of their groups, general groups last."""
     panels: dict[str, list[tuple[str, str]]] = {}
-    for parameter in (*_arguments(command, context), *_options_of(command, context)):
+    for parameter in (*_arguments(command, context), *_shown_options(command, context)):
         title = (
             "Arguments"
             if parameter.param_type_name == "argument"
