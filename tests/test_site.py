@@ -12,11 +12,14 @@ import sys
 import types
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 
+import numpy as np
 import pytest
 import typer.main
 from browser_checks import WIDTHS, faults, looked_at, opened
@@ -188,6 +191,40 @@ def test_constants_have_their_comments_in_the_reference():
         assert re.search(rf"^\.\. py:data:: strapgen\.{name}\n\n   \w.*\.$", text, re.MULTILINE), name
 
 
+TABLE = {"add": len}
+
+
+@dataclass
+class Record:
+    """Stands for those of the reference."""
+
+    sizes: dict[str, int] = field(default_factory=dict)
+    axes: np.ndarray = field(default_factory=lambda: np.array([[1.0, 0.5]]))
+    lag: Fraction = Fraction(1, 8)
+    run: Any = sorted
+    names: tuple[str, ...] = ("x",)
+
+
+def of_a_table(value, *, table=TABLE, text="1/8"):
+    """Takes a table of the module."""
+
+
+@pytest.mark.parametrize(
+    ("thing", "signature"),
+    [
+        (Record, "(sizes={}, axes=((1, 0.5),), lag=1/8, run=sorted, names=('x',))"),
+        (of_a_table, "(value, *, table=TABLE, text='1/8')"),
+    ],
+)
+def test_defaults_are_written_as_a_user_would(thing, signature):
+    inspected = pytest.importorskip("sphinx.util.inspect")
+    from signatures import with_plain_defaults
+
+    known = inspected.stringify_signature(inspect.signature(thing), show_annotation=False)
+    assert known != signature and with_plain_defaults(known, thing) == signature
+    assert with_plain_defaults("(x)", 1) == "(x)"
+
+
 def test_every_command_is_in_the_reference_with_its_options():
     pages, missing = reference_commands.pages(), []
     for words, command in commands():
@@ -333,6 +370,10 @@ def test_the_built_reference_has_every_name_and_every_command(site):
     assert len(methods) > 50 and [method for method in methods if method not in anchors] == []
     plain = html.unescape(re.sub(r"<[^>]*>", "", "".join(texts.values())))
     assert [words for words, _ in commands() if f"strapgen {words} [OPTIONS]" not in plain] == []
+    defaults = re.findall(r'class="default_value">(.*?)</span></em>', "".join(texts.values()), re.DOTALL)
+    told = [html.unescape(re.sub(r"<[^>]*>", "", text)) for text in defaults]
+    assert len(told) > 300
+    assert [text for text in told if re.search(r"Fraction|<|array\(| at 0x", text)] == []
 
 
 @pytest.mark.long

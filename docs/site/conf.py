@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import re
+import sys
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
 from sphinx import addnodes
 
 from strapgen import __version__
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from signatures import with_plain_defaults
 
 project = "strapgen"
 author = "The strapgen authors"
@@ -73,6 +79,13 @@ copybutton_exclude = ".linenos, .gp, .go"
 _COMMAND = re.compile(r"(?:strapgen|cmake|ctest|make|pip|python3?|apt-get|git|source) ")
 
 
+def plain_signatures(
+    app: Any, what: str, name: str, obj: Any, options: Any, signature: str | None, returned: str | None
+) -> tuple[str, str | None] | None:
+    """Have the defaults of a signature written as a user would write them."""
+    return (with_plain_defaults(signature, obj), returned) if signature else None
+
+
 def colour_commands(app: Any, document: nodes.document) -> None:
     """Mark literal blocks that begin with a command as those of a shell."""
     for block in document.findall(nodes.literal_block):
@@ -115,6 +128,7 @@ def navigate_by_titles(app: Any, page: str, template: str, context: dict[str, An
 
 def setup(app: Any) -> dict[str, bool]:
     """Register what this file adds to Sphinx."""
+    app.connect("autodoc-process-signature", plain_signatures)
     app.connect("doctree-read", colour_commands)
     app.connect("doctree-read", mark_pictures)
     app.connect("html-page-context", navigate_by_titles, priority=400)  # before the theme calls it

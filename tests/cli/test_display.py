@@ -8,6 +8,7 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ import pytest
 import strapgen
 from strapgen.catalogue.methods import coning_coefficients
 from strapgen.cli import main
+from strapgen.lab import scipy_rotations
 from strapgen.results.display import objects
 from strapgen.results.display.latex import PAGE, broken, equations, width
 
@@ -177,6 +179,20 @@ def test_rotations_of_scipy_go_in_and_come_out(algorithm):
     assert (strapgen.to_rotation(run)[-1].inv() * turned).magnitude() < 1e-5
     state = strapgen.from_rotation(begin, backend)
     assert (strapgen.to_rotation(state, backend).inv() * begin).magnitude() < 1e-15
+
+
+def test_scipy_gets_an_array_that_it_may_write(run, history, monkeypatch):
+    """Arrays of results are read-only, which SciPy 1.15 refuses to read."""
+    matrices = np.eye(3)[None]
+    matrices.flags.writeable = False
+    taken = []
+    rotation = SimpleNamespace(from_matrix=taken.append)
+    monkeypatch.setattr(scipy_rotations, "_scipy", lambda: rotation)
+    for attitudes in (run, history, matrices):
+        strapgen.to_rotation(attitudes)
+    assert not run.computed.flags.writeable
+    assert [array.flags.writeable for array in taken] == [True, True, True]
+    assert np.array_equal(taken[0], run.computed)
 
 
 def test_rotations_that_do_not_fit_are_refused(history):

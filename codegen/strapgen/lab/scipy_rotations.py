@@ -48,17 +48,23 @@ def to_rotation(attitudes: Run | History | Any, backend: Backend | None = None) 
     array([ 0.,  0., 90.])
     """
     rotation = _scipy()
+    # SciPy 1.15 takes no array that is read-only, as those of results are.
+    return rotation.from_matrix(_matrices(attitudes, backend).copy())
+
+
+def _matrices(attitudes: Run | History | Any, backend: Backend | None) -> NDArray[np.float64]:
+    """Return direction cosine matrices (N, 3, 3), body to reference."""
     if isinstance(attitudes, Run):
-        return rotation.from_matrix(attitudes.computed)
+        return attitudes.computed
     if isinstance(attitudes, History):
         backend = backend or attitudes.backend
         if backend is None:
             raise InputTypeError("the states of this History are not known as attitudes of a back end")
         attitudes = attitudes.states
     if backend is None:
-        return rotation.from_matrix(checks.real_array("attitudes", attitudes, (3, 3), np.dtype(np.float64)))
+        return checks.real_array("attitudes", attitudes, (3, 3), np.dtype(np.float64))
     states = checks.real_array("states", attitudes, backend.state_shape, np.dtype(np.float64))
-    return rotation.from_matrix(attitude(backend, states))
+    return attitude(backend, states)
 
 
 def from_rotation(rotation: Any, backend: Backend) -> NDArray[np.float64]:
