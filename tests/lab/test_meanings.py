@@ -45,8 +45,10 @@ LAYOUTS = {
         "xacc yacc zacc",
     ),
     "sensor_msgs/Imu": (
-        "header.stamp orientation.x orientation.y orientation.z orientation.w angular_velocity.x angular_velocity.y "
-        "angular_velocity.z linear_acceleration.x linear_acceleration.y linear_acceleration.z",
+        "received header.stamp orientation.x orientation.y orientation.z orientation.w orientation_covariance[0] "
+        "angular_velocity.x angular_velocity.y angular_velocity.z angular_velocity_covariance[0] "
+        "angular_velocity_covariance[1] angular_velocity_covariance[2] linear_acceleration.x linear_acceleration.y "
+        "linear_acceleration.z",
         "header.stamp angular_velocity.x angular_velocity.y angular_velocity.z",
         "linear_acceleration.x linear_acceleration.y linear_acceleration.z",
     ),

@@ -89,8 +89,9 @@ def loaded(name: str) -> Recording:
 def test_recordings_lead_to_the_true_attitude(name, make):
     backend = make("euler", largest=0.01, carry="full")
     history = propagate(backend, loaded(name))
-    assert history.time[0] == pytest.approx(0, abs=1e-12)
-    assert history.time[-1] == pytest.approx(4, abs=1e-9)
+    # Times that are taken as even have the mean departure of the stamps.
+    within = 1e-3 if name == "rates_uneven.csv" else 1e-9
+    assert history.time[[0, -1]] == pytest.approx([0, 4], abs=within)
     error = Rotation.from_quat(history.states[-1]) * truth(4.0).inv()
     # Noise of 0.05 deg/s in 400 samples of 0.01 s walks 0.01 deg on each axis; increments hardly walk.
     noise = 1e-3 if name == "increments.csv" else 0.06

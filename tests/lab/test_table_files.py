@@ -277,6 +277,22 @@ def test_messages_of_one_length_with_texts_of_several(tmp_path):
     assert columns(path, "/between")["number"] == [k + 0.5 for k in range(9)]
 
 
+def test_elements_of_lists_are_no_columns_and_what_follows_them_is_read(tmp_path):
+    store, kind, path = get_typestore(Stores.ROS1_NOETIC), "test/msg/Listed", tmp_path / "x.bag"
+    text = "geometry_msgs/Vector3[] places\nfloat64[] loads\nfloat32[2] pair\nfloat64 number\n"
+    store.register(get_types_from_msg(text, kind))
+    vector = store.types["geometry_msgs/msg/Vector3"]
+    with Bag1(path) as bag:
+        connection = bag.add_connection("/listed", kind, typestore=store)
+        for k in range(9):
+            places = [vector(1.0, 2.0, 3.0)] * (k % 3)
+            message = store.types[kind](places, np.zeros(k % 2), np.array([k, -k], np.float32), k + 0.5)
+            bag.write(connection, k, store.serialize_ros1(message, kind))
+    got = columns(path, "/listed")
+    assert [*got] == ["received", "pair[0]", "pair[1]", "number"]
+    assert got["number"] == [k + 0.5 for k in range(9)] and got["pair[1]"] == [-k for k in range(9)]
+
+
 def test_a_bag_is_a_recording_without_more_words(bag):
     """Its covariances are no rates."""
     recording = strapgen.read(bag)

@@ -75,7 +75,9 @@ class StampError(InputError):
 
     def __init__(self, status: StampStatus, reason: str, place: int | None = None) -> None:
         super().__init__(reason if place is None else f"stamp {place + 1}: {reason}")
-        self.status, self.reason, self.place = status, reason, place
+        self.status: StampStatus = status
+        self.reason: str = reason
+        self.place: int | None = place
 
 
 @dataclass(frozen=True)

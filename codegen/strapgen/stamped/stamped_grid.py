@@ -120,7 +120,7 @@ class StampedGrid:
         self._scale = StampScale.of(sample_hz, tick_hz, stamp_bits)
         self._tick_hz = checks.number("tick_hz", tick_hz)
         self._pairs = stamped_sources.checked_pairs(pairs)
-        self.latency = sum(self._pairs)
+        self.latency: int = sum(self._pairs)
         checks.choice("backend", backend, BACKENDS)
         target, settings = BACKENDS[backend].target, fit_settings(backend, settings)
         self._unit: StampedUnit | StampedUnitInC

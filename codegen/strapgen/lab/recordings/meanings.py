@@ -290,6 +290,8 @@ def _three(
         bare = one.stem == "" and pattern in (_RATES, _ANGLES)
         if one == time or one.stem is None or (one.unit in {*units.FORCES} - known):
             continue
+        if "covariance" in one.stem:  # beside the values, in messages of ROS
+            continue
         if pattern.fullmatch(one.stem) or (bare and one.unit in {None, *known}):
             axes.setdefault(one.stem, [None] * 3)[one.axis] = one
     groups = [group for group in axes.values() if None not in group]

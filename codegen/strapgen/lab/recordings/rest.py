@@ -203,7 +203,7 @@ def without_earth(recording: Recording, along: History, rate: Array) -> Recordin
     middles: Array = recording.start + recording.interval * (
         np.arange(len(recording.samples), dtype=np.float64) + 0.5
     )
-    turned = quaternions.from_rotation_vectors((along.time[0] - middles)[:, None] * rate)
-    attitudes = quaternions.product(turned, quaternions.interpolated(along.time, attitude_of(along), middles))
+    # The reference axes turn about the Earth's rate, which stays as it is in them.
+    attitudes = quaternions.interpolated(along.time, attitude_of(along), middles)
     sensed = np.einsum("nij,i->nj", quaternions.matrices(attitudes), rate)
     return replace(recording, samples=recording.samples - sensed * recording.interval)

@@ -77,16 +77,16 @@ class _Walk:
         size = min(size, self._most)
         self._position += (self._origin - self._position) % size
 
-    def _struct(self, name: str, prefix: str) -> None:
+    def _struct(self, name: str, prefix: str, is_column: bool = True) -> None:
         for label, of in self._fields_of(name):
-            self._field(of, f"{prefix}.{label}" if prefix else label)
+            self._field(of, f"{prefix}.{label}" if prefix else label, is_column)
 
     def _field(self, of: Any, name: str, is_column: bool = True) -> None:
         kind, what = int(of[0]), of[1]
         if kind == 2 and what in _TIMES:
             self._number(_TIME, name, is_column)
         elif kind == 2:
-            self._struct(what, name)
+            self._struct(what, name, is_column)
         elif kind == 1 and what[0] in _KINDS:
             self._number(_KINDS[what[0]], name, is_column)
         elif kind == 1 and what[0] == "string":
@@ -98,7 +98,7 @@ class _Walk:
             element, count = what
             if kind == 4:
                 count = self._length()
-            is_column = kind == 3 and count <= _MOST_ELEMENTS
+            is_column = is_column and kind == 3 and count <= _MOST_ELEMENTS
             if int(element[0]) == 1 and element[1][0] in _KINDS and not is_column:
                 size = int(_KINDS[element[1][0]][1])
                 if count:
