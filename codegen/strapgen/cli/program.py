@@ -35,7 +35,13 @@ class PlainCommand(TyperCommand):
             _refuse_second_values(self, ctx, args)
             if name := value_of(args, "--variant"):
                 ctx.default_map = _words_of_variant(self, ctx, name, args)
-        return list(super().parse_args(ctx, args))
+        rest = list(super().parse_args(ctx, args))
+        several: list[Any] = [parameter for parameter in self.params if parameter.nargs == -1]
+        for parameter in several:  # the parser of before Click 8.3 takes no defaults for several words
+            key = parameter.name
+            if not ctx.params.get(key) and key in (ctx.default_map or {}):
+                ctx.params[key] = parameter.type_cast_value(ctx, ctx.default_map[key])
+        return rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; in its messages the parameters of Python are options."""
