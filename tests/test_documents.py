@@ -730,7 +730,11 @@ def test_example(path, capsys, monkeypatch):
         assert strapgen.read_motion(path, 1).error_bound(1.0) < 1e-20
         return
     if path.stem.startswith("make_"):
-        assert namespace["text"]() == namespace["LOG"].read_text()
+        made, kept = namespace["text"](), namespace["LOG"].read_text()
+        assert made.partition("\n")[0] == kept.partition("\n")[0]
+        tables = (np.loadtxt(text.splitlines(), delimiter=",", skiprows=1) for text in (made, kept))
+        # Versions of NumPy differ in the last place of a sine.
+        np.testing.assert_allclose(*tables, rtol=1e-11, atol=1e-15)
         return
     namespace["main"]()
     assert capsys.readouterr().out.count("\n") >= 3
