@@ -150,6 +150,22 @@ def test_rows_out_of_order_are_sorted():
     np.testing.assert_allclose(read(TIME[rows], RATES[rows], repair="order").samples, RATES * STEP, rtol=1e-9)
 
 
+def test_rows_that_run_backwards_are_turned_round():
+    back = slice(None, None, -1)
+    refused(TIME[back], RATES[back], "row 1: its time lies 0.01 s before", "backwards in time", "--repair order")
+    broken = RATES[back].copy()
+    broken[40] = np.nan
+    got = read(TIME[back], broken, repair="order,nan")
+    np.testing.assert_allclose(got.samples, RATES * STEP, atol=2e-6 * STEP)
+    assert got.start == pytest.approx(TIME[0] - STEP)
+
+
+def test_times_that_are_all_the_same_are_refused():
+    same = np.zeros(COUNT)
+    refused(same, RATES, f"{COUNT - 1} rows repeat a time", "--repair repeats")
+    refused(same, RATES, "holds 1 sample without faults; 2 are needed", repair="all", gaps="bridge")
+
+
 def test_a_clock_that_is_set_back_goes_on():
     time = TIME.copy()
     time[200:] -= 1.7
