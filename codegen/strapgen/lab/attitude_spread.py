@@ -132,7 +132,7 @@ def spread(
         )  # equal at the first common time
     rows = []
     for (kernel, _, _, operations), q in zip(runs, attitudes, strict=True):
-        angles = _angles(attitudes[0], q)
+        angles = np.zeros(len(q)) if q is attitudes[0] else _angles(attitudes[0], q)
         rms = float(np.sqrt(np.mean(angles**2)))
         rows.append(AlgorithmOnLog(kernel, float(angles.max()), rms, float(angles[-1]), operations, angles))
     between = np.max(
