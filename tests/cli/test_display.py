@@ -210,7 +210,7 @@ def test_rotations_that_do_not_fit_are_refused(history):
     assert len(strapgen.to_rotation(history, backend)) == len(history.time)
     assert (
         strapgen.to_rotation(history).inv() * strapgen.to_rotation(history, backend)
-    ).magnitude().max() == 0
+    ).magnitude().max() < 1e-15
 
 
 def test_ipython_uses_the_display_of_objects(run):

@@ -266,12 +266,15 @@ def test_dual_rows_stretch_a_difference_by_at_most_their_bound(rng):
     left *= np.sign(np.linalg.det(left @ right))[:, None, None]
     matrices = (left * (1 + rng.choice([-e, 0, e], (count, 1, 3)))) @ right
     changes = rng.normal(size=(count, 3, 3))
-    changes[::2] -= changes[::2].mT  # half of them are turns, in which the rest of a change cannot be seen
+    # Half of them are turns, in which the rest of a change cannot be seen.
+    changes[::2] -= changes[::2].swapaxes(1, 2)
     after = [orthonormalize(matrices + sign * small * changes @ matrices) for sign in (1, -1)]
     changed = (after[0] - after[1]) / (2 * small) @ np.linalg.inv(orthonormalize(matrices))
 
     def size(change: np.ndarray) -> np.ndarray:
-        skew, symmetric = (np.linalg.norm(change + sign * change.mT, axis=(1, 2)) / 2 for sign in (-1, 1))
+        skew, symmetric = (
+            np.linalg.norm(change + sign * change.swapaxes(1, 2), axis=(1, 2)) / 2 for sign in (-1, 1)
+        )
         return skew + weight * symmetric
 
     growth = size(changed) / size(changes) - 1

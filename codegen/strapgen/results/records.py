@@ -280,7 +280,7 @@ def _meant(kind: Any) -> Any:
     name, parts = typing.get_origin(kind) or kind, typing.get_args(kind)
     if not hasattr(name, "__value__"):
         return kind
-    return name.__value__[parts] if parts else name.__value__
+    return _meant(name.__value__[parts] if parts else name.__value__)
 
 
 def _plain_type_schema(kind: Any) -> dict[str, Any]:
