@@ -140,6 +140,46 @@ def test_a_log_without_rates_shows_its_columns(tmp_path, capsys):
     assert status == 0 and "no rates about three axes" in out and "simulate" not in out
 
 
+def swaying(count: int = 300) -> np.ndarray:
+    """Return rates in rad/s that fall as often as they rise, after a rest."""
+    k = np.arange(count)[:, None]
+    return np.where(k < 250, 0, 1) * np.sin(k / [7.0, 9.0, 11.0])
+
+
+def test_times_that_rise_twice_and_axes_the_other_way_round_are_guessed(tmp_path, capsys):
+    log = tmp_path / "log.csv"
+    start = 1_700_000_000_123_456_789
+    lines = [
+        f"{start + 10_000_000 * k},{k / 100},{z},{y},{x}" for k, (x, y, z) in enumerate(swaying().tolist())
+    ]
+    log.write_text("\n".join(["time,seconds_elapsed,z,y,x", *lines, ""]))
+    status, out, _ = ran(["log", str(log)], capsys)
+    assert status == 0 and "a guess is t=time,x=x,y=y,z=z" in out
+    assert "at rest from 1700000000.11346 s to 1700000002.61346 s" in out
+
+
+def test_numbers_of_packets_are_no_times(tmp_path, capsys):
+    log = tmp_path / "log.csv"
+    lines = [f"{k},{x},{y},{z}" for k, (x, y, z) in enumerate(swaying().tolist())]
+    log.write_text("\n".join(["PacketCounter,Gyr_X,Gyr_Y,Gyr_Z", *lines, ""]))
+    status, out, _ = ran(["log", str(log)], capsys)
+    assert status == 0 and "--sample-hz the sampling rate" in out and "simulate" not in out
+    status, out, _ = ran(["log", str(log), "--sample-hz", "100"], capsys)
+    assert status == 0 and out.rstrip().endswith("--rate-unit rad/s --sample-hz 100")
+
+
+@pytest.mark.parametrize("time", ["0", "nan"])
+def test_a_log_without_a_time_that_grows_has_no_command(tmp_path, capsys, time):
+    log = tmp_path / "log.csv"
+    log.write_text("t,gx [rad/s],gy,gz\n" + "".join(f"{time},{k},0,0\n" for k in range(20)))
+    status, out, err = ran(["log", str(log)], capsys)
+    assert (status, err) == (0, "") and "simulate" not in out
+    assert "19 rows repeat a time" in out or "20 rows hold none" in out
+    for repair in ([], ["--repair", "all", "--gaps", "bridge"]):
+        status, out, err = ran(["simulate", "euler", "--recording", str(log), *repair], capsys)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+
+
 def rows(count: int = 40, gyro: str = "0.1,0.2,0.3", step: float = 0.01) -> list[str]:
     """Return rows that are no two alike, so that none looks stuck."""
     return [f"{step * k:.6g},{gyro[:-1]}{k % 7}" for k in range(count)]

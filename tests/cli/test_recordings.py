@@ -71,6 +71,8 @@ def test_increment_left_over_is_said(capsys, tmp_path):
     status, last, said = simulated(arguments, capsys, tmp_path)
     assert status == 0 and last[0] == pytest.approx(0.18)
     assert "1 increment at the end fills no step of 2 and is left out" in said
+    _, _, said = simulated([*arguments, "--increments", "8"], capsys, tmp_path)
+    assert "3 increments at the end fill no step of 8 and are left out" in said
 
 
 #: Headers and rows of loggers, from which 1 s at 36 deg/s about z is read.

@@ -150,6 +150,24 @@ def test_rows_out_of_order_are_sorted():
     np.testing.assert_allclose(read(TIME[rows], RATES[rows], repair="order").samples, RATES * STEP, rtol=1e-9)
 
 
+def test_rows_that_run_backwards_are_turned_round():
+    back = slice(None, None, -1)
+    refused(
+        TIME[back], RATES[back], "row 1: its time lies 0.01 s before", "backwards in time", "--repair order"
+    )
+    broken = RATES[back].copy()
+    broken[40] = np.nan
+    got = read(TIME[back], broken, repair="order,nan")
+    np.testing.assert_allclose(got.samples, RATES * STEP, atol=2e-6 * STEP)
+    assert got.start == pytest.approx(TIME[0] - STEP)
+
+
+def test_times_that_are_all_the_same_are_refused():
+    same = np.zeros(COUNT)
+    refused(same, RATES, f"{COUNT - 1} rows repeat a time", "--repair repeats")
+    refused(same, RATES, "holds 1 sample without faults; 2 are needed", repair="all", gaps="bridge")
+
+
 def test_a_clock_that_is_set_back_goes_on():
     time = TIME.copy()
     time[200:] -= 1.7
@@ -198,13 +216,14 @@ def test_faults_of_all_kinds_together_are_each_said_once(rng):
         assert sum(word in text for text in got.remarks) == 1, word
 
 
-def test_forces_follow_the_rates(rng):
+@pytest.mark.parametrize(("axes", "order"), [("x,-y,-z", [0, 1, 2]), ("y,-z,-x", [1, 2, 0])])
+def test_forces_follow_the_rates(axes, order, rng):
     forces = rng.normal(0, 1, (COUNT, 3))
-    got = read(TIME, np.degrees(RATES), unit="deg/s", force=forces, force_unit="g", axes="x,-y,-z")
+    got = read(TIME, np.degrees(RATES), unit="deg/s", force=forces, force_unit="g", axes=axes)
     assert isinstance(got, InertialRecording)
     signs = np.array([1, -1, -1])
-    np.testing.assert_allclose(got.samples, RATES * STEP * signs, rtol=1e-12)
-    np.testing.assert_allclose(got.velocity_increments, forces * 9.80665 * STEP * signs, rtol=1e-12)
+    np.testing.assert_allclose(got.samples, RATES[:, order] * STEP * signs, rtol=1e-12)
+    np.testing.assert_allclose(got.velocity_increments, forces[:, order] * 9.80665 * STEP * signs, rtol=1e-12)
 
 
 def test_a_part_of_a_recording_is_read():

@@ -113,6 +113,8 @@ def test_the_topic_with_rates_is_taken_and_said():
     assert meanings.find(topics, "sensor_gyro", Stated())[0].samples == ("x", "y", "z")
     with pytest.raises(InputError, match=r"^topic 'sensor_gyros' is not known"):
         meanings.find(topics, "sensor_gyros", Stated())
+    with pytest.raises(InputError, match=r"^topic 'gyro' is not known; the log has none, and FILE alone"):
+        meanings.find([topic("t x y z")], "gyro", Stated())
     with pytest.raises(
         InputError, match=r"^no topic has a time and rates about three axes; it has vehicle_attitude"
     ):

@@ -77,5 +77,7 @@ def waiting(title: str) -> Iterator[None]:
 def say_unused(file: Path, unused: int, of_step: int, step: str = "step") -> None:
     """Say on stderr that increments at the end of a recording fill no step."""
     if unused:
-        verb = "increment at the end fills" if unused == 1 else "increments at the end fill"
-        terminal.remark(f"strapgen: {file}: {unused} {verb} no {step} of {of_step} and is left out")
+        noun, fill, are = ("increment", "fills", "is") if unused == 1 else ("increments", "fill", "are")
+        terminal.remark(
+            f"strapgen: {file}: {unused} {noun} at the end {fill} no {step} of {of_step} and {are} left out"
+        )

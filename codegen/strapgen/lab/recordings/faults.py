@@ -109,7 +109,8 @@ def examined(time: Array, values: Array, names: Sequence[str], *, keep_times: bo
         return samples
     _put_in_order(samples)
     is_coarse = _take_out_repeated(samples)
-    _take_out_stuck(samples)
+    if len(samples.time) >= 2:
+        _take_out_stuck(samples)
     if len(samples.time) >= 2:
         _find_gaps(samples, is_coarse, keep_times)
     return samples
@@ -156,6 +157,12 @@ def _put_in_order(samples: Samples) -> None:
     words = (
         f"its time lies {samples.time[first - 1] - samples.time[first]:.6g} s before that of the row before"
     )
+    if not _places(samples.time, lambda gaps: gaps > 0).size:
+        samples.note("order", len(back), first, f"{words}: all rows run backwards in time")
+        count = len(samples.time)
+        samples.restored = [count - place for place in samples.restored]
+        samples.keep(np.arange(count)[::-1])
+        return
     order = np.argsort(samples.time, kind="stable")
     if np.abs(order - np.arange(len(order))).max() <= _DISPLACED:
         samples.note("order", len(back), first, f"{words}; {counted(len(back), 'row')} out of order")
@@ -163,7 +170,7 @@ def _put_in_order(samples: Samples) -> None:
         return
     samples.note("clock", len(back), first, f"{words}: the clock is set back, {counted(len(back), 'time')}")
     time = np.array(samples.time)
-    typical = float(np.median(np.diff(time)))
+    typical = float(np.median(np.abs(np.diff(time))))
     for place in map(int, back):
         time[place + 1 :] += time[place] + typical - time[place + 1]
     samples.time = time
@@ -177,7 +184,7 @@ def _take_out_repeated(samples: Samples) -> bool:
     samples.repeats = len(repeated)
     first = int(repeated[0]) + 1
     words = "its time is that of the row before"
-    if len(repeated) > _COARSE * len(samples.time):
+    if len(repeated) > _COARSE * len(samples.time) and samples.time[-1] > samples.time[0]:
         samples.note(
             "clock", len(repeated), first, f"{words}, as in {len(repeated)} rows: the clock is coarse"
         )

@@ -36,6 +36,8 @@ _LONGEST = 0.2
 #: Equal extreme samples in a row that show the end of a range, and the share of rows above which they do not.
 _AT_END, _MOST_AT_END = 3, 0.5
 _AXES = ("x", "y", "z")
+#: Names of columns that number the rows, and are no times.
+_COUNTS = re.compile(r"count|packet|index|\bseq|frame|number|nummer")
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class LoggedColumn:
     name: str
     #: "time", "rate x", "increment x", "force x", "velocity increment x" or "attitude w"; null where it is not read
     meaning: str | None
-    #: Null where the log states none
+    #: Null where the log states none and none is guessed
     unit: str | None
 
 
@@ -137,7 +139,8 @@ class LogResult(Result):
         lines += self.remarks
         for rest in self.rest:
             rates = ", ".join(f"{rate:.4g}" for rate in rest.rate_deg_s)
-            lines.append(f"at rest from {rest.start_s:.6g} s to {rest.end_s:.6g} s, mean rates {rates} deg/s")
+            begin, end = (f"{time:.5f}".rstrip("0").rstrip(".") for time in (rest.start_s, rest.end_s))
+            lines.append(f"at rest from {begin} s to {end} s, mean rates {rates} deg/s")
         return "\n".join([*lines, *([] if self.command is None else ["", self.command])])
 
 
@@ -160,7 +163,7 @@ def survey(log: LogFile, topic: str, stated: Reading) -> LogResult:
     by_kind = {fault.kind: fault for fault in samples.faults}
     saturated, at_end = _saturated(samples)
     repairs = [kind for kind in faults.REPAIRS if kind in by_kind]
-    shown = meaning
+    shown = replace(meaning, unit=meaning.unit or how.rate_unit)
     with suppress(InputError):
         shown, _ = replace(how, force=True).meanings(log, meaning.topic)
     how = replace(how, repair=repairs, gaps="bridge" if samples.gaps else "refuse")
@@ -175,7 +178,7 @@ def survey(log: LogFile, topic: str, stated: Reading) -> LogResult:
         topic=meaning.topic,
         columns=_columns(one, shown),
         samples=samples.read,
-        duration_s=float(samples.time[-1] - samples.time[0]),
+        duration_s=float(samples.time[-1] - samples.time[0]) if len(samples.time) else 0.0,
         rate_hz=1 / samples.interval if samples.interval else None,
         jitter=samples.jitter,
         gaps=gaps,
@@ -186,7 +189,9 @@ def survey(log: LogFile, topic: str, stated: Reading) -> LogResult:
         stuck=by_kind["stuck"].rows if "stuck" in by_kind else 0,
         rest=_rests(log, meaning, how),
         remarks=texts,
-        command=_command(log, topic or (meaning.topic if len(log.topics) > 1 else ""), how),
+        command=_command(log, topic or (meaning.topic if len(log.topics) > 1 else ""), how)
+        if len(samples.time) > 1
+        else None,
     )
 
 
@@ -218,11 +223,17 @@ def _guessed(log: LogFile, topic: str, stated: Reading) -> Reading | None:
         name: np.asarray(array[:_SEEN], float) for name, array in read.items() if array.dtype.kind in "fiu"
     }
     rising = [name for name, array in values.items() if _rises(array)]
-    if not rising:
+    times = [name for name in rising if not _COUNTS.search(name.lower())]
+    if not times:
         return None
-    time = max(rising, key=lambda name: bool(re.search("t|zeit|stamp", name.lower())))
-    rest = [name for name in values if name != time]
-    groups = [three for three in zip(rest, rest[1:], rest[2:], strict=False) if _is_of_axes(three)]
+    time = max(times, key=lambda name: bool(re.search("t|zeit|stamp", name.lower())))
+    rest = [name for name in values if name not in rising]
+    rest = rest if len(rest) > 2 else [name for name in values if name != time]
+    if len(rest) < 3:
+        return None
+    threes = zip(rest, rest[1:], rest[2:], strict=False)
+    orders = (order for three in threes for order in (three, three[::-1]))
+    groups = [order for order in orders if _is_of_axes(order)]
     groups = [three for three in groups if not _is_force(np.column_stack([values[name] for name in three]))]
     chosen = groups[0] if groups else (rest[0], rest[1], rest[2])
     keys = ",".join(f"{key}={name}" for key, name in zip(("t", *_AXES), (time, *chosen), strict=True))
@@ -265,7 +276,8 @@ def _with_time_unit(log: LogFile, how: Reading, meaning: Meanings) -> tuple[Read
     if stamps.dtype.kind == "M":
         return how, []
     stamps = np.asarray(stamps, float)
-    typical = float(np.median(np.abs(np.diff(stamps[np.isfinite(stamps)])))) if len(stamps) > 1 else 0.0
+    steps = np.abs(np.diff(stamps[np.isfinite(stamps)]))
+    typical = float(np.median(steps)) if len(steps) else 0.0
     unit = next((name for name, factor in units.TIMES.items() if typical * float(factor) <= _LONGEST), "ns")
     if unit == "s":
         return how, []

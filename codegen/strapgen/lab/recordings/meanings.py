@@ -140,6 +140,8 @@ def find(topics: Sequence[LogTopic], topic: str, stated: Stated) -> tuple[Meanin
 
 
 def _place(names: Sequence[str], topic: str) -> int:
+    if topic not in names and [*names] == [""]:
+        raise InputError(f"topic {topic!r} is not known; the log has none, and FILE alone names it")
     if topic not in names:
         checks.choice("topic", topic, names)
     return [*names].index(topic)
