@@ -148,6 +148,11 @@ def test_trajectories_have_the_attitude(format, columns, logs, capsys):
             ["--attitude", "rpy", "--quaternion", "sxyz"],
             "--quaternion goes with --attitude quaternion, not rpy",
         ),
+        (
+            ["--format", "tum", "--quaternion", "sxyz"],
+            "a trajectory has a form of its own, body to reference; --quat",
+        ),
+        (["--format", "kitti", "--sense", "reference-to-body"], "--sense does not go with it"),
         (["--format", "parquet"], "--format parquet is no text; --out FILE is needed"),
         (
             ["--true-attitude", "{logs}/gyro.csv"],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from strapgen import registration
 from strapgen.cli import terminal
 from strapgen.cli.fixed_options import RUN_OPTIONS, FixedOptions
-from strapgen.cli.option_groups import Needs, Shown, grouped, rules, stated
+from strapgen.cli.option_groups import Excludes, Needs, Shown, grouped, rules, stated
 from strapgen.cli.options import STEP_OPTIONS, MethodOptions, OneBackend, RunAlgorithm
 from strapgen.cli.progress import say_unused
 from strapgen.cli.values import Positive, written
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     SOURCE_NEEDED,
     Needs("--rates --matrices --print", "--motion"),
     Needs("@truth @form --format=tum|kitti|parquet", "--recording --increments-csv --rates-csv"),
+    Excludes("--format=tum|kitti", "@form", "a trajectory has a form of its own, body to reference"),
     ONE_SCALE,
 )
 def simulate(
