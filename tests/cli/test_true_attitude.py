@@ -75,6 +75,17 @@ def test_rest_is_found(logs, capsys):
     np.testing.assert_allclose(data["bias_deg_s"], BIAS_DEG_S, atol=4 * max(data["bias_uncertainty_deg_s"]))
 
 
+def test_clocks_are_compared_without_the_bias(logs, capsys, tmp_path):
+    lines = np.loadtxt(logs / "gyro.csv", delimiter=",", skiprows=1)
+    lines[:, 1:] += (1, -2, 0.5)
+    np.savetxt(tmp_path / "gyro.csv", lines, "%.9f", ",", header="t [s],gx [deg/s],gy,gz", comments="")
+    (tmp_path / "truth.csv").write_bytes((logs / "truth.csv").read_bytes())
+    offset = judged(tmp_path, capsys, "--bias", "rest")["error"]["time_offset_s"]
+    assert offset == pytest.approx(judged(logs, capsys, "--bias", "rest")["error"]["time_offset_s"], abs=1e-7)
+    assert offset == pytest.approx(12.25, abs=5e-4)
+    assert judged(tmp_path, capsys)["error"]["time_offset_s"] != pytest.approx(12.25, abs=5e-4)
+
+
 @pytest.mark.parametrize(
     ("options", "drift_deg_s"),
     [

@@ -99,6 +99,19 @@ def test_attitudes_are_found(names, wanted):
     assert found.order == ("sxyz" if len(found.columns) == 4 else "")
 
 
+@pytest.mark.parametrize(
+    ("names", "unit"),
+    [
+        ("time_s roll_deg pitch_deg heading_deg", "deg"),
+        ("time_s roll_rad pitch_rad yaw_rad", "rad"),
+        ("time_s roll[deg] pitch[deg] yaw[deg]", "deg"),
+        ("time_s roll pitch yaw", None),
+    ],
+)
+def test_the_unit_of_angles_is_that_in_their_names(names, unit):
+    assert meanings.attitude(topic(names)).unit == unit
+
+
 def test_the_topic_with_rates_is_taken_and_said():
     gyro = "timestamp gyro_rad[0] gyro_rad[1] gyro_rad[2]"
     topics = [

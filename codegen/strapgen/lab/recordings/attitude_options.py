@@ -240,8 +240,10 @@ class Judge:
         truth = options.read(recording)
         offset = None
         if truth is not None:
-            stated = options.time_offset
-            offset = time_offset(data, truth) if stated is None else TimeOffset(float(stated))
+            if options.time_offset is None:  # a bias changes the magnitudes that tell the offset
+                offset = time_offset(options.taken_off(data, options.rest(data)).data, truth)
+            else:
+                offset = TimeOffset(float(options.time_offset))
         align = options.align or ("start" if initial is None else "none")
         return cls(options, truth, offset, initial, align, data.interval)
 

@@ -252,7 +252,8 @@ def attitude(
             f"{what} named among the columns {_shown(known)}; --true-columns NAME,... says which are the time and the "
             "attitude, --true-quaternion the order"
         )
-    unit = next((one.unit for one in found if one.unit in ("rad", "deg")), None)
+    stated = [word for one in found for word in (one.unit, one.name.rpartition("_")[2])]  # as in roll_deg
+    unit = next((word for word in stated if word in ("rad", "deg")), None)
     stamps = _unit("--true-time-unit", time_unit, [time] if time and time.unit else [], units.TIMES, "times")
     return AttitudeColumns(time and time.text, tuple(one.text for one in found), order, stamps, unit)
 
