@@ -14,6 +14,7 @@ GROUPS = {
     "run": "Back ends, which run generated code",
     "catalogue": "Algorithms, methods and windows",
     "lab": "Motions, runs, recordings and comparisons",
+    "stamped": "Samples with instants of their own",
     "attitude_algorithm": "Algorithms as objects",
     "design": "Windows that answer late and now",
     "navigation": "Two speeds, described systems and courses",

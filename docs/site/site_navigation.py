@@ -54,8 +54,14 @@ SECTIONS = (
                 "microcontrollers",
                 "evidence",
             ),
-            *("check-foreign-code", "sensor-data", "redundancy"),
+            *("check-foreign-code", "redundancy"),
         ),
+    ),
+    Section(
+        "Recordings",
+        "docs/recorded-data.md",
+        "You have a log, and want its attitude and the error of it.",
+        _docs("stamped-samples", "sensor-data"),
     ),
     Section(
         "Paper",
