@@ -131,7 +131,7 @@ def test_examples_of_the_help_run(command, strapgen_says, tmp_path):
     said = strapgen_says(f"{command} --help")
     shown = examples(said)
     assert shown and re.search(r"^Examples?:$", said, flags=re.MULTILINE)
-    (tmp_path / "gyro.csv").write_text((DATA / "rates_uneven.csv").read_text())
+    (tmp_path / "gyro.csv").write_text((DATA.parents[1] / "examples/gyro_log.csv").read_text())
     (tmp_path / "examples").symlink_to(DATA.parents[1] / "examples")
     pages = "\n".join(path.read_text() for path in (DATA.parents[1] / "docs").glob("*.md"))
     on_pages = {" ".join(line.split()) for line in re.sub(r"\\\n\s*", "", pages).splitlines()}

@@ -76,7 +76,7 @@ def test_sculling_is_that_of_the_source_in_every_slow_cycle(algorithm, sculling)
     run = runner.run(angles[1:], velocities[1:], fast_cycles=10, previous=angles[0])
     turned = rotations(runner, run.attitudes)
     # In the body at the start of each slow cycle: u + beta x u / 2 + S2.
-    body = turned[:-1].apply(run.velocity_changes, inverse=True)
+    body = turned[:-1].apply(run.velocity_changes.copy(), inverse=True)
     beta, u = (x[1:].reshape(4, 10, 3).sum(axis=1) for x in (angles, velocities))
     s2 = body - u - np.cross(beta, u) / 2
     assert np.abs(s2[:, 2] / SLOW - 1.1042645359e-2).max() <= 1e-10

@@ -22,8 +22,6 @@ from strapgen.lab.recordings.faults import Samples
 from strapgen.lab.recordings.log_file import LogFile
 from strapgen.lab.recordings.long_columns import Columns, SideBySide, parts
 from strapgen.lab.recordings.meanings import INPUTS, Meanings, Stated, known_unit
-from strapgen.stamped.grid_clock import StampError
-from strapgen.stamped.stamped_grid import StampedGrid
 
 Array = NDArray[Any]
 
@@ -290,6 +288,8 @@ def _rows(
 
 def _on_grid(samples: Samples, edges: tuple[int, int], kind: str, remarks: list[str]) -> Array:
     """Return the increments of one piece on an even grid, from the first time to the last."""
+    from strapgen.stamped.stamped_grid import StampedGrid  # loads SymPy
+
     first, last = edges
     rows = np.concatenate([*_rows(samples, edges, kind, even=False)])
     rows = rows[len(rows) - (last - first) + 1 :]
@@ -311,6 +311,8 @@ def _on_grid(samples: Samples, edges: tuple[int, int], kind: str, remarks: list[
 @contextmanager
 def _at_time(log: LogFile, begin: float, time: Array) -> Iterator[None]:
     """Name the time of a stamp that the grid cannot take."""
+    from strapgen.stamped.grid_clock import StampError
+
     try:
         yield
     except StampError as error:
