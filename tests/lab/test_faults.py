@@ -310,3 +310,9 @@ def test_repairs_have_the_names_of_the_options():
     from strapgen.lab import run_options
 
     assert (*faults.REPAIRS, "all") == run_options._REPAIRS and faults.GAPS == run_options._GAPS
+
+
+@pytest.mark.parametrize("make", [Recording.from_rates, Recording.from_increments])
+def test_an_unknown_keyword_is_named_with_those_that_are_allowed(make):
+    with pytest.raises(InputError, match=r"^keyword 'gap' is not known \(did you mean gaps\?\)"):
+        make([0.1, 0.2], np.zeros((2, 3)), gap="split")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -66,6 +66,14 @@ class Reading:
         if self.near_hz is not None:
             checks.number("resample_hz", self.near_hz, positive=True)
         _turned(self.axes)
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any], **stated: Any) -> Reading:
+        """Return the reading of keywords of a user, beside those that are stated already."""
+        allowed = [field.name for field in fields(cls) if field.name not in (*stated, "near_hz")]
+        for name in options:
+            checks.choice("keyword", name, allowed)
+        return cls(**stated, **options)
 
     @property
     def repaired(self) -> tuple[str, ...]:

@@ -121,8 +121,8 @@ class Recording(ReadOnly):
         >>> turn.samples[:, 2].round(6).tolist()
         [0.15708, 0.15708]
         """
-        reading = Reading(
-            input=input, rate_unit=unit, force_unit=force_unit, force=force is not None, **options
+        reading = Reading.of(
+            options, input=input, rate_unit=unit, force_unit=force_unit, force=force is not None
         )
         return recording_of(ArrayLog.of(time, rate=rates, force=force), "", reading)
 
@@ -155,7 +155,7 @@ class Recording(ReadOnly):
         >>> Recording.from_increments([0.1, 0.2], np.full((2, 3), 1e-3)).start
         0.0
         """
-        reading = Reading(input="increments", force=velocity is not None, **options)
+        reading = Reading.of(options, input="increments", force=velocity is not None)
         return recording_of(ArrayLog.of(time, delta_angle=angle, delta_velocity=velocity), "", reading)
 
     @classmethod
@@ -186,7 +186,7 @@ class Recording(ReadOnly):
         >>> Recording.from_frame(frame).samples[:, 2]
         array([0.15707963, 0.15707963])
         """
-        return recording_of(frame_log(frame), "", Reading(columns=columns, **options))
+        return recording_of(frame_log(frame), "", Reading.of(options, columns=columns))
 
     def _in_words(self) -> str:
         times = f"{self.interval:g} s from {self.start:g} s"
