@@ -602,8 +602,9 @@ def attitude_error(
     --------
     >>> from strapgen import backend, propagate
     >>> rest = propagate(backend("dcm"), Recording(0.0, 0.01, np.zeros((200, 3))))
-    >>> attitude_error(rest, TrueAttitude.of([0, 2], [[0, 0, 0.6, 0.8]] * 2), align="none").angle[-1].round(6)
-    np.float64(1.287002)
+    >>> error = attitude_error(rest, TrueAttitude.of([0, 2], [[0, 0, 0.6, 0.8]] * 2), align="none")
+    >>> round(float(error.angle[-1]), 6)
+    1.287002
     """
     checks.choice("align", align, ALIGNMENTS)
     if not isinstance(offset, TimeOffset):
