@@ -20,7 +20,7 @@ from strapgen.design.commit_late.late_filters import LateFilters
 from strapgen.design.commit_late.late_unit import SampleKind
 from strapgen.design.family import FamilyBrief, design
 from strapgen.design.filters import exchange, responses
-from strapgen.design.filters.band_grid import ONE, REAL, BandGrid
+from strapgen.design.filters.band_grid import ONE, REAL, BandGrid, mean_points
 from strapgen.design.filters.filter_taps import Shape, Unknowns, in_words, rounded
 from strapgen.ir.exceptions import InputError
 from strapgen.lab.runs import drift
@@ -162,6 +162,22 @@ def test_noise_makes_the_filters_smaller():
     for m in (1, 2):
         assert responses.noise_gain(noisy, m) < responses.noise_gain(quiet, m)
         assert responses.level(best, m) < responses.level(quiet, m) < responses.level(noisy, m)
+
+
+def test_the_mean_square_error_of_the_product_is_least():
+    window = design(replace(SMALL, noise=Fraction(1, 10**12)))
+    points = [float(b) for b in mean_points(BAND)]
+    (direction,) = Unknowns(Shape(2, 2, 4, None, 3), 1).directions
+    move = Unknowns(Shape(2, 2, 4, None, 3), 1).taps(direction)
+
+    def mean(size: Fraction) -> float:
+        first = tuple(tap + size * one for tap, one in zip(window.filters[1], move, strict=True))
+        moved = replace(window, filters=(window.filters[0], first, window.filters[2]))
+        return float(np.mean(responses.errors(moved, 1, points) ** 2))
+
+    # The parabola has its least value in the middle of the two.
+    low, middle, high = (mean(Fraction(k, 10000)) for k in (-1, 0, 1))
+    assert middle < min(low, high) and abs(high - low) < 1e-4 * (high + low - 2 * middle)
 
 
 def test_words_hold_a_pair_by_its_product():
