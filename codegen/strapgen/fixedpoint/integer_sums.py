@@ -271,9 +271,13 @@ class _Gathered:
     constant: Fraction = Fraction(0)
 
 
-def _gathered(context: Quantization, definition: Sum) -> _Gathered:
+def _gathered(context: Quantization, name: str, definition: Sum) -> _Gathered:
     """Return the terms of a sum by how they can be brought to a place."""
-    words = filter_words(context.quantities, context.program.inputs, definition, context.word)
+    linear = [monomial for monomial, _ in definition.terms if len(monomial) == 1]
+    # A filter that is fine keeps the longest coefficients, whose products lie at several places.
+    fine = context.high is not None and name in context.high.fine
+    fractions = None if fine else {factor: context.values[factor].fraction for (factor,) in linear}
+    words = filter_words(context.quantities, context.program.inputs, definition, context.word, fractions)
     terms = _Gathered()
     for monomial, coefficient in definition.terms:
         if not monomial:
@@ -308,7 +312,7 @@ def _top(context: Quantization, definition: Sum, terms: _Gathered, fraction: int
 
 def _unrounded(context: Quantization, quantity: Quantity, definition: Sum, followed: Fraction) -> Value:
     """Return a sum that no word is needed of, with its products at one place."""
-    terms = _gathered(context, definition)
+    terms = _gathered(context, quantity.name, definition)
     top = _top(context, definition, terms, 0)
     placed = [*terms.products, *(item for *_, item in terms.shifted)]
     if top is None:
@@ -333,7 +337,7 @@ def _narrowed(
 ) -> Value:
     """Return the integer of a sum whose products lie at one place, a word above that of the result."""
     name, word, forced = quantity.name, context.word, quantity.name in context.plan.forced
-    terms = _gathered(context, definition)
+    terms = _gathered(context, quantity.name, definition)
     natural = finest(quantity.range.magnitude, word)
     fraction = context.plan.forced.get(name, min(natural, context.most.get(name, natural)))
     top = _top(context, definition, terms, fraction)
