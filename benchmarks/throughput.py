@@ -24,6 +24,7 @@ import strapgen
 from strapgen import pipeline
 from strapgen.catalogue import choose
 from strapgen.run import compiler
+from strapgen.run.evaluators import Loop
 
 #: Runs side by side, and the steps of each.
 RUNS, STEPS = 10_000, 20
@@ -130,6 +131,28 @@ def loops(rounds: int, narrow: bool = False) -> None:
     )
 
 
+def series(rounds: int) -> None:
+    """Print what series take beside the closed form, in a step by combined coning coefficients."""
+    choice = choose("euler", "coning-combined", 3, previous=3)
+    increments = np.random.default_rng(1).uniform(-0.02, 0.02, (RUNS, 6, 3))
+    settings = strapgen.Settings.of(max_rate_deg_s=400, step="0.01")
+    made = {
+        name: strapgen.backend(choice, backend="c", settings=each)
+        for name, each in (("closed", None), ("series", settings))
+    }
+    calls = {f"{name}, one": one.prepared(increments) for name, one in made.items()}
+    rows = increments.reshape(-1, STEPS, 18)
+    loop = Loop(
+        np.tile(made["closed"].identity, (len(rows), 1)), np.empty((len(rows), 0)), record_every=STEPS
+    )
+    calls |= {f"{name}, many": lambda one=one: one.evaluator.loop(rows, loop) for name, one in made.items()}
+    times = least(calls, rounds, time.process_time)
+    print(f"ns a step: {', '.join(f'{name} {t / len(increments) * 1e9:.1f}' for name, t in times.items())}")
+    for runs, what in (("one", "a single run"), ("many", "many runs")):
+        ratio = times[f"series, {runs}"] / times[f"closed, {runs}"]
+        show(f"series / closed form, coning-combined 3+3, {what}", ratio, 0.25)
+
+
 def back_ends(rounds: int) -> None:
     """Print the ratios of back ends as Python calls them, checks of the inputs included."""
     c, numpy = (strapgen.backend("euler", backend=name) for name in ("c", "numpy"))
@@ -192,6 +215,7 @@ def main() -> None:
     options = parser.parse_args()
     for narrow in (False, True):
         loops(5 * options.rounds, narrow)
+    series(options.rounds)
     back_ends(max(1, options.rounds // 4))
     processes(max(1, options.rounds // 4))
 

@@ -53,7 +53,16 @@ def compile(
     if targets.TARGETS[target].fixed:
         chosen = (settings or _DEFAULTS).for_program(choice.increments, choice.kernel)
         return generate(naming.of(fixed_program(choice, chosen)), target)
-    return generate(naming.of(program(choice)), target)
+    return generate(naming.of(_declared(program(choice), target, settings)), target)
+
+
+def _declared(program: Program, target: str, settings: Settings | None) -> Program:
+    """Return a program for a target in floating point, with the ranges that settings declare."""
+    if settings is None:
+        return program
+    from strapgen.fixedpoint.bounded_series import with_declared_ranges
+
+    return with_declared_ranges(program, settings, targets.TARGETS[target].number or "double")
 
 
 @cached("fixed-programs", "integers of {0.kernel}")
@@ -179,13 +188,16 @@ def quantize(program: Program, settings: Settings | None = None) -> FixedProgram
 def generate(program: Program | FixedProgram, target: str, settings: Settings | None = None) -> Sources:
     """Turn a program into source text; for a fixed-point target a `Program` is quantized first.
 
+    In floating point, settings that state ranges alone declare them: bounds are those of the ranges, and series take
+    the place of the root, the cosine and the sine of a length whose range they bound.
+
     Parameters
     ----------
     program : Program or FixedProgram
     target : str
         A key of `strapgen.TARGETS`: one that ``strapgen list`` shows, of an installed package too.
     settings : Settings, optional
-        Word, ranges and rounding for a `Program` and a fixed-point target.
+        Word, ranges and rounding for a `Program` and a fixed-point target; ranges alone for one in floating point.
 
     Raises
     ------
@@ -204,7 +216,9 @@ def generate(program: Program | FixedProgram, target: str, settings: Settings | 
     _require_target(target, settings)
     if isinstance(program, Program) and targets.TARGETS[target].fixed:
         program = quantize(program, settings)
-    elif isinstance(program, FixedProgram) and settings is not None:
+    elif isinstance(program, Program):
+        program = _declared(program, target, settings)
+    elif settings is not None:
         kernel = program.program.kernel
         raise InputError(f"the program of {kernel} is quantized already; settings do not go with it")
     kernel = program.kernel if isinstance(program, Program) else program.program.kernel
@@ -217,7 +231,9 @@ def _require_target(target: Any, settings: Any) -> None:
         names = some(targets.TARGETS)
         raise InputTypeError(f"target is {checks.describe(target)}; a name is needed: {names}")
     _require_settings(settings)
-    targets.require(target, settings)
+    known = target in targets.TARGETS
+    declares = known and settings is not None and settings.only_ranges and not targets.TARGETS[target].fixed
+    targets.require(target, None if declares else settings)
 
 
 def _require_settings(settings: Any) -> None:

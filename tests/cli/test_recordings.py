@@ -75,6 +75,29 @@ def test_increment_left_over_is_said(capsys, tmp_path):
     assert "3 increments at the end fill no step of 8 and are left out" in said
 
 
+@pytest.mark.parametrize("form", ["text", "csv", "json"])
+def test_increment_left_over_in_two_speeds_is_said_once(capsys, form):
+    log = str(Path(__file__).parents[2] / "examples/inertial_log.csv")
+    with pytest.raises(SystemExit) as ended:
+        main(
+            [
+                "strapdown",
+                "dcm",
+                "--recording",
+                log,
+                "--fast-cycles",
+                "3",
+                "--slow-cycles",
+                "7",
+                "--format",
+                form,
+            ]
+        )
+    assert not ended.value.code
+    out, said = capsys.readouterr()
+    assert out.count("left out") + said.count("left out") == 1
+
+
 #: Headers and rows of loggers, from which 1 s at 36 deg/s about z is read.
 LOGS = {
     "phyphox": (

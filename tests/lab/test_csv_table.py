@@ -145,7 +145,7 @@ def test_units_in_brackets_or_below_the_header(tmp_path):
     path = tmp_path / "gyro.csv"
     path.write_text("#timestamp [ns],w_RS_S_x [rad s^-1],gyro[2],T (°C)\n1,2,3,4\n", encoding="latin-1")
     units = [column.unit for column in open_log(path).topics[0].columns]
-    assert units == ["ns", "rad/s", None, "degc"]
+    assert units == ["ns", "rad/s", None, "°C"]
     path.write_text("Time,GyroX,Label\n(s),(deg/s),\n1,2,3\n")
     assert open_log(path).topics[0].columns == (
         LogColumn("Time", "s"),

@@ -192,6 +192,15 @@ def test_gaps_of_the_truth_are_left_out(motion, history):
     assert np.isnan(at).all(axis=1).tolist() == [False, True, False, True]
 
 
+def test_truth_in_the_other_sense_is_told(motion, history):
+    right = truth(motion, left=TURNED)
+    wrong = TrueAttitude(right.time, quaternions.inverse(right.quaternions))
+    mounted = truth(motion, right=MOUNTED)
+    assert "the other sense" in attitude_error(history, wrong, align="mean").lines()[-1]
+    assert not attitude_error(history, truth(motion)).doubt
+    assert not attitude_error(history, mounted).doubt, "a mounting is no sense"
+
+
 # What is refused
 
 

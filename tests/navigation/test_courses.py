@@ -45,11 +45,11 @@ def test_a_wobble_on_one_spot(algorithm, sculling, backend_name, wobble):
     true = motion("coning", a_deg_s=20, b_deg_s=200, g_deg_s=5).attitude(made.time)
     computed = evaluator("dcm-from-euler-angles")(made.angles)
     # The first cycle knows no increment before it: a twelfth of their cross product is missing.
-    missing = np.linalg.norm(np.cross(*wobble.increments[:2])) / 12
+    missing = np.linalg.norm(np.cross(*wobble.samples[:2])) / 12
     allowed = 1.5 * missing + ROUNDING.get(precision(backend_name), 1e-9)
     assert np.linalg.norm(drift_between(computed, true), axis=-1).max() <= allowed
     # (47) leaves out the square of the angle of a slow cycle: up to a sixth of it, of the whole reaction to gravity.
-    angle = np.linalg.norm(wobble.increments, axis=-1).max() * 4
+    angle = np.linalg.norm(wobble.samples, axis=-1).max() * 4
     left_out = angle**2 / 6 * GRAVITY
     rounding = {"float": 1e-4, "16": 0.2}.get(precision(backend_name), 1e-6)
     assert np.abs(made.velocity_changes - [0, 0, GRAVITY]).max() <= left_out + rounding
@@ -76,7 +76,7 @@ def test_incomplete_cycles_are_reported(wobble):
     made = course("dcm", wobble, fast_cycles=3, slow_cycles=7)
     assert (len(made.time), made.unused) == (47, 13)
     said = CourseResult({"backend": "numpy"}, made).text()
-    assert "13 increments at the end make no whole navigation cycle" in said
+    assert "13 increments at the end fill no navigation cycle" in said
     assert "of 47 cycles; --format csv prints all" in said
 
 

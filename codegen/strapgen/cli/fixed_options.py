@@ -26,6 +26,10 @@ RUN_OPTIONS = (
 )
 
 
+#: The options that state the largest numbers, which code in floating point takes too.
+_RANGE_OPTIONS = {"--max-rate-deg-s", "--step", "--sample-hz", "--max-angle-rad", "--range"}
+
+
 def _rate_of_a_count(option: str, text: str) -> str:
     """Read a rate with its unit."""
     from strapgen.ir.units import Sensor
@@ -191,6 +195,14 @@ class FixedOptions:
         if "lsb_rad" in given:
             given["lsb"] = f"{given.pop('lsb_rad')}rad"
         return Settings.of(increments=increments, **given)
+
+    def check_target(self, target: str) -> None:
+        """Refuse options that a target in floating point does not take: all but those of the largest numbers."""
+        from strapgen.targets import TARGETS, fixed_targets
+
+        if not TARGETS[target].fixed and not {*stated(self)} <= _RANGE_OPTIONS:
+            takers = " or ".join(fixed_targets())
+            raise InputError(f"the options of fixed point go with --target {takers}, not with {target}")
 
     def at_step(self, seconds: float) -> FixedOptions:
         """Return the options at the step of a run in s, by which a largest rate becomes a largest increment."""

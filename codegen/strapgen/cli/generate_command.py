@@ -202,7 +202,8 @@ def generate(
     """Generate source code for an algorithm, or for the whole catalogue.
 
     For the targets c-fixed and fixed-model, state the largest body rate and the step length. The formats and the
-    error bounds then hold for all increments up to that rate.
+    error bounds then hold for all increments up to that rate. Targets in double and float take them too: series
+    then stand for sines and roots where the rate allows it.
 
     Example: strapgen generate euler --method rk4 --increments 2 --target c --out firmware
 
@@ -265,14 +266,10 @@ def request(
 ) -> Request:
     """Return the request of the command's options."""
     from strapgen.run.kernel_sources import Request
-    from strapgen.targets import TARGETS, fixed_targets
 
     choice = method.choose(algorithm, step=False)
     settings = fixed.settings(choice.increments_per_step)
-    if settings is not None and not TARGETS[target].fixed:
-        raise InputError(
-            f"the options of fixed point go with --target {' or '.join(fixed_targets())}, not with {target}"
-        )
+    fixed.check_target(target)
     output.require_language(target)
     fixed.check_increments(choice)
     return Request(choice, target, settings, output.naming)

@@ -133,6 +133,10 @@ def _assign(context: DerivationContext, assignment: Assignment) -> None:
         derive_operation(context, name, node, assignment.meaning)
     else:
         store(context, name, terms_of(context, node, name), assignment.meaning, whole=name in context.outputs)
+    if assignment.remainder:
+        quantity = context.items[name]
+        error = quantity.approximation_error + up(assignment.remainder)
+        context.items[name] = replace(quantity, approximation_error=error)
 
 
 def _output_quantities(context: DerivationContext, result: Result) -> tuple[Operand, ...]:

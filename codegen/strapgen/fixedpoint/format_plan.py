@@ -260,6 +260,8 @@ def state_fraction(word: int, largest: Fraction) -> int:
 
 def largest_magnitude(program: Program, signal: Signal, settings: Settings) -> Fraction:
     """Return the largest magnitude of the elements of an input."""
+    if signal.limit is not None:
+        return signal.limit
     if signal.name in settings.ranges:
         if signal.constraint or signal.name in ROTATION_INPUTS:
             raise InputError(

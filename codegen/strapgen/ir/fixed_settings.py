@@ -309,7 +309,7 @@ class Settings(ReadOnly):
         angle, options = None, []
         if largest_angle is not None:
             angle = checks.number("largest angle", largest_angle, positive=True)
-            options = [f"--max-angle-rad {largest_angle}"] * (sensor is not None)
+            options = [f"--max-angle-rad {largest_angle}"] * (sensor is not None or angle == DEFAULT_ANGLE)
         elif max_rate_deg_s is not None and interval is not None:
             angle = checks.number("max_rate_deg_s", max_rate_deg_s, positive=True) * interval * _DEGREE
             options = [f"--max-rate-deg-s {max_rate_deg_s}"]
@@ -372,6 +372,24 @@ class Settings(ReadOnly):
             sensor=angles.sensor,
             whole_step=None,
         )
+
+    @property
+    def only_ranges(self) -> bool:
+        """Whether they state the ranges of inputs and nothing that belongs to fixed point alone."""
+        fixed = replace(
+            self, largest_angle=DEFAULT_ANGLE, ranges={}, stated="", increments=None, whole_step=None
+        )
+        return self.states_ranges and fixed == _DEFAULTS
+
+    @property
+    def states_ranges(self) -> bool:
+        """Whether they state the largest magnitude of an input."""
+        return bool(self.stated or self.ranges) or self.largest_angle != DEFAULT_ANGLE
+
+    @property
+    def range_options(self) -> str:
+        """The options of the command line that state the largest angle."""
+        return self.stated or f"--max-angle-rad {self.largest_angle}"
 
     def fitted(self, largest: float) -> Settings:
         """Return the settings with a largest angle of this magnitude, and up to an eighth more.
@@ -445,6 +463,9 @@ class Settings(ReadOnly):
                 "whole_step": _WholeStep(*data["whole_step"]) if "whole_step" in data else None,
             }
         )
+
+
+_DEFAULTS = Settings()
 
 
 def rounded_limit(angle: Fraction) -> Fraction:

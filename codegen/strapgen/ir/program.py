@@ -143,6 +143,8 @@ class Assignment:
     name: str
     value: Node
     meaning: str = ""
+    #: Bound of the distance of the value from the function whose series it is.
+    remainder: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,8 @@ class Signal:
     over : str
         "cycle" for an increment: a change over the cycle of the stage that the signal is part of, which must not be
         sampled at another rate. "" for a value at an instant; a sum that a slower stage resets is one.
+    limit : Fraction or None
+        Largest magnitude of an element that code in floating point takes, where a user has declared one.
 
     Raises
     ------
@@ -78,6 +80,7 @@ class Signal:
     constraint: str = ""
     frame: str = ""
     over: str = ""
+    limit: Fraction | None = None
 
     __repr__ = short_repr
 
@@ -140,7 +143,9 @@ class Signal:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the signal as plain JSON data."""
-        return asdict(self) | {"bound": None if self.bound is None else str(self.bound)}
+        limit = {} if self.limit is None else {"limit": str(self.limit)}
+        data = asdict(self) | {"bound": None if self.bound is None else str(self.bound)}
+        return {name: value for name, value in data.items() if name != "limit"} | limit
 
 
 def after(signal: Signal) -> Signal:

@@ -71,13 +71,14 @@ def split(text: str) -> tuple[str, str]:
 
 
 def spelled(text: str) -> str:
-    """Return a unit in one spelling; an unknown one as it is, simplified.
+    """Return a unit in one spelling; an unknown one as it is.
 
-    >>> [spelled(text) for text in ("rad s^-1", "°/s", "dps", "deg/sec", "µs", "m/s²")]
-    ['rad/s', 'deg/s', 'deg/s', 'deg/s', 'us', 'm/s^2']
+    >>> [spelled(text) for text in ("rad s^-1", "°/s", "dps", "deg/sec", "µs", "m/s²", "uT")]
+    ['rad/s', 'deg/s', 'deg/s', 'deg/s', 'us', 'm/s^2', 'uT']
     """
     plain = _plain(text)
-    return _SPELLINGS.get(plain, plain)
+    found = _SPELLINGS.get(plain, plain)
+    return found if found in {*RATES, *TIMES, *FORCES, _ANGLE, "deg"} else text.strip()
 
 
 def _plain(text: str) -> str:

@@ -9,7 +9,6 @@ from strapgen.cli.option_groups import Excludes, OneOf, Shown, grouped, rules
 from strapgen.cli.options import MethodOptions, argument, option
 from strapgen.cli.output import TEXT_OUTPUT, Output
 from strapgen.cli.progress import waiting
-from strapgen.ir.exceptions import InputError
 
 
 @grouped
@@ -94,7 +93,6 @@ def cost(
     for kernel in kernels or ():
         choice = method.choose(kernel, step=False)
         settings = fixed.settings(choice.increments_per_step)
-        if settings is not None and not TARGETS[target].fixed:
-            raise InputError(f"the options of fixed point go with --target c-fixed, not with {target}")
+        fixed.check_target(target)
         rows += costs.costs_of([choice], target, settings, processors).costs
     output.show(CostResult(rows))

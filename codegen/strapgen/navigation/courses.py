@@ -276,7 +276,8 @@ class CourseResult(Result):
             lines.append(f"({len(shown)} of {len(course.time)} cycles; --format csv prints all)")
         if course.unused:
             lines.append(
-                f"{course.unused} increments at the end make no whole navigation cycle and were not used"
+                f"{checks.counted(course.unused, 'increment')} at the end fill no navigation cycle and "
+                f"{'is' if course.unused == 1 else 'are'} left out"
             )
         return "\n".join(lines)
 

@@ -152,7 +152,8 @@ def strapdown(
     covered = _course(algorithm, data, counts, backend, fixed, start)
     of_cycle = counts["fast_cycles"] * counts["slow_cycles"]
     source.say_remarks(data)
-    say_unused(source.file, covered.unused, of_cycle, "navigation cycle")
+    if output.file is not None or output.format not in (None, "text"):  # the text says it itself
+        say_unused(source.file, covered.unused, of_cycle, "navigation cycle")
     facts = {"algorithm": f"{algorithm} in two speeds", "backend": backend, "source": source.source}
     facts |= {} if errors is None else {"errors": errors}
     _deliver(covered, facts, f"{facts['algorithm']}, {backend}: {source.file.name}", output)

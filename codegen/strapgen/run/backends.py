@@ -25,7 +25,7 @@ from strapgen.run.backend_names import BACKENDS, DEFAULT_BACKENDS, Entry, of_sou
 from strapgen.run.evaluators import Array, Evaluator, Loop, in_si
 from strapgen.run.increments import PART, run_parts
 from strapgen.run.kernel_sources import StepSources, sources_of_choice
-from strapgen.targets.registry import NUMPY
+from strapgen.targets.registry import NUMPY, TARGETS
 
 __all__ = [
     "BACKENDS",
@@ -461,6 +461,7 @@ class Backend:
 
     def _rows(self, samples: Array) -> Array:
         """Return samples, (runs, N, samples, 3), in the numbers of the code, (runs, N, elements)."""
+        self.evaluator.check_limit(1, samples)
         return self.evaluator.stored(1, samples.reshape(*samples.shape[:2], 3 * self.samples_per_step))
 
     def _states(self, rows: Array) -> Array:
@@ -508,6 +509,15 @@ def fit_settings(backend: str, settings: Settings | None) -> Settings | None:
     return replace(settings, word=entry.word)
 
 
+def _settings_of_kernel(backend: str, settings: Settings | None) -> Settings | None:
+    """Return the settings of a single kernel: `fit_settings`, or the ranges that are declared for generated text."""
+    entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
+    is_text = entry.target in TARGETS and not entry.fixed
+    if is_text and isinstance(settings, Settings) and settings.only_ranges:
+        return settings
+    return fit_settings(backend, settings)
+
+
 def evaluator(kernel: AnyAlgorithm, backend: str = "numpy", settings: Settings | None = None) -> Evaluator:
     """Return a kernel as a callable.
 
@@ -519,7 +529,7 @@ def evaluator(kernel: AnyAlgorithm, backend: str = "numpy", settings: Settings |
     backend : str, optional
         A key of `BACKENDS`.
     settings : Settings, optional
-        Settings of fixed point.
+        Settings of fixed point; ranges alone for generated code in floating point.
 
     Returns
     -------
@@ -545,7 +555,9 @@ def evaluator(kernel: AnyAlgorithm, backend: str = "numpy", settings: Settings |
     if isinstance(name, str):
         checks.choice("kernel", name, {**catalogue.KERNELS, **catalogue.LAYOUT_KERNELS})
     choice = catalogue.choose(name)
-    return of_sources(sources_of_choice(choice, BACKENDS[backend].target, fit_settings(backend, settings)))
+    return of_sources(
+        sources_of_choice(choice, BACKENDS[backend].target, _settings_of_kernel(backend, settings))
+    )
 
 
 def backend(
@@ -576,7 +588,8 @@ def backend(
         Kernel that orthonormalizes, for instance "dcm-orthonormalize-optimal"; by default the thesis's.
     settings : Settings, optional
         Settings of fixed point: largest increment, rounding, error feedback, and the word of "fixed-model". By default
-        increments are at most 1/8 rad.
+        increments are at most 1/8 rad. Generated code in floating point takes a largest increment alone: see
+        `strapgen.generate`.
     previous, ahead : int, optional
         Numbers of increments from before the step and from after it that it takes in addition, together at most 32;
         by default 0.
@@ -604,7 +617,7 @@ def backend(
     choice = catalogue.choose_step(name, method, increments, previous=previous, ahead=ahead)
     if orthonormalization is not None:
         checks.choice("orthonormalization", orthonormalization, choice.orthonormalizations)
-    step = sources_of_choice(choice, BACKENDS[backend].target, fit_settings(backend, settings))
+    step = sources_of_choice(choice, BACKENDS[backend].target, _settings_of_kernel(backend, settings))
     return Backend(StepSources(step, choice, orthonormalization))
 
 
@@ -614,7 +627,9 @@ def sources_to_build(choice: Choice, backend: str, settings: Settings | None = N
     `strapgen.compile_together` compiles those of many steps in one call of the compiler.
     """
     entry = BACKENDS[checks.choice("backend", backend, BACKENDS)]
-    step = StepSources(sources_of_choice(choice, entry.target, fit_settings(backend, settings)), choice)
+    step = StepSources(
+        sources_of_choice(choice, entry.target, _settings_of_kernel(backend, settings)), choice
+    )
     beside = step.step_kernels.orthonormalize
     return [step.step, *([] if beside is None else [step.sources(beside, entry.target)])]
 

@@ -124,6 +124,8 @@ class Evaluator(ABC):
             checks.real_array(signal.name, value, signal.shape, self.dtype)
             for signal, value in zip(signals, values, strict=True)
         ]
+        for place, array in enumerate(arrays):
+            self.check_limit(place, array)
         leading = [a.shape[: a.ndim - len(s.shape)] for a, s in zip(arrays, signals, strict=True)]
         try:
             batch = np.broadcast_shapes(*leading)
@@ -159,6 +161,18 @@ class Evaluator(ABC):
             self.in_si(place, output).reshape(batch + signal.shape)
             for place, (output, signal) in enumerate(zip(outputs, self.function.outputs, strict=True))
         )
+
+    def check_limit(self, place: int, values: Array) -> None:
+        """Refuse values of an input, by its place, beyond the range that was declared for its code."""
+        signal = self.function.inputs[place]
+        if signal.limit is None or not values.size:
+            return
+        most = float(max(values.max(), -values.min()))
+        if most > signal.limit:
+            raise InputError(
+                f"{signal.name} holds {most:.9g}; {self.kernel} was generated for at most "
+                f"{float(signal.limit):.9g} in magnitude"
+            )
 
     def stored(self, place: int, values: Any) -> Array:
         """Return values of an input, by its place, in the numbers that `run` takes."""

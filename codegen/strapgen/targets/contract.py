@@ -81,7 +81,7 @@ def options(settings: Settings, inputs: Iterable[Signal] = (), *, keep_stated: b
         largest = settings.stated
         words.append(largest)
     elif any(signal.name in ROTATION_INPUTS for signal in inputs):
-        largest = settings.stated or f"--max-angle-rad {settings.largest_angle}"
+        largest = settings.range_options
         words.append(largest)
     if settings.sensor is not None and settings.sensor.stated not in largest:
         words.append(settings.sensor.stated)
@@ -172,6 +172,8 @@ def elements_text(signal: Signal) -> str:
 
 def range_text(signal: Signal) -> str:
     """Return the range of a signal in words, for a contract."""
+    if signal.limit is not None:
+        return f"at most {below(signal.limit)} in magnitude, as its error bounds and series need it"
     if signal.bound is None:
         return "any finite number"
     return f"any finite number; at most {signal.bound} in magnitude in normal use"

@@ -19,7 +19,7 @@ from strapgen.ir import checks
 from strapgen.ir.exceptions import InputError, InputTypeError
 from strapgen.ir.integer_program import FixedProgram, IntegerOperation, IntegerSum, Scaled, Term, Value
 from strapgen.ir.interfaces import Argument, ErrorFeedback, Interface
-from strapgen.ir.program import Assignment, Node, Operation, Program, Reference, Result
+from strapgen.ir.program import Node, Operation, Program, Reference, Result
 from strapgen.ir.signals import Signal
 from strapgen.targets.c_library import LIBRARY
 
@@ -377,7 +377,7 @@ class _Renaming:
             program,
             name=self.names.get(Key("function", program.name), program.name),
             inputs=tuple(map(self.signal, program.inputs)),
-            body=tuple(Assignment(self.value(a.name), self.node(a.value), a.meaning) for a in program.body),
+            body=tuple(replace(a, name=self.value(a.name), value=self.node(a.value)) for a in program.body),
             outputs=tuple(map(self.result, program.outputs)),
             transition=program.transition and self.result(program.transition),
         )

@@ -241,6 +241,15 @@ def test_a_file_is_read_and_named_after_its_title(written):
     assert now.file == "mine.toml" and (now.objective, window.objective) == ("mean square", "minimax")
 
 
+def test_gyro_series_is_the_inverse_of_its_denominator():
+    """All terms of the product with 1 + 2 zeta s/w + s^2/w^2 vanish but the first, exactly."""
+    terms, inverse = 9, GYRO.sample_hz / (2 * window_conditions.PI * GYRO.bandwidth_hz)
+    denominator = [Fraction(1), 2 * GYRO.damping * inverse, inverse**2]
+    series = window_conditions.gyro_series(GYRO, terms)
+    product = [sum(d * series[n - k] for k, d in enumerate(denominator[: n + 1])) for n in range(terms)]
+    assert product == [1] + [0] * (terms - 1)
+
+
 def test_a_gyro_needs_filters_for_both_sides(written):
     # c_0 of a gyro: its lag 2 zeta/w, times the slope of the rate, is added again.
     gyro = "{bandwidth_hz = 40, damping = '0.7071', sample_hz = 100}"

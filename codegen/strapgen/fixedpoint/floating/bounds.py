@@ -118,7 +118,8 @@ def rounding_bounds(
         return proved.bounds(program, number, precision)
     known = {*settings.ranges, *ROTATION_INPUTS}
     for signal in program.inputs:
-        if signal.bound is None and not signal.constraint and signal.name not in known:
+        without = signal.bound is None and signal.limit is None and not signal.constraint
+        if without and signal.name not in known:
             reason = f"the range of {signal.name} is unknown"
             return RoundingBounds(number, precision, reason=reason)
     return _bounds(

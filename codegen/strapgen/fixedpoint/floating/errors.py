@@ -43,6 +43,7 @@ class Expressions:
     names: dict[str, int] = field(default_factory=dict)  # places of elements of inputs and of assignments
     labels: dict[int, str] = field(default_factory=dict)  # assignments in which operations stand
     results: dict[str, list[int]] = field(default_factory=dict)  # places of the elements of every result
+    remainders: dict[int, Fraction] = field(default_factory=dict)  # of series, at the places of their values
     _places: dict[Expression, int] = field(default_factory=dict)
 
     @classmethod
@@ -52,7 +53,9 @@ class Expressions:
         for name in [*(name for signal in program.inputs for name in signal.elements), RESOLUTION]:
             flat.names[name] = flat._place(Expression(INPUT, name=name), name)
         for assignment in program.body:
-            flat.names[assignment.name] = flat.place_of(assignment.value, assignment.name)
+            place = flat.names[assignment.name] = flat.place_of(assignment.value, assignment.name)
+            if assignment.remainder:
+                flat.remainders[place] = max(assignment.remainder, flat.remainders.get(place, _ZERO))
         for result in program.results:
             name = result.signal.name
             flat.results[name] = [flat.place_of(node, name) for node in result.nodes]
@@ -198,6 +201,8 @@ class _ComputedNumbers:
         if expression.kind == CONSTANT:
             return self._literal(expression.value)
         carried, second = self._propagate(place, expression)
+        left_out = up(self.expressions.remainders.get(place, _ZERO))
+        carried, second = carried + left_out, second + left_out
         before = self._before_rounding(expression).meet(exact.widened(carried))
         rounding = self._rounding(expression, before)
         after = before.widened(rounding).meet(self._round(before, expression.kind))

@@ -107,6 +107,10 @@ class ExactRanges:
             terms = self._terms(expression)
             seen = float(np.nan_to_num(np.abs(self._anywhere[place]), posinf=0).max()) or 1e-300
             known = self._proofs.of_sum(name, terms, seen)
+            if remainder := self.expressions.remainders.get(place):
+                known = known.widened(remainder)
+                self._note(name, _UNKNOWN, known)
+                return known
             self._items[name] = Quantity(name, Sum(tuple(terms.items())), Fraction(0), known)
             return known
         known = self._function_range(place, expression)

@@ -46,6 +46,8 @@ _MOST_INSTANTS, _LEAST_INTERVAL = 1 << 18, 0.01
 _PARTS = 10
 #: Least time in s of a turn that tells how two bodies are mounted, and its least angle in rad.
 _TURN_SECONDS, _TURN_ANGLE = 0.5, 0.02
+#: The other sense is told where turns differ by this much in rad or more, and from those of the inverse by a fourth.
+_OTHER_SENSE, _CLEARLY = 0.01, 0.25
 #: Seconds in an hour.
 _HOUR = 3600
 
@@ -486,6 +488,8 @@ class AttitudeError(Records):
         A key of `ALIGNMENTS`.
     reference, body : array, (4,)
         Quaternions of the turns of the computed attitude's reference and body axes.
+    doubt : str, optional
+        What makes the truth's stated sense doubtful.
 
     Examples
     --------
@@ -502,6 +506,7 @@ class AttitudeError(Records):
     align: str
     reference: Array = field(repr=False)
     body: Array = field(repr=False)
+    doubt: str = ""
 
     __repr__ = short_repr
 
@@ -551,6 +556,7 @@ class AttitudeError(Records):
             f"slope of the angle {slope.deg_h:.4g} +- {slope.uncertainty_deg_h:.2g} deg/h; of the error about the "
             f"reference axes {by_axis} deg/h (least squares; standard deviations from the slopes between ten "
             "parts)",
+            *([self.doubt] if self.doubt else []),
         ]
 
     def at(self, time: Array) -> Array:
@@ -596,8 +602,9 @@ def attitude_error(
     --------
     >>> from strapgen import backend, propagate
     >>> rest = propagate(backend("dcm"), Recording(0.0, 0.01, np.zeros((200, 3))))
-    >>> attitude_error(rest, TrueAttitude.of([0, 2], [[0, 0, 0.6, 0.8]] * 2), align="none").angle[-1].round(6)
-    np.float64(1.287002)
+    >>> error = attitude_error(rest, TrueAttitude.of([0, 2], [[0, 0, 0.6, 0.8]] * 2), align="none")
+    >>> round(float(error.angle[-1]), 6)
+    1.287002
     """
     checks.choice("align", align, ALIGNMENTS)
     if not isinstance(offset, TimeOffset):
@@ -616,6 +623,7 @@ def attitude_error(
             f"the truth is from {truth.time[0]:.12g} s to {truth.time[-1]:.12g} s, and the attitude from "
             f"{shown[0]:.12g} s to {shown[-1]:.12g} s on its clock; they have to overlap"
         )
+    doubt = _doubt_of_sense(at, found, true)
     body = _mounting(at, found, true) if align == "mounting" else np.array([0.0, 0, 0, 1])
     found = quaternions.product(found, body)
     turns = quaternions.product(true, quaternions.inverse(found))
@@ -623,7 +631,7 @@ def attitude_error(
     vector = quaternions.rotation_vectors(
         quaternions.inverse(quaternions.product(turns, quaternions.inverse(reference)))
     )
-    return AttitudeError(at - offset.seconds, vector, offset, align, reference, body)
+    return AttitudeError(at - offset.seconds, vector, offset, align, reference, body, doubt)
 
 
 def _mean(turns: Array) -> Array:
@@ -641,13 +649,30 @@ _REFERENCES: dict[str, Callable[[Array], Array]] = {
 }
 
 
+def _turns(time: Array, q: Array) -> Array:
+    """Return the rotation vectors over half a second or more, body axes."""
+    apart = max(1, math.ceil(_TURN_SECONDS / float(np.median(np.diff(time)))))
+    return quaternions.rotation_vectors(quaternions.product(quaternions.inverse(q[:-apart]), q[apart:]))
+
+
+def _doubt_of_sense(time: Array, found: Array, true: Array) -> str:
+    """Return what tells that a truth has the other sense: the turns are those of its inverse; "" if they are not."""
+    mine, stated, other = (_turns(time, q) for q in (found, true, quaternions.inverse(true)))
+    if not len(mine):
+        return ""
+    beside, better = (float(np.sqrt(np.mean(np.sum((mine - one) ** 2, axis=1)))) for one in (stated, other))
+    if beside < _OTHER_SENSE or better > _CLEARLY * beside:
+        return ""
+    return (
+        f"the truth seems to have the other sense: turns over {_TURN_SECONDS:g} s differ by "
+        f"{math.degrees(beside):.2g} deg, and by {math.degrees(better):.2g} deg from those of its inverse; "
+        "--true-sense states it"
+    )
+
+
 def _mounting(time: Array, found: Array, true: Array) -> Array:
     """Return the turn from the computed body axes to the true ones, from rotations over half a second or more."""
-    apart = max(1, math.ceil(_TURN_SECONDS / float(np.median(np.diff(time)))))
-    mine, others = (
-        quaternions.rotation_vectors(quaternions.product(quaternions.inverse(q[:-apart]), q[apart:]))
-        for q in (found, true)
-    )
+    mine, others = (_turns(time, q) for q in (found, true))
     moved = (np.linalg.norm(mine, axis=1) > _TURN_ANGLE) & (np.linalg.norm(mine, axis=1) < 3)
     sums = mine[moved].T @ others[moved]
     sizes = np.linalg.svd(mine[moved], compute_uv=False) if moved.any() else np.zeros(3)
